@@ -33,17 +33,16 @@ def open_scene_file(
             raise UsageError(f"--{name} is for one model; in {path.name} each object has its own.")
     file = read_scene_file(path)
     with progress_after(PATIENCE_S) as progress:
-        models = read_models(file, replace(options.reading(), progress=progress))
+        file, models = read_models(file, replace(options.reading(), progress=progress))
     if show_findings:
         print_findings(models)
     return file, models, scene_of(file, models)
 
 
 def print_findings(models: dict[str, "Model"]) -> None:
-    """What is wrong with the models, each printed once however many objects have it."""
-    for model in {id(model): model for model in models.values()}.values():
-        for finding in model.findings:
-            say(sentence(finding))
+    """What is wrong with the models, once however many objects have one or parts of it."""
+    for finding in dict.fromkeys(f for model in models.values() for f in model.findings):
+        say(sentence(finding))
 
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:
@@ -61,6 +60,7 @@ def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) ->
             {
                 "name": item.name,
                 "model": item.model,
+                "part": item.part,
                 "splats": models[item.name].splat_count,
                 "x": control_row(item.x),
                 "position": list(item.position),

@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS, basis
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import BadFile, Finding, Model, ScaffoldModel, SplatLayers
+from shapeshift.runtime_models.parts import splat_labels
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.stop_weights import Controls
 
@@ -102,13 +103,14 @@ def as_plain(
     plain = PlainSplats(means, scales, wxyz, opacity, sh, findings=findings, format="baked")
     if isinstance(model, ScaffoldModel):
         return replace(plain, origin=model.origin)
+    labels = splat_labels(model)
+    plain = replace(plain, labels=None if labels is None else of_rows(labels, there))
     if not isinstance(model, SplatLayers):
         return plain
     return replace(
         plain,
         origin=model.origin,
         antialiased=model.antialiased,
-        labels=None if model.labels is None else of_rows(model.labels, there),
         extra={name: of_rows(column, there) for name, column in model.extra.items()},
     )
 

@@ -16,6 +16,7 @@ SCAFFOLD_HEADS = {"opacity": 1, "covariance": 7, "color": 3}  # numbers a splat
 OCTREE_RULES = ("round", "floor", "ceil", "progressive")
 STOP_KINDS = ("rgb", "thermal", "layer", "style")
 BETWEEN_STOPS = ("blend", "encoding")
+MOST_LABEL = 254  # of an object; 255 of a label map says nothing of a pixel
 LONGEST_SENTENCE = 600  # letters of a refusal, whatever of a file's words is in it
 
 
@@ -67,6 +68,14 @@ class Mlp:
 
 
 @dataclass(frozen=True)
+class ObjectLabel:
+    """What the anchors of one label show; label 0, the background, has no name."""
+
+    label: int  # 1 to MOST_LABEL
+    name: str
+
+
+@dataclass(frozen=True)
 class AnchorFrames:
     """Every anchor's own axes and sizes: a splat is predicted in them, as if all were alike.
 
@@ -96,9 +105,12 @@ class AnchorModel:
     pace: tuple[Pace, ...] = ()  # of some pairs of stops
     between_stops: str = "blend"  # one of BETWEEN_STOPS: x there is a blend, or encoded as it is
     frames: AnchorFrames | None = None  # None: the object's axes and size 1 for all
+    labels: np.ndarray | None = None  # (A,) uint8 object of each anchor; 0 = background
+    objects: tuple[ObjectLabel, ...] = ()  # of every label above 0 that there is; maybe more
 
     def __post_init__(self) -> None:
         check(anchors=(self.anchors, "A 3"), features=(self.features, "A F"))
+        check_labels(self.labels, self.objects, len(self.anchors))
         if self.frames is not None:
             check(anchors=(self.anchors, "A 3"), scales=(self.frames.scales, "A 3"))
 
@@ -127,7 +139,28 @@ class AnchorModel:
             anchors=np.ascontiguousarray(self.anchors[rows]),
             features=np.ascontiguousarray(self.features[rows]),
             frames=frames,
+            labels=None if self.labels is None else np.ascontiguousarray(self.labels[rows]),
         )
+
+
+def check_labels(labels: np.ndarray | None, objects: tuple[ObjectLabel, ...], anchors: int) -> None:
+    """ValueError, one sentence, where labels of anchors and the names of objects do not fit."""
+    if labels is None:
+        if objects:
+            raise ValueError(f"objects name {len(objects)} labels, but no anchor has labels")
+        return
+    if labels.dtype != np.uint8 or labels.shape != (anchors,):
+        raise ValueError(
+            f"labels are {labels.dtype} of shape {labels.shape}, expected uint8 of ({anchors},)"
+        )
+    numbers, names = [o.label for o in objects], [o.name for o in objects]
+    if any(not 1 <= number <= MOST_LABEL for number in numbers):
+        raise ValueError(f"objects have the labels {numbers}, expected 1 to {MOST_LABEL}")
+    for what, values in (("label", numbers), ("name", names)):
+        if twice := [value for value in values if values.count(value) > 1]:
+            raise ValueError(f"two objects have the {what} {twice[0]}")
+    if unnamed := sorted(set(np.unique(labels).tolist()) - {0, *numbers}):
+        raise ValueError(f"anchors have the label {unnamed[0]}, which no object has")
 
 
 @dataclass(frozen=True)
@@ -167,6 +200,17 @@ class SplatLayers:
     def blend(self) -> StopBlend:
         """What a control means."""
         return StopBlend(self.stops)
+
+    def with_rows(self, rows: np.ndarray) -> "SplatLayers":
+        """These splats alone, in their order."""
+        names = ("means", "scales", "wxyz", "opacity", "sh", "layer")
+        arrays = {name: np.ascontiguousarray(getattr(self, name)[rows]) for name in names}
+        return replace(
+            self,
+            **arrays,
+            labels=None if self.labels is None else np.ascontiguousarray(self.labels[rows]),
+            extra={name: column[rows] for name, column in self.extra.items()},
+        )
 
     def weights(self, control: Controls) -> np.ndarray:
         """(stops,) float32 in 0..1: how much of each layer is there; (stops, n) of n controls.

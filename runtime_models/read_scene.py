@@ -20,6 +20,7 @@ from shapeshift.runtime_models.package.lint_package import refuse_filling
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, format_name
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.refit_encoding import encoding_findings
+from shapeshift.runtime_models.parts import splat_labels
 from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold, read_scaffold
 from shapeshift.runtime_models.splats.foreign_files import is_address, refusal
 from shapeshift.runtime_models.splats.formats import format_of, head_of
@@ -189,6 +190,7 @@ def describe(model: Model, path: str | Path) -> dict:
         | networks
         | {"encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing}}
         | {"between_stops": model.between_stops, "paced_pairs": len(model.pace)}
+        | describe_labels(model)
         | describe_findings(model)
     )
 
@@ -199,12 +201,17 @@ def describe_findings(model: Model) -> dict:
     return {"findings": sentences} if sentences else {}
 
 
-def describe_labels(model: SplatLayers) -> dict:
-    """Splats of each label, where there are labels."""
-    if model.labels is None:
+def describe_labels(model: Model) -> dict:
+    """Splats of each label and the names of objects, where there are such."""
+    if (of_splats := splat_labels(model)) is None:
         return {}
-    labels, counts = np.unique(model.labels, return_counts=True)
-    return {"labels": {str(label): int(n) for label, n in zip(labels, counts, strict=True)}}
+    labels, counts = np.unique(of_splats, return_counts=True)
+    there = {int(label): int(n) for label, n in zip(labels, counts, strict=True)}
+    if not isinstance(model, AnchorModel):
+        return {"labels": {str(label): n for label, n in there.items()}}
+    known = dict.fromkeys((o.label for o in model.objects), 0) | there
+    names = {str(o.label): o.name for o in model.objects}
+    return {"labels": {str(label): known[label] for label in sorted(known)}, "label_names": names}
 
 
 def describe_octree(model: ScaffoldModel) -> dict:

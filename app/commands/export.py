@@ -43,8 +43,9 @@ class Options(ReadingOptions):
     object of this name or label.  Default: all."""
     overwrite: bool = False
     """Replace an earlier file; never what is read."""
-    label: Annotated[int | None, EXPERT] = None
-    """Write only the object of this label (files with labels: Gaussian Grouping).  Default: all."""
+    label: Annotated[str, EXPERT] = ""
+    """Write only the object of this label or name, where a scene has labels: a package that
+    `segment` made, files of Gaussian Grouping.  Default: all."""
     eye: Annotated[str, Opt(expert=True, metavar="X,Y,Z")] = ""
     """Metres: from where a scene is seen whose shape depends on that (Scaffold-GS).  Default: the
     first view."""
@@ -213,7 +214,7 @@ def make_part(path: Path, model, position, options: Options, known=None):
         raise UsageError(f"--only {error}") from None
     pose = Pose(position, IDENTITY.wxyz)
     thing = SceneObject(path.stem or path.name, model, pose, x, selectors=selectors)
-    return Part(thing, inside or None, options.label)
+    return Part(thing, inside or None, options.label or None)
 
 
 def choose_x(text: str, model):
@@ -259,7 +260,7 @@ def export_package(options: Options, opened: list) -> int:
 
     asked = {
         "--x": options.x, "--select": options.select, "--only": options.only,
-        "--label": options.label is not None, "--eye": options.eye,
+        "--eye": options.eye,
     }  # fmt: skip
     given = [name for name, value in asked.items() if value]
     if given:
@@ -275,11 +276,17 @@ def export_package(options: Options, opened: list) -> int:
             f"{what} cannot become a package: it is anchors and five networks, which "
             f"`{program()} train` makes of photos; write .ply, .spz or .glb."
         )
+    from shapeshift.app.commands.exported import label_of
     from shapeshift.app.pace import with_pace
     from shapeshift.runtime_models.package.refit_encoding import refit_encoding
+    from shapeshift.runtime_models.parts import labelled_anchors
 
     model = models[0] if options.encoding == "kept" else refit_encoding(models[0])
     model = with_pace(model) if options.pace else model
+    if options.label:
+        model = labelled_anchors(
+            model, label_of(model, options.label, opened[0].scene.objects[0].name)
+        )
     features = model.features
     halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed
     size = write_package(model, options.out, "float16" if halves else "float32")

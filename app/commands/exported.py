@@ -12,8 +12,9 @@ from shapeshift.renderer.colors.false_colors import mixed_colors, shade_of
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.runtime_models.bake import ColorAt, Recolor, bake
 from shapeshift.runtime_models.evaluate import follows_eye
-from shapeshift.runtime_models.model import Finding, SplatLayers
+from shapeshift.runtime_models.model import BadFile, Finding, Model, SplatLayers
 from shapeshift.runtime_models.package.package_files import MANIFEST
+from shapeshift.runtime_models.parts import find_label, splat_labels
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.sog.read_streamed import TREE
 from shapeshift.runtime_models.splats.sog.sog_files import META
@@ -39,7 +40,7 @@ class Part:
 
     thing: SceneObject  # with its x, its regions and its pose
     inside: tuple[Selector, ...] | None = None  # what lies in any of them; None: all
-    label: int | None = None  # the splats of this object within it; None: all
+    label: int | str | None = None  # the splats of this object within it, or its name; None: all
 
 
 @dataclass(frozen=True)
@@ -134,14 +135,16 @@ def chosen_rows(part: Part) -> np.ndarray | None:
             raise UsageError(f"nothing of {part.thing.name} lies inside; choose another place.")
     if part.label is None:
         return keep
-    labels = model.labels if isinstance(model, SplatLayers) else None
-    if labels is None:
-        raise UsageError(f"--label {part.label}: {part.thing.name} has no labels of objects.")
-    of_label = labels == part.label
-    if not of_label.any():
-        known = ", ".join(map(str, np.unique(labels)[:20]))
-        raise UsageError(f"--label {part.label}: {part.thing.name} has the labels {known}.")
+    of_label = splat_labels(model) == label_of(model, part.label, part.thing.name)
     return of_label if keep is None else keep & of_label
+
+
+def label_of(model: Model, label: int | str, name: str) -> int:
+    """The label that --label asks for, by itself or by an object's name.  Raises UsageError."""
+    try:
+        return find_label(model, label, name)
+    except BadFile as error:
+        raise UsageError(f"--label {label}: {error}") from None
 
 
 def check_output(path: Path, inputs: Sequence[Path], overwrite: bool, said: str = "--") -> None:

@@ -54,7 +54,13 @@ def print_table(facts: dict) -> None:
         elif key == "objects":
             value = "\n".join(map(object_line, value))
         elif key == "labels":
-            value = "\n".join(f"{label}: {count:,} splats" for label, count in value.items())
+            names = {"0": "background"} | facts.get("label_names", {})
+            value = "\n".join(
+                f"{label}{f' {names[label]}' if label in names else ''}: {count:,} splats"
+                for label, count in value.items()
+            )
+        elif key == "label_names":
+            continue  # told with the labels
         elif isinstance(value, int) and not isinstance(value, bool):
             value = f"{value:,}"
         table.add_row(key, Text("" if value is None else str(value)))  # names may hold brackets
@@ -64,7 +70,8 @@ def print_table(facts: dict) -> None:
 def object_line(item: dict) -> str:
     """One object of a scene file."""
     body = "not to be touched" if item["collider"] is None else item["collider"]
-    words = [item["model"], f"{item['splats']:,} splats", f"x {item['x']:g}", body]
+    part = [] if item["part"] is None else [f"part {item['part']}"]
+    words = [item["model"], *part, f"{item['splats']:,} splats", f"x {item['x']:g}", body]
     words += ["static"] if item["static"] else []
     words += [f"{item['reactions']} reactions"] if item["reactions"] else []
     return f"{item['name']}: " + ", ".join(words)

@@ -101,7 +101,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
     from shapeshift.scene.world.world import World
 
     with progress_after(PATIENCE_S) as shown:
-        models = read_models(file, Reading(progress=shown))
+        file, models = read_models(file, Reading(progress=shown))
         file = file_at(file, models, x) if x else file
         colliders = colliders_of(file, models, shown)
     world = World(file, models, colliders, hz=HZ)

@@ -15,6 +15,7 @@ from shapeshift.renderer.debug.debug_map import birdseye
 from shapeshift.renderer.debug.points import dim, dot_size, paint_points
 from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
 from shapeshift.runtime_models.model import Model, is_antialiased
+from shapeshift.runtime_models.parts import name_of, splat_labels
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
@@ -197,7 +198,9 @@ def object_counts(scene: Scene) -> dict[str, float]:
     counts: dict[str, float] = {}
     for i, (thing, parts) in enumerate(zip(scene.objects, object_parts(scene), strict=True)):
         for label, count in parts:
-            name = thing.name if label is None else f"{thing.name}, label {label}"
+            name = thing.name
+            if label is not None:
+                name += f", {name_of(thing.model, label) or f'label {label}'}"
             counts[name if name not in counts else f"{name} {i + 1}"] = float(count)
     return counts
 
@@ -220,7 +223,7 @@ def label_ranks(model: Model) -> tuple[list[int], np.ndarray | int]:
 
     What has a rarer label counts to the last one.  ([], 0) for a model without labels.
     """
-    labels = getattr(model, "labels", None)
+    labels = splat_labels(model)
     if labels is None:
         return [], 0
     found, which, counts = np.unique(labels, return_inverse=True, return_counts=True)

@@ -12,6 +12,7 @@ FORMAT = "shapeshift 1"
 FRAMES_FORMAT = "shapeshift 2"  # the same, and anchors.npz holds the anchors' own frames
 MANIFEST = "scene.json"
 ANCHORS = "anchors.npz"
+LABELS = "labels"  # the array in it that says which object each anchor is of
 WHOLE = f"a package is {MANIFEST}, {ANCHORS} and five ONNX files"
 
 LARGEST = {MANIFEST: 16 << 20, ANCHORS: 4 << 30}  # bytes, unpacked

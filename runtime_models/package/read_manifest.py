@@ -7,9 +7,11 @@ from shapeshift.runtime_models.files.json_fields import Fields, is_number, parse
 from shapeshift.runtime_models.model import (
     BETWEEN_STOPS,
     HEADS,
+    MOST_LABEL,
     STOP_KINDS,
     BadFile,
     ControlEncoding,
+    ObjectLabel,
     Stop,
 )
 from shapeshift.runtime_models.package.package_files import FORMAT, FRAMES_FORMAT
@@ -44,6 +46,7 @@ class Manifest:
     pace: tuple[Pace, ...] = ()
     between_stops: str = "blend"
     has_frames: bool = False  # whether anchors.npz holds the anchors' own frames
+    objects: tuple[ObjectLabel, ...] | None = None  # None: anchors.npz holds no labels
 
 
 def read_manifest(data: bytes, where: str) -> Manifest:
@@ -70,6 +73,7 @@ def read_manifest(data: bytes, where: str) -> Manifest:
         read_pace(top, {stop.name for stop in stops}),
         top.line("between_stops", "blend", known=BETWEEN_STOPS),
         found == FRAMES_FORMAT,
+        read_objects(top),
     )
 
 
@@ -144,6 +148,20 @@ def read_pace(top: Fields, stops: set[str]) -> tuple[Pace, ...]:
         except ValueError as error:
             raise BadFile(f"{row.where}: {error}") from None
     return tuple(paces.values())
+
+
+def read_objects(top: Fields) -> tuple[ObjectLabel, ...] | None:
+    """What the labels of anchors mean; None where the manifest has no "objects"."""
+    if not top.has("objects"):
+        return None
+    found: dict[int, ObjectLabel] = {}
+    for row in top.rows("objects", MOST_LABEL, "object", first=0):
+        label, name = row.count("label", 1, MOST_LABEL), row.line("name")
+        if label in found or name in (other.name for other in found.values()):
+            word = f"label {label}" if label in found else f"name {shown(name)}"
+            raise BadFile(f"{row.where}: the {word} is taken by another object; each has its own.")
+        found[label] = ObjectLabel(label, name)
+    return tuple(found.values())
 
 
 def check_view(provenance: Fields) -> None:

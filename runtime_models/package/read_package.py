@@ -15,9 +15,16 @@ from shapeshift.runtime_models.model import (
     AnchorModel,
     BadFile,
     Mlp,
+    ObjectLabel,
+    check_labels,
 )
 from shapeshift.runtime_models.package.feature_codes import decode_features, range_of
-from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, open_package
+from shapeshift.runtime_models.package.package_files import (
+    ANCHORS,
+    LABELS,
+    MANIFEST,
+    open_package,
+)
 from shapeshift.runtime_models.package.read_manifest import Manifest, read_manifest
 from shapeshift.runtime_models.package.read_onnx import read_onnx
 from shapeshift.runtime_models.rotation import normalize
@@ -50,6 +57,7 @@ def read_files(
     anchors, features, frames = read_anchors(
         data, manifest.feature_width, where, manifest.has_frames, memory
     )
+    labels = read_labels(data, manifest.objects, len(anchors), where, memory)
     memory.release(len(data))
     shown = len(anchors) * manifest.splats_per_anchor
     memory.charge(SHOWN * shown, f"{shown:,} splats")  # that is what they are for
@@ -60,6 +68,7 @@ def read_files(
     return AnchorModel(
         anchors, features, networks, manifest.splats_per_anchor, manifest.encoding,
         manifest.stops, manifest.provenance, (), manifest.pace, manifest.between_stops, frames,
+        labels, manifest.objects or (),
     )  # fmt: skip
 
 
@@ -95,6 +104,26 @@ def read_anchors(
             f"logarithms of factors, at most {LARGEST_LOG:g}; export it again."
         )
     return positions, features, AnchorFrames(np.exp(log_scales), normalize(wxyz))
+
+
+def read_labels(
+    data: bytes, objects: tuple[ObjectLabel, ...] | None, count: int, where: str, memory: Account
+) -> np.ndarray | None:
+    """(count,) uint8 labels of the anchors; None where there are none.  Raises BadFile."""
+    with opened_zip(data, where, memory) as archive:
+        labels = read_array(archive, LABELS, where, memory)
+    if labels is None and not objects:
+        return None
+    if labels is None or objects is None:
+        has, lacks = (MANIFEST, where) if labels is None else (where, MANIFEST)
+        key = "'objects'" if labels is None else f"'{LABELS}'"
+        other = f"the array '{LABELS}'" if labels is None else "'objects'"
+        raise BadFile(f"{has} has {key}, but {lacks} lacks {other}; write both or neither.")
+    try:
+        check_labels(labels, objects, count)
+    except ValueError as error:
+        raise BadFile(f"{where}: {error}; label the anchors anew.") from None
+    return labels.copy()  # as many bytes as were charged; what it lay in is let go
 
 
 def refuse_array(

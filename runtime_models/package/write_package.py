@@ -17,6 +17,7 @@ from shapeshift.runtime_models.package.feature_codes import encode_features
 from shapeshift.runtime_models.package.package_files import (
     ANCHORS,
     FORMAT,
+    LABELS,
     MANIFEST,
     format_name,
     open_package,
@@ -56,6 +57,8 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
         log_scales = np.log(model.frames.scales)
         tables |= encode_features(log_scales, features, "frame_log_scales")
         tables |= encode_features(model.frames.wxyz, features, "frame_rotations")
+    if model.labels is not None:
+        tables[LABELS] = model.labels
     write_arrays(arrays, {"positions": model.anchors, **tables})
     manifest = json_text(describe_model(model)).encode()
     files = {MANIFEST: manifest, ANCHORS: arrays.getvalue()}
@@ -87,6 +90,7 @@ def describe_model(model: AnchorModel) -> dict:
         },
         "up": "+Y",
         "provenance": plain(model.provenance),
+        **describe_objects(model),
     }
 
 
@@ -100,6 +104,13 @@ def describe_between(model: AnchorModel) -> dict:
             {"from": pace.start, "to": pace.end, "blend": list(pace.blend)} for pace in model.pace
         ]
     return rows
+
+
+def describe_objects(model: AnchorModel) -> dict:
+    """What the labels of its anchors mean; nothing where there are none."""
+    if model.labels is None:
+        return {}
+    return {"objects": [{"label": o.label, "name": o.name} for o in model.objects]}
 
 
 def describe_stop(stop: Stop) -> dict:

@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from shapeshift.runtime_models.files.json_fields import Fields, read_json
+from shapeshift.runtime_models.files.json_fields import Fields, is_count, read_json
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import MODES
@@ -26,6 +26,8 @@ from shapeshift.scene.world.reactions import KINDS, Reaction, State, TwoAxes
 MOST_OBJECTS = 1000
 MOST_ROWS = 100  # of selectors, states and reactions each
 LONGEST_NAME = 100  # letters
+LARGEST_LABEL = 2**31 - 1  # of plain splats; those of packages end at 254
+PART = "a label, which is a whole number from 0 on, or the name of one of the model's objects,"
 GRAVITY, MASS, FRICTION, RESTITUTION = 100.0, 1e6, 10.0, 1.0  # at most: m/s2, kg
 
 
@@ -100,6 +102,7 @@ def read_looks(row: Fields) -> dict:
         "mode": row.line("mode", "", MODES),
         "up": row.line("up", "", AXES),
         "flip": row.flag("flip"),
+        **read_part(row),
         **read_pose(row.optional_object("pose")),
         "x": row.control("x", 0.0),
         "visible": row.flag("visible", True),
@@ -112,6 +115,18 @@ def read_looks(row: Fields) -> dict:
 
 def read_selectors(row: Fields) -> tuple[Selector, ...]:
     return tuple(map(read_selector_row, row.rows("selectors", MOST_ROWS, "selector")))
+
+
+def read_part(row: Fields) -> dict:
+    """Which part of its model an object is, and whether the file says where it stands."""
+    part = row.value("part", None)
+    if part is None:
+        return {}
+    if isinstance(part, str):
+        row.line("part", wanted=PART)
+    elif not (is_count(part) and part <= LARGEST_LABEL):
+        raise row.error("part", PART)
+    return {"part": part, "placed": row.has("pose")}
 
 
 def read_pose(row: Fields | None) -> dict:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers, Stop
+from shapeshift.runtime_models.parts import find_label, part_of
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
@@ -37,8 +38,10 @@ class SceneItem:
     mode: str = ""  # how its layers add up, which axis is up: as of Reading
     up: str = ""
     flip: bool = False
+    part: int | str | None = None  # of the model: a label or an object's name; None: all of it
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres in the world
     wxyz: tuple[float, float, float, float] = UPRIGHT
+    placed: bool = True  # False: a part without a pose, until `read_models` puts it in its place
     x: Control = 0.0
     visible: bool = True
     selectors: tuple[Selector, ...] = ()
@@ -96,9 +99,18 @@ def is_scene_file(path: Path) -> bool:
         return b'"shapeshift-scene ' in file.read(MARK_WITHIN)
 
 
-def read_models(file: SceneFile, reading: Reading | None = None) -> dict[str, Model]:
-    """The model of each object by its name; one that several have is read once.  Raises BadFile."""
-    reading, models, opened = (reading or Reading()).begun(), {}, {}
+def read_models(
+    file: SceneFile, reading: Reading | None = None
+) -> tuple[SceneFile, dict[str, Model]]:
+    """The file, in which every part has its place now, and each object's model by its name.
+
+    A model that several have, or parts of it, is read once.  A part that the file gives no pose
+    stands where it stands in its model.  Raises BadFile.
+    """
+    reading, models = (reading or Reading()).begun(), {}
+    opened: dict[tuple, Model] = {}
+    parts: dict[tuple, tuple[Model, tuple[float, float, float]]] = {}
+    items = []
     for item in file.all_items:
         key = (item.model, item.mode, item.up, item.flip)
         if key not in opened:
@@ -107,8 +119,19 @@ def read_models(file: SceneFile, reading: Reading | None = None) -> dict[str, Mo
                 opened[key] = read_model(file.path(item.model), own)
             except BadFile as error:
                 raise BadFile(f"object '{item.name}': 'model': {error}") from None
-        models[item.name] = opened[key]
-    return models
+        if item.part is None:
+            models[item.name], position = opened[key], item.position
+        else:
+            try:
+                label = find_label(opened[key], item.part, Path(item.model).name)
+                if (*key, label) not in parts:
+                    parts[*key, label] = part_of(opened[key], label)
+            except BadFile as error:
+                raise BadFile(f"object '{item.name}': 'part': {error}") from None
+            models[item.name], position = parts[*key, label]
+        items.append(item if item.placed else replace(item, position=position, placed=True))
+    background = items.pop(0) if file.background else None
+    return replace(file, items=tuple(items), background=background), models
 
 
 def scene_of(file: SceneFile, models: Mapping[str, Model]) -> Scene:

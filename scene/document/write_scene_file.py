@@ -32,7 +32,10 @@ def write_scene_file(file: SceneFile, path: str | Path) -> None:
 def item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
     """The keys of one object."""
     row: dict = {"name": item.name, "model": moved(item.model, file.folder, folder)}
-    if (item.position, item.wxyz) != (PLAIN.position, PLAIN.wxyz):
+    if item.part is not None:
+        row["part"] = item.part
+    posed = item.placed and item.part is not None  # without one it would stand elsewhere
+    if posed or (item.position, item.wxyz) != (PLAIN.position, PLAIN.wxyz):
         row["pose"] = {"position": list(item.position), "wxyz": list(item.wxyz)}
     if item.collider is not None:
         path = item.collider

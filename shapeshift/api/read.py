@@ -30,7 +30,8 @@ def read_document(path: PathText, reading: Reading) -> tuple[Document, Path]:
         if getattr(reading, name):
             raise UsageError(f"{name} is for one model; in {path.name} each object has its own.")
     file = read_scene_file(path)
-    scene = scene_of(file, read_models(file, reading))
+    file, models = read_models(file, reading)
+    scene = scene_of(file, models)
     if not scene.objects:
         raise BadFile(f"{path} has no object; nothing is there to be drawn.")
     return Document(scene, file), path

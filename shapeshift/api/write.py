@@ -46,7 +46,7 @@ def export(
     palette: bool = True,
     only: Sequence[Selector] = (),
     object: str | None = None,
-    label: int | None = None,
+    label: int | str | None = None,
     eye: Sequence[float] | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,

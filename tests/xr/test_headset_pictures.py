@@ -38,7 +38,7 @@ def eyes_of(line: dict) -> list[View]:
 def scene_at(line: dict) -> Scene:
     """The scene with every object where the line says, at its x."""
     file = read_scene_file(SCENE)
-    scene = scene_of(file, read_models(file))
+    scene = scene_of(*read_models(file))
     objects = [
         replace(
             thing,

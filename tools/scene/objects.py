@@ -18,7 +18,6 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +28,7 @@ sys.path.insert(0, str(ROOT))
 from shapeshift.app.charts.chart_scene import Walk, arc  # noqa: E402
 from shapeshift.renderer.gl.context import NoContext, open_context  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
-from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel, Model  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.cameras.framing import default_view, frame_points, model_points  # noqa: E402
 from shapeshift.scene.metrics import psnr  # noqa: E402
@@ -45,20 +44,16 @@ COLUMNS = (
     "scene,splats,drawing,size,objects,change,cpu_ms_p50,merged_cpu_ms_p50,over_merged,"
     "decode_ms,project_ms,equal"
 )
-ROWS = {  # fields with one row a splat, or one an anchor
-    SplatLayers: ("means", "scales", "wxyz", "opacity", "sh", "layer"),
-    AnchorModel: ("anchors", "features"),
-}
 
 
 def rows_of(model: Model, rows: np.ndarray) -> Model:
     """The model of these rows alone."""
-    return replace(model, **{name: getattr(model, name)[rows] for name in ROWS[type(model)]})
+    return model.with_anchors(rows) if isinstance(model, AnchorModel) else model.with_rows(rows)
 
 
 def deal(model: Model, count: int) -> tuple[list[Model], Model]:
     """`count` models that take a row each in turns, and all of them joined in that order."""
-    total = len(getattr(model, ROWS[type(model)][0]))
+    total = len(model.anchors if isinstance(model, AnchorModel) else model.means)
     hands = [np.arange(first, total, count) for first in range(count)]
     return [rows_of(model, rows) for rows in hands], rows_of(model, np.concatenate(hands))
 

@@ -7,7 +7,6 @@ import numpy as np
 from shapeshift.runtime_models.model import AnchorModel, Finding, SplatLayers
 from shapeshift.runtime_models.splats.operations.morton import morton_order
 
-ROWS = ("means", "scales", "wxyz", "opacity", "sh", "layer", "labels")  # of SplatLayers
 LEAST = 1e-9  # of the least weight: what shows nothing goes first, but sums are never zero
 PHASE = 0.618  # of 0..1: equal weights do not add up to just this
 NEARLY_SURE = 0.999  # chance from which a splat stays for certain
@@ -23,7 +22,6 @@ def prune_by_importance(layers: SplatLayers, most: int) -> SplatLayers:
     if not 0 < most < count:
         return layers
     kept = evenly(prominence(layers), morton_order(layers.means), most)
-    arrays = {name: getattr(layers, name) for name in ROWS}
     found = Finding(
         f"{count:,} splats, --max-splats asks for {most:,}",
         0,
@@ -31,12 +29,7 @@ def prune_by_importance(layers: SplatLayers, most: int) -> SplatLayers:
         file=", ".join(layers.provenance.get("files", ())[:3]),
         repaired=False,
     )
-    return replace(
-        layers,
-        **{name: array[kept] for name, array in arrays.items() if array is not None},
-        extra={name: column[kept] for name, column in layers.extra.items()},
-        findings=(*layers.findings, found),
-    )
+    return replace(layers.with_rows(kept), findings=(*layers.findings, found))
 
 
 def left_whole(model: AnchorModel, most: int, file: str) -> AnchorModel:

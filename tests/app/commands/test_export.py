@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app import cli
+from shapeshift.runtime_models.model import ObjectLabel
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import read_plain
@@ -122,6 +123,24 @@ def test_far_places_come_back(scenes, tmp_path, monkeypatch):
     np.testing.assert_allclose(found[1], wanted[1], rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("label", ["cup", 2])
+def test_an_object_of_a_package_by_name_or_label(tmp_path, label):
+    whole = make_random_model(50, k=4)
+    objects = (ObjectLabel(1, "mug"), ObjectLabel(2, "cup"))
+    whole = replace(whole, labels=np.resize(np.uint8([0, 1, 2]), 50), objects=objects)
+    write_package(whole, tmp_path / "room.shift", "float32")
+    for out in ("cup.ply", "cup.shift", "all.ply"):
+        words = () if out == "all.ply" else ("--label", label)
+        assert export(tmp_path / "room.shift", "--out", tmp_path / out, "--no-pace", *words) == 0
+    part, cup = read_plain(tmp_path / "cup.ply"), read_plain(tmp_path / "all.ply")
+    assert len(part.means) == (cup.labels == 2).sum() and set(part.labels) == {2}
+    # Where it stands in the whole, to the last bit of what the PLY holds.
+    assert np.array_equal(part.means + part.origin, (cup.means + cup.origin)[cup.labels == 2])
+    package = read_model(tmp_path / "cup.shift")
+    assert np.array_equal(package.anchors, whole.anchors[whole.labels == 2])
+    assert package.objects == objects[1:] and package.stops == whole.stops
+
+
 def test_a_label(scenes, tmp_path, capsys, monkeypatch):
     model = read_model(scenes / "plain.ply")
     labelled = replace(model, labels=np.arange(40, dtype=np.int32) % 3)
@@ -129,7 +148,7 @@ def test_a_label(scenes, tmp_path, capsys, monkeypatch):
     assert export(scenes / "plain.ply", "--out", tmp_path / "a.ply", "--label", 2) == 0
     np.testing.assert_allclose(read_plain(tmp_path / "a.ply").means, model.means[2::3], atol=1e-6)
     refused(
-        capsys, "labels 0, 1, 2", scenes / "plain.ply", "--out", tmp_path / "b.ply", "--label", 7
+        capsys, "it has 0, 1, 2", scenes / "plain.ply", "--out", tmp_path / "b.ply", "--label", 7
     )
 
 
@@ -160,7 +179,7 @@ def test_a_package_is_written_as_it_is(scenes, tmp_path):
     assert (tmp_path / "copy.shift").read_bytes() == (scenes / "random.shift").read_bytes()
 
 
-@pytest.mark.parametrize("words", [("--x", "1"), ("--only", "sphere:0,0,0:1"), ("--label", "1")])
+@pytest.mark.parametrize("words", [("--x", "1"), ("--only", "sphere:0,0,0:1")])
 def test_a_package_has_no_part(scenes, tmp_path, capsys, words):
     out = ("--out", tmp_path / "part.shift")
     refused(capsys, f"leave {words[0]} out", scenes / "random.shift", *out, *words)

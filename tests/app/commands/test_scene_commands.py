@@ -41,7 +41,7 @@ def rendered(scene: Path, out: Path, **changes) -> list[np.ndarray]:
 def test_render_draws_what_the_file_says(tmp_path):
     (picture,) = rendered(SCENE, tmp_path)
     file = read_scene_file(SCENE)
-    scene = scene_of(file, read_models(file))
+    scene = scene_of(*read_models(file))
     with Renderer(None, "tiles") as renderer:
         renderer.update(scene)
         renderer.draw([first_view(file, scene, SIZE)])

@@ -185,7 +185,7 @@ def test_the_touch_scene_needs_no_collider_to_be_made(monkeypatch):
     monkeypatch.setattr("shapeshift.scene.colliders.convex_parts.run_coacd", None)
     monkeypatch.setattr("shapeshift.scene.colliders.collider.wrap", None)
     file = read_scene_file(ASSETS / "touch.scene.json")
-    models = read_models(file)
+    file, models = read_models(file)
     made = {i.name: one_collider(file, i, models[i.name], Making(kept=False))
             for i in file.all_items}  # fmt: skip
     assert {name: len(c.parts) for name, c in made.items()} == {

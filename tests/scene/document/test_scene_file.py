@@ -342,7 +342,7 @@ def small(tmp_path: Path, **changes) -> SceneFile:
 
 def test_the_renderer_gets_every_object_where_it_is(tmp_path):
     file = small(tmp_path, wxyz=(HALF, 0.0, HALF, 0.0), visible=False, selectors=SELECTORS[:1])
-    models = read_models(file)
+    file, models = read_models(file)
     assert models["a"] is models["b"] and models["a"].mode == "exclusive"
     scene = scene_of(file, models)
     assert [(o.name, o.label, o.x, o.visible) for o in scene.objects] == [
@@ -356,12 +356,12 @@ def test_the_renderer_gets_every_object_where_it_is(tmp_path):
 def test_states_without_a_list_are_the_stops(tmp_path):
     reactions = (Reaction(on="grab", to="layer1"),)
     file = small(tmp_path, reactions=reactions)
-    machine = machine_of(file.items[0], read_models(file)["a"])
+    machine = machine_of(file.items[0], read_models(file)[1]["a"])
     assert machine.states == (State("layer0", 0.0), State("layer1", 1.0))
-    assert machine_of(file.items[1], read_models(file)["b"]).states == ()
+    assert machine_of(file.items[1], read_models(file)[1]["b"]).states == ()
     wrong = replace(file.items[0], reactions=(Reaction(on="grab", to="hot"),))
     with pytest.raises(BadFile, match="object 'a': 'reactions': 'hot' is no state; there are lay"):
-        machine_of(wrong, read_models(file)["a"])
+        machine_of(wrong, read_models(file)[1]["a"])
 
 
 def test_a_blend_of_stops_that_the_model_has_not_is_refused(tmp_path):
@@ -370,7 +370,7 @@ def test_a_blend_of_stops_that_the_model_has_not_is_refused(tmp_path):
         (tmp_path / str(number)).mkdir()
         file = small(tmp_path / str(number), **changes)
         with pytest.raises(BadFile, match=r"object '.*'.*no stop 'bone'; there "):
-            models = read_models(file)
+            file, models = read_models(file)
             scene_of(file, models)
             machine_of(file.items[0], models[file.items[0].name])
 
@@ -381,4 +381,4 @@ def test_a_model_that_is_no_model_names_its_object(tmp_path):
         read_models(file)
     file = replace(file, items=(replace(file.items[1], selectors=SELECTORS[-1:]),))
     with pytest.raises(BadFile, match="painted are 3 weights, its model has 7 anchors"):
-        scene_of(file, read_models(file))
+        scene_of(*read_models(file))

@@ -16,7 +16,7 @@ from shapeshift.scene.document.write_scene_file import moved
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
 
-ModelKey = tuple  # what makes two objects have the same model: path, mode, up, flip
+ModelKey = tuple  # what makes two objects have the same model: path, mode, up, flip, part
 
 
 @dataclass
@@ -111,7 +111,7 @@ def first_stop(model: Model) -> Stop:
 
 
 def key_of(item: SceneItem) -> ModelKey:
-    return (item.model, item.mode, item.up, item.flip)
+    return (item.model, item.mode, item.up, item.flip, item.part)
 
 
 def edited_from_file(path: Path, file: SceneFile, sources: Sequence[Source]) -> EditedFile:

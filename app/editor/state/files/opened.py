@@ -102,15 +102,19 @@ def read_scene(
         raise BadFile(f"{path.name} says for each object how layers add up and which way is up.")
     file = read_scene_file(path)
     with nullcontext(progress) if progress else progress_after(PATIENCE_S) as shown_progress:
-        models = read_models(file, replace(plain, progress=shown_progress))
+        file, models = read_models(file, replace(plain, progress=shown_progress))
     print_findings(models)
-    facts: dict[Path, dict] = {}
+    facts: dict[tuple, dict] = {}
+    counted: set[Path] = set()
     sources = []
     for item in file.all_items:
         at, model = file.path(item.model), models[item.name]
-        first = at not in facts  # bytes count once, however many objects share a model
-        facts[at] = describe(model, at) if first else facts[at] | {"bytes": 0}
-        sources.append(Source(at, model, facts[at], Reading(item.mode, item.up, item.flip)))
+        key = (at, item.part)
+        facts[key] = facts[key] if key in facts else describe(model, at)
+        if at in counted:  # bytes count once, however many objects share a file
+            facts[key] = facts[key] | {"bytes": 0}
+        counted.add(at)
+        sources.append(Source(at, model, facts[key], Reading(item.mode, item.up, item.flip)))
     return file, sources
 
 

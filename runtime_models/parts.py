@@ -1,0 +1,86 @@
+"""Parts of a labelled model: one object is the rows of its label, under the same networks.
+
+So it keeps its slider, and adds nothing to the disk.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.runtime_models.model import AnchorModel, BadFile, Model, SplatLayers
+from shapeshift.runtime_models.shapes import three
+
+BACKGROUND = 0  # its label
+DECIMALS = 6  # of metres: what a scene file's pose keeps, so that both say the same
+MOST_TOLD = 12  # labels of a message
+Place = tuple[float, float, float]  # metres
+
+
+def splat_labels(model: Model) -> np.ndarray | None:
+    """(N,) int32 label of each splat, 0 the background's; None of a model without labels."""
+    if isinstance(model, SplatLayers):
+        return model.labels
+    if not isinstance(model, AnchorModel) or model.labels is None:
+        return None
+    return np.repeat(model.labels.astype(np.int32), model.splats_per_anchor)
+
+
+def name_of(model: Model, label: int) -> str:
+    """What an object is called; "" where it has no name."""
+    known = model.objects if isinstance(model, AnchorModel) else ()
+    return next((each.name for each in known if each.label == label), "")
+
+
+def find_label(model: Model, part: int | str, where: str) -> int:
+    """The label that some row has, of a part given by its label or by the name of an object.
+
+    A text of digits is a name, where an object is called so.  Raises BadFile; `where` is the file.
+    """
+    labels = model.labels if isinstance(model, AnchorModel | SplatLayers) else None
+    if labels is None:
+        raise BadFile(
+            f"{where} has no labels of objects, so no parts; `launch.py segment` makes them."
+        )
+    objects = model.objects if isinstance(model, AnchorModel) else ()
+    label = part
+    if isinstance(part, str):
+        named = (each.label for each in objects if each.name == part)
+        label = next(named, int(part) if part.isdecimal() else part)
+    there = [int(each) for each in np.unique(labels)]
+    if isinstance(label, int) and label in there:
+        return label
+    known = [f"{each} {name_of(model, each)}".strip() for each in there[:MOST_TOLD]]
+    more = ", ..." if len(there) > MOST_TOLD else ""
+    raise BadFile(f"nothing of {where} is {part!r:.60}; it has {', '.join(known)}{more}.")
+
+
+def part_of(model: Model, label: int) -> tuple[Model, Place]:
+    """The rows of one label in a frame of their own, and where its zero lies in the model's.
+
+    The zero is the mean of the rows' places, and of the background the model's own: moving all
+    anchors is exact, since networks see features, control and direction alone.  `find_label` says
+    whether there are such rows.
+    """
+    if isinstance(model, AnchorModel):
+        part = labelled_anchors(model, label)
+        middle = middle_of(part.anchors, label)
+        moved = (part.anchors - middle).astype(np.float32)
+        return replace(part, anchors=moved), three(middle)
+    assert isinstance(model, SplatLayers) and model.labels is not None, "find_label refuses others"
+    few = model.with_rows(model.labels == label)
+    middle = middle_of(few.means, label)
+    origin = three(np.add(few.origin, middle))
+    return replace(few, means=(few.means - middle).astype(np.float32), origin=origin), three(middle)
+
+
+def labelled_anchors(model: AnchorModel, label: int) -> AnchorModel:
+    """The anchors of one label, where they are, with its name alone."""
+    objects = tuple(each for each in model.objects if each.label == label)
+    return replace(model.with_anchors(model.labels == label), objects=objects)
+
+
+def middle_of(places: np.ndarray, label: int) -> np.ndarray:
+    """(3,) float64 metres, of so many decimals as a pose in a file has."""
+    if label == BACKGROUND:
+        return np.zeros(3)
+    return np.round(places.mean(axis=0, dtype=np.float64), DECIMALS) + 0.0  # never -0
