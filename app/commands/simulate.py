@@ -25,7 +25,7 @@ class Options:
     out: Path
     """Folder for run.jsonl and the pictures."""
     script: Path | None = None
-    """JSON lines with times: hands, grabs, releases, rays.  Default: none, things only fall."""
+    """JSON lines with times: hands, grabs, releases, rays.  Default: none, objects only fall."""
     x: Annotated[str, CONTROL] = ""
     """Where the sliders of all objects stand at the start: a stop or state by its name, or a number
     from 0 to 1.  Default: what the scene file says for each."""

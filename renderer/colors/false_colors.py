@@ -82,14 +82,14 @@ def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
     shades = [shade_of(o.model, x) for o, x in zip(scene.objects, controls, strict=True)]
     shown = [
         shade
-        for thing, shade in zip(scene.objects, shades, strict=True)
-        if thing.visible and thing.model.splat_count
+        for obj, shade in zip(scene.objects, shades, strict=True)
+        if obj.visible and obj.model.splat_count
     ]
     names = {heat.palette for shade in shown for heat in shade.heats}
     if len(names) == 1 and all(shade.pure for shade in shown):
         plain = [
-            Shade(x if colors_follow_control(thing.model) else 0.0)
-            for thing, x in zip(scene.objects, controls, strict=True)
+            Shade(x if colors_follow_control(obj.model) else 0.0)
+            for obj, x in zip(scene.objects, controls, strict=True)
         ]
         return FalseColors(PICTURE, names.pop(), tuple(plain))
     way = (NO_HEAT, BESIDE)[len(names)] if len(names) < 2 else SPLATS

@@ -163,7 +163,7 @@ def common_side(views: Sequence[View]) -> float | None:
     """The side from which cameras look, radians about +Y from +Z; None where they look from all.
 
     The mean of their directions over the ground, where it is longer than COMMON: photos of one
-    side of a thing say which side is its front.
+    side of an object say which side is its front.
     """
     ahead = np.array([-view.world_from_eye.matrix()[:3, 2] for view in views]).reshape(-1, 3)
     level = ahead[:, [0, 2]]  # (V, 2) x, z
