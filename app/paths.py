@@ -83,7 +83,7 @@ def begin_at_start(value):
 
 
 def full(path: Path | str) -> str:
-    """A path as it is told to people: from the root, so that it is found from everywhere."""
+    """A path as it is shown to people: from the root, so that it is found from everywhere."""
     return os.path.abspath(plain(path))
 
 
@@ -108,7 +108,7 @@ class WorkFolders:
 
     @staticmethod
     def of(pictures: Path | None = None) -> "WorkFolders":
-        """All beside the pictures; without these in Shapeshift, in the person's documents."""
+        """All next to the pictures; without these in Shapeshift, in the person's documents."""
         if pictures is None:
             import platformdirs
 

@@ -25,7 +25,7 @@ class Work(Protocol):
         ...
 
 
-_under_way: list[Work] = []  # the innermost last; lines are of that
+_under_way: list[Work] = []  # the innermost last; lines report that one
 
 
 def progress_bar(*columns: "str | ProgressColumn", transient: bool = True) -> "Progress":

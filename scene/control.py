@@ -1,7 +1,7 @@
 """The control over stops and time, and from place to place where an object has selectors.
 
 It is a number x, a place on the slider, or a blend of any stops (runtime_models/stop_weights.py).
-The rule for x outside 0 to 1, where no network was trained: whoever asks for it by number is
+The rule for x outside 0 to 1, where no network was trained: a request for it by number is
 refused (commands, SceneObject and selectors name the value, NaN too); what a hand or a clock moves
 is clamped (sliders, snap, Sweep).  So nothing below ever meets such a value.
 """

@@ -1,4 +1,4 @@
-"""launch.py simulate: a scene file in motion, driven by a script, told as JSON lines."""
+"""launch.py simulate: a scene file in motion, driven by a script, written as JSON lines."""
 
 import json
 import math
@@ -126,7 +126,7 @@ def refuse_taken(paths: list[Path], options: Options) -> None:
 def write_steps(simulation, steps: int, path: Path, options: Options):
     """Steps and writes what is new; gives the number of steps done, 0 at first.
 
-    Lines are whole at every moment: who stops it keeps what was told until then.
+    Lines are whole at every moment: an interrupted run keeps what was written until then.
     """
     from shapeshift.runtime_models.files.whole_file import open_lines
 

@@ -36,7 +36,7 @@ class EyeColors:
     def shared_db(self, eyes: np.ndarray) -> float:
         """PSNR, dB, that colours for the middle of the eyes (E, 3), object frame, have at least.
 
-        A splat d away is seen from the middle at an angle of apart / d beside an eye's own.
+        A splat d away is seen from the middle at an angle of apart / d from an eye's own.
         """
         middle = eyes.mean(axis=0)
         apart = float(np.linalg.norm(eyes - middle, axis=1).max())

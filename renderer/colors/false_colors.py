@@ -3,7 +3,7 @@
 A thermal stop gives values, a palette makes colours of them.  At a pure thermal stop the palette is
 laid over the whole picture, as a thermal camera does it: values are blended before they become
 colours.  Between such a stop and another one both stops' colours are decoded.  What is thermal, the
-heat, is then drawn beside the rest, splat by splat by its weight, and the palette is laid over the
+heat, is then drawn in addition, splat by splat by its weight, and the palette is laid over the
 heat alone: a white tool is not hot because it is white.  Where several palettes show at once there
 is no one picture of values; each splat's heat is coloured before it is drawn.
 """
@@ -73,7 +73,7 @@ class FalseColors:
     """How a scene's colours come about."""
 
     way: str = NO_HEAT
-    palette: str = ""  # of the picture, or of the heat beside it
+    palette: str = ""  # of the picture, or of its heat
     shades: tuple[Shade, ...] = ()  # one an object
 
 

@@ -93,7 +93,7 @@ def apply_palette(rgba: np.ndarray, name: str) -> np.ndarray:
 
 
 def overlay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
-    """Premultiplied (H, W, 4) and the heat beside it, (H, W, 2) value and weight, both times alpha:
+    """Premultiplied (H, W, 4) and its heat, (H, W, 2) value and weight, both times alpha:
     with the palette's colour of the value, as much as the weight; as (H, W, 4).
     """
     value, weight = heat[..., 0], heat[..., 1]

@@ -85,7 +85,7 @@ def reference_image(
 def shaded_objects(
     scene: Scene, view: View, settings: RenderSettings, eye: np.ndarray
 ) -> tuple[list[ReferenceSplats], FalseColors]:
-    """The visible objects; colours are (N, 3), or (N, 5) with the heat that is drawn beside."""
+    """The visible objects; colours are (N, 3), or (N, 5) with the heat."""
     colors = false_colors(scene, [control_of(obj) for obj in scene.objects])
     found = [
         gate_object(obj, view, settings, eye, (colors.way, shade))
@@ -150,7 +150,7 @@ def gate_object(
     scales = np.where(turned, scales, np.nan)
     if not obj.visible:
         means = np.full_like(means, np.nan)
-    with np.errstate(all="ignore"):  # splats that are not finite, or beside or behind the eye
+    with np.errstate(all="ignore"):  # splats that are not finite, or level with or behind the eye
         mean = means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres
         depth = mean[:, 2]
         axes = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3) metres

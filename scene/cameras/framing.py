@@ -37,7 +37,7 @@ def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, fl
     low, high = np.percentile(points, PERCENTILES, axis=0)
     centre = (low + high) / 2
     radius = float(np.percentile(np.linalg.norm(points - centre, axis=1), PERCENTILES[1]))
-    # beside its place a smaller one is lost in rounding: the eye would lie in what it looks at
+    # next to its numbers a smaller one is lost in rounding: the eye would lie in what it looks at
     least = max(SMALLEST_PART * float(np.abs(centre).max()), SMALLEST_RADIUS)
     return centre, radius if radius > least else max(FALLBACK_RADIUS, 1000 * least)
 

@@ -303,7 +303,7 @@ class World:
         throws has its speed however frames and steps fall.
         """
         if self.paused:
-            self._hands_before = dict(self.hands)  # whoever moves meanwhile has no speed
+            self._hands_before = dict(self.hands)  # a hand that moves meanwhile has no speed
             return []
         if not seconds > 0:
             return []

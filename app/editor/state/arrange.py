@@ -20,7 +20,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 
 LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
-MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less is not told
+MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less counts as unmoved
 COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 
 

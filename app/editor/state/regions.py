@@ -46,7 +46,7 @@ class Region:
 class Regions:
     """The list of regions, which of them is being edited, and what the mouse does to it.
 
-    `version` goes up with every edit, so that whoever depends on regions knows when they changed;
+    `version` goes up with every edit, so that what is made of regions knows when they changed;
     `did` says in words what the last one was, "" where nobody edited: undoing passes over it.
     """
 

@@ -74,7 +74,7 @@ class TouchState:
         return self._state.chosen
 
     def forget(self) -> None:
-        """Another scene: nothing of the old one is held or told."""
+        """Another scene: nothing of the old one is held or listed."""
         self.hand = self._known = None
         self.pads.clear()
         self.reactions.clear()

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
-EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index
+EVERYTHING, REGIONS = -1, -2  # what is exported, other than one object by its index
 
 
 class Exporting:
