@@ -31,7 +31,7 @@ COMMANDS = {
     "cameras": ("commands.cameras", "list a file of cameras, or convert it"),
     "simulate": (
         "commands.simulate",
-        "a scene file in motion: hands and rays of a script, told as lines",
+        "a scene file in motion: hands and rays of a script, written as lines",
     ),
     "colliders": (
         "commands.colliders",
@@ -53,7 +53,7 @@ COMMANDS = {
     ),
     "table": (
         "training.table",
-        "one model beside separate ones and plain splats: dB, bytes, seconds",
+        "one model compared with separate ones and plain splats: dB, bytes, seconds",
     ),
     "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),

@@ -38,7 +38,7 @@ NUMBER = re.compile(r"-[\d.]")  # how a value begins that is no option
 
 @dataclass(frozen=True)
 class Opt:
-    """What an annotation says about an option beside its type."""
+    """What an annotation says about an option in addition to its type."""
 
     positional: bool = False
     expert: bool = False  # in help's second group

@@ -51,7 +51,7 @@ class Document:
     @property
     def models(self) -> tuple[Model, ...]:
         """Each once, in the order of the objects."""
-        return tuple({id(thing.model): thing.model for thing in self.scene.objects}.values())
+        return tuple({id(obj.model): obj.model for obj in self.scene.objects}.values())
 
     @property
     def stops(self) -> tuple[float, ...]:
@@ -64,7 +64,7 @@ class Document:
     @property
     def x(self) -> Control | None:
         """The control value of all that shows; None where objects have several."""
-        found = {thing.x for thing in self.scene.objects if thing.visible}
+        found = {obj.x for obj in self.scene.objects if obj.visible}
         return found.pop() if len(found) == 1 else None
 
     @property
@@ -91,12 +91,12 @@ class Document:
 
     def at(self, x: Control | None, pose: Pose = IDENTITY) -> Scene:
         """All objects at x (None: each at its own), the world moved by a pose."""
-        things = self.scene.objects
+        objects = self.scene.objects
         if x is not None:
-            things = tuple(replace(thing, x=x) for thing in things)
+            objects = tuple(replace(obj, x=x) for obj in objects)
         if pose is not IDENTITY:
-            things = tuple(moved_object(thing, pose) for thing in things)
-        return Scene(things)
+            objects = tuple(moved_object(obj, pose) for obj in objects)
+        return Scene(objects)
 
     def placed(self, text: str, said: str = "--x") -> "Document":
         """The same with all objects where `control_of_text` has their sliders; of a scene file,
@@ -128,7 +128,7 @@ class Document:
 
 
 def placed(
-    things: Sequence[SceneObject], text: str, said: str = "--x",
+    objects: Sequence[SceneObject], text: str, said: str = "--x",
     states: Mapping[str, Sequence] = MappingProxyType({}),
 ) -> tuple[SceneObject, ...]:  # fmt: skip
     """Objects with their sliders where a text says, those that have the stop that it names.
@@ -136,17 +136,17 @@ def placed(
     states: of a scene file, by object.  Raises UsageError where no object has it.
     """
     stops = [
-        [*thing.model.stops, *(Stop(s.name, s.x) for s in states.get(thing.name, ()))]
-        for thing in things
+        [*obj.model.stops, *(Stop(s.name, s.x) for s in states.get(obj.name, ()))]
+        for obj in objects
     ]
     known = {stop.name: stop for each in reversed(stops) for stop in reversed(each)}
     control_of_text(text, list(known.values())[::-1], said)  # one sentence for all of them
     out = []
-    for thing, mine in zip(things, stops, strict=True):
+    for obj, mine in zip(objects, stops, strict=True):
         try:
-            out.append(replace(thing, x=control_of_text(text, mine, said, pace_of(thing.model))))
+            out.append(replace(obj, x=control_of_text(text, mine, said, pace_of(obj.model))))
         except UsageError:  # a stop that others have
-            out.append(thing)
+            out.append(obj)
     return tuple(out)
 
 
@@ -158,8 +158,8 @@ def file_at(file: SceneFile, models: dict[str, Model], text: str) -> SceneFile:
     from shapeshift.scene.document import edits
 
     states = {item.name: item.states for item in file.all_items}
-    for thing in placed(scene_of(file, models).objects, text, states=states):
-        file = edits.change(file, thing.name, x=thing.x)
+    for obj in placed(scene_of(file, models).objects, text, states=states):
+        file = edits.change(file, obj.name, x=obj.x)
     return file
 
 
@@ -199,11 +199,11 @@ def no_control(word: str, stops: Sequence[Stop]) -> str:
     )
 
 
-def moved_object(thing: SceneObject, world_from_before: Pose) -> SceneObject:
+def moved_object(obj: SceneObject, world_from_before: Pose) -> SceneObject:
     """An object, with its parts, after its world is moved."""
-    pose = Pose.from_matrix(world_from_before.matrix() @ thing.world_from_object.matrix())
-    parts = tuple(carried(selector, world_from_before) for selector in thing.selectors)
-    return replace(thing, world_from_object=pose, selectors=parts)
+    pose = Pose.from_matrix(world_from_before.matrix() @ obj.world_from_object.matrix())
+    parts = tuple(carried(selector, world_from_before) for selector in obj.selectors)
+    return replace(obj, world_from_object=pose, selectors=parts)
 
 
 def open_document(path: Path, options: ReadingOptions) -> Document:

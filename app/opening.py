@@ -22,7 +22,7 @@ PATIENCE_S = 1.0  # what takes longer shows a progress bar
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingOptions:
-    """What a command that opens scenes takes beside its own options."""
+    """What a command that opens scenes takes in addition to its own options."""
 
     up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = ""
     """The axis of the file that points up.  Default: the one that its format says."""

@@ -10,7 +10,7 @@ from urllib.parse import unquote
 SCHEME = "file:"
 ASSETS = Path(__file__).resolve().parents[1] / "assets"  # what the program brought along
 DEMO, TOUCH = ASSETS / "workshop.shift", ASSETS / "touch.scene.json"
-LONGEST_NAME = 100  # letters, of a file that is named after a thing
+LONGEST_NAME = 100  # letters, of a file that is named after an object
 STANDARD_STREAM = "-"  # stands for one where a file is wanted
 # Settings of libraries that people give as paths.
 PATHS_IN_ENVIRONMENT = ("XR_RUNTIME_JSON", "OCL_ICD_VENDORS", "POCL_CACHE_DIR", "TMPDIR")
@@ -83,12 +83,12 @@ def begin_at_start(value):
 
 
 def full(path: Path | str) -> str:
-    """A path as it is told to people: from the root, so that it is found from everywhere."""
+    """A path as it is shown to people: from the root, so that it is found from everywhere."""
     return os.path.abspath(plain(path))
 
 
 def file_name(text: str) -> str:
-    """A name that is a file's on every system, of one that people or files have given a thing."""
+    """A name that is a file's on every system, of one that people or files have given an object."""
     plain = "".join(c if c.isalnum() or c in " -_.,()+" else "_" for c in text)
     return plain.strip(" .")[:LONGEST_NAME] or "scene"
 
@@ -108,7 +108,7 @@ class WorkFolders:
 
     @staticmethod
     def of(pictures: Path | None = None) -> "WorkFolders":
-        """All beside the pictures; without these in Shapeshift, in the person's documents."""
+        """All next to the pictures; without these in Shapeshift, in the person's documents."""
         if pictures is None:
             import platformdirs
 

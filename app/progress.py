@@ -13,7 +13,7 @@ from shapeshift.app.terminal import open_console, say
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
-Thing = TypeVar("Thing")
+Item = TypeVar("Item")
 LINE_EVERY_S = 60.0
 
 
@@ -25,7 +25,7 @@ class Work(Protocol):
         ...
 
 
-_under_way: list[Work] = []  # the innermost last; lines are of that
+_under_way: list[Work] = []  # the innermost last; lines report that one
 
 
 def progress_bar(*columns: "str | ProgressColumn", transient: bool = True) -> "Progress":
@@ -43,12 +43,12 @@ def progress_bar(*columns: "str | ProgressColumn", transient: bool = True) -> "P
     )
 
 
-def tracked(work: Collection[Thing], what: str) -> Iterator[Thing]:
-    """The things of the work one by one, with a bar that says how many of them are done."""
+def tracked(work: Collection[Item], what: str) -> Iterator[Item]:
+    """The items of the work one by one, with a bar that says how many of them are done."""
     with progress_bar() as bar:
         task = bar.add_task(what, total=len(work))
-        for thing in work:
-            yield thing
+        for item in work:
+            yield item
             bar.advance(task)
 
 

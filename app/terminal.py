@@ -38,7 +38,7 @@ def clean_streams() -> Iterator[None]:
     try:
         yield
         if sys.stdout is not None:
-            sys.stdout.flush()  # while an error can be told
+            sys.stdout.flush()  # while an error can be printed
     finally:
         for name, stream in before.items():
             setattr(sys, name, stream)

@@ -3,9 +3,9 @@
 import shapeshift as ss
 
 scene = ss.load(ss.TOUCH)  # a scene file: objects with places, bodies and reactions
-for thing in scene.objects:
-    place = ", ".join(f"{c:.2f}" for c in thing.world_from_object.position)
-    print(f"{thing.name:12} at {place} m, x {thing.x}")
+for obj in scene.objects:
+    place = ", ".join(f"{c:.2f}" for c in obj.world_from_object.position)
+    print(f"{obj.name:12} at {place} m, x {obj.x}")
 
 # The cube half a metre higher, falling for half a second.
 lifted = scene.with_object("cube", position=(-0.22, 0.5, 0.05))

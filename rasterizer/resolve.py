@@ -19,7 +19,7 @@ def resolve(
 ) -> np.ndarray:
     """(H, W, 4) uint8, opaque, row 0 at the bottom as GL wants it, of image (H, W, 4) float32.
 
-    image, and heat (H, W, 2) beside it: as rasterize_rgba gives them.  palette (256, 3): makes
+    image, and its heat (H, W, 2): as rasterize_rgba gives them.  palette (256, 3): makes
     colours of the heat, where there is any, else of the image.  Read only; on a CPU it is the
     device's own memory, which is reused when the array goes.
     """

@@ -27,7 +27,7 @@ class Drawing(ABC):
     backends: dict[str, str]  # what is in use: drawing, mlps, sort
     sorts: int  # of the last frame, as order_age: see FrameStats
     order_age: int
-    draws_heat: bool  # beside the colours, from the next frame on
+    draws_heat: bool  # in addition to the colours, from the next frame on
 
     @abstractmethod
     def allocate(self, models: list[Model]) -> None:
@@ -102,7 +102,7 @@ class Drawing(ABC):
 
     @abstractmethod
     def presentable_heat(self, i: int) -> np.ndarray | moderngl.Texture:
-        """What resolve takes beside it, of a frame with heat."""
+        """What resolve takes in addition, of a frame with heat."""
 
     def presentable_rgba8(
         self, i: int, background: tuple[float, float, float], palette: np.ndarray | None = None

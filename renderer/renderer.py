@@ -97,9 +97,9 @@ class Renderer:
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
             if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
                 self._rebuild(scene)
-            for i, (thing, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
-                if thing.visible and decoded.key != (key := control_key(thing)):
-                    self._decode_geometry(i, decoded, control_of(thing))
+            for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
+                if obj.visible and decoded.key != (key := control_key(obj)):
+                    self._decode_geometry(i, decoded, control_of(obj))
                     decoded.key = key
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
@@ -223,23 +223,23 @@ class Renderer:
         """
         eye_world = np.mean([v.world_from_eye.position for v in views], axis=0)
         degrees = self.settings.recolor_degrees
-        for i, (thing, decoded) in enumerate(zip(self._scene.objects, self._decoded, strict=True)):
-            if not thing.visible:
+        for i, (obj, decoded) in enumerate(zip(self._scene.objects, self._decoded, strict=True)):
+            if not obj.visible:
                 continue
             colored = decoded.colored[which]
-            object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+            object_from_world = np.linalg.inv(obj.world_from_object.matrix())
             eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
-            key = color_key(thing.model, decoded.version, eye)
-            stale = colored.is_stale(key, degrees, nearer=follows_eye(thing.model))
-            if follows_eye(thing.model):
-                due, wanted = self._wanted_of_follower(thing, colored, stale, views)
+            key = color_key(obj.model, decoded.version, eye)
+            stale = colored.is_stale(key, degrees, nearer=follows_eye(obj.model))
+            if follows_eye(obj.model):
+                due, wanted = self._wanted_of_follower(obj, colored, stale, views)
                 if not due:
                     continue
                 colored.key, colored.anchors = key, wanted
                 self.drawing.decode_geometry(i, decoded.x, eye, wanted)
                 self._geometry_runs += 1
             else:
-                wanted = self._wanted_anchors(i, thing, decoded, colored, stale, views)
+                wanted = self._wanted_anchors(i, obj, decoded, colored, stale, views)
                 if not colored.mark_colored(key, wanted, stale):
                     continue  # all that is seen has its colours
             at_once = self._false_colors.way == SPLATS
@@ -247,14 +247,14 @@ class Renderer:
             self._color_runs += 1
 
     def _wanted_anchors(
-        self, i: int, thing: SceneObject, decoded: DecodedObject, colored: ColorCache, stale: bool,
+        self, i: int, obj: SceneObject, decoded: DecodedObject, colored: ColorCache, stale: bool,
         views: list[View],
     ) -> np.ndarray | None:  # fmt: skip
         """(A,) bool: the anchors that views see and whose colours are stale; None: all.
 
         Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
         """
-        if not self.settings.skip_unseen or isinstance(thing.model, SplatLayers):
+        if not self.settings.skip_unseen or isinstance(obj.model, SplatLayers):
             if stale or colored.anchors is None:
                 return None
             return ~colored.anchors  # left out before: now all are wanted
@@ -269,28 +269,28 @@ class Renderer:
             mean_opacity, owner, covariance = self.drawing.splat_points()
             mine = owner == i
             k = math.sqrt(2 * math.log(1 / self.settings.min_alpha))
-            parts = (thing.model.anchors, mean_opacity[mine], covariance[mine], k)
+            parts = (obj.model.anchors, mean_opacity[mine], covariance[mine], k)
             colored.reach = reach_of(*parts)
-        pose = thing.world_from_object.matrix()
-        seen = visible_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
+        pose = obj.world_from_object.matrix()
+        seen = visible_anchors(obj.model.anchors, colored.reach, pose, views, self.settings)
         return seen if stale or colored.anchors is None else seen & ~colored.anchors
 
     def _wanted_of_follower(
-        self, thing: SceneObject, colored: ColorCache, stale: bool, views: list[View]
+        self, obj: SceneObject, colored: ColorCache, stale: bool, views: list[View]
     ) -> tuple[bool, np.ndarray | None]:
         """Whether a model that follows the eye is to be decoded, and (A,) which anchors; None: all.
 
         Where its splats can be is known beforehand, so only what views see needs to be decoded;
         for one eye as a whole, so what comes into view has the rest decoded, too.
         """
-        model = thing.model
+        model = obj.model
         assert isinstance(model, ScaffoldModel), "the one kind that follows the eye"
         if not self.settings.skip_unseen:
             return stale or colored.anchors is not None, None
         if colored.reach is None or colored.reach_key != self.settings.min_alpha:
             colored.reach = reach_of_scaffold(model, self.settings.min_alpha)
             colored.reach_key = self.settings.min_alpha
-        pose = thing.world_from_object.matrix()
+        pose = obj.world_from_object.matrix()
         seen = visible_anchors(model.anchors, colored.reach, pose, views, self.settings)
         new = colored.anchors is not None and (seen & ~colored.anchors).any()
         return stale or bool(new), None if seen.all() else seen

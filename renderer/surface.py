@@ -1,4 +1,4 @@
-"""What a scene is made of beside its colours: depth, normals and coverage of a view."""
+"""What a scene is made of besides its colours: depth, normals and coverage of a view."""
 
 from dataclasses import dataclass
 

@@ -54,7 +54,7 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
 from shapeshift.runtime_models.splats.sog.sog_files import META
 
 PHOTOS = (".jpg", ".jpeg")  # a scene's own pictures are .png and .webp
-THINNING = 160  # bytes a splat on the way, beside what is kept
+THINNING = 160  # bytes a splat on the way, in addition to what is kept
 KNOWN = (
     "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
     ".gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of a 3DGS or "
@@ -215,7 +215,7 @@ def describe_labels(model: Model) -> dict:
 
 
 def describe_octree(model: ScaffoldModel) -> dict:
-    """What a Scaffold-GS model says beside its networks."""
+    """What a Scaffold-GS model says besides its networks."""
     facts = {"appearance": model.provenance.get("appearance")}
     if (octree := model.octree) is not None:
         levels, counts = np.unique(octree.level, return_counts=True)

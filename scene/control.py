@@ -1,7 +1,7 @@
 """The control over stops and time, and from place to place where an object has selectors.
 
 It is a number x, a place on the slider, or a blend of any stops (runtime_models/stop_weights.py).
-The rule for x outside 0 to 1, where no network was trained: whoever asks for it by number is
+The rule for x outside 0 to 1, where no network was trained: a request for it by number is
 refused (commands, SceneObject and selectors name the value, NaN too); what a hand or a clock moves
 is clamped (sliders, snap, Sweep).  So nothing below ever meets such a value.
 """
@@ -26,51 +26,51 @@ def snap(x: float, stops: Sequence[Stop], reach: float = SNAP) -> float:
     return nearest if abs(nearest - x) <= reach else x
 
 
-def control_of(thing: SceneObject) -> Controls:
+def control_of(obj: SceneObject) -> Controls:
     """Of an object: one for all of it, or one an anchor (layers: a splat), float32: numbers (A,),
     or where these do not do weights of its stops (A, S).
 
     A border shows what a shift from outside to inside shows on its way: no third stop.
     """
-    x: Controls = thing.x
-    for selector in thing.selectors:
-        weights = selector_weights(thing, selector)
+    x: Controls = obj.x
+    for selector in obj.selectors:
+        weights = selector_weights(obj, selector)
         if not weights.any():  # a lens that looks elsewhere costs nothing
             continue
         whole = (weights == weights[0]).all()
-        x = thing.model.blend.between(x, selector.x, float(weights[0]) if whole else weights)
+        x = obj.model.blend.between(x, selector.x, float(weights[0]) if whole else weights)
     return np.clip(x, 0, 1).astype(np.float32) if is_each(x) else x
 
 
-def selector_weights(thing: SceneObject, selector: Selector) -> np.ndarray:
+def selector_weights(obj: SceneObject, selector: Selector) -> np.ndarray:
     """(A,) float32 0..1: how much of each anchor (layers: splat) is inside."""
-    model = thing.model
+    model = obj.model
     places = model.means if isinstance(model, SplatLayers) else model.anchors  # (A, 3) metres
-    return selector.weights(_in_space(places, thing, selector.space))
+    return selector.weights(_in_space(places, obj, selector.space))
 
 
-def covered(thing: SceneObject, selectors: Sequence[Selector]) -> np.ndarray:
+def covered(obj: SceneObject, selectors: Sequence[Selector]) -> np.ndarray:
     """(A,) 0..1: how much of each anchor lies in any of them."""
-    model = thing.model
+    model = obj.model
     outside = np.ones(model.splat_count if isinstance(model, SplatLayers) else len(model.anchors))
     for selector in selectors:
-        outside = outside * (1 - selector_weights(thing, selector))
+        outside = outside * (1 - selector_weights(obj, selector))
     return 1 - outside
 
 
-def control_key(thing: SceneObject) -> tuple:
+def control_key(obj: SceneObject) -> tuple:
     """What control_of depends on; of one model, equal keys give equal control values."""
-    if not any(selector.space == "world" for selector in thing.selectors):
-        return thing.x, thing.selectors
-    pose = thing.world_from_object
-    return thing.x, thing.selectors, (*pose.position, *pose.wxyz)
+    if not any(selector.space == "world" for selector in obj.selectors):
+        return obj.x, obj.selectors
+    pose = obj.world_from_object
+    return obj.x, obj.selectors, (*pose.position, *pose.wxyz)
 
 
-def _in_space(places: np.ndarray, thing: SceneObject, space: str) -> np.ndarray:
+def _in_space(places: np.ndarray, obj: SceneObject, space: str) -> np.ndarray:
     """Places (A, 3) of the object's frame in a selector's space."""
     if space == "object":
         return places
-    world_from_object = thing.world_from_object.matrix()
+    world_from_object = obj.world_from_object.matrix()
     return places @ world_from_object[:3, :3].T + world_from_object[:3, 3]
 
 

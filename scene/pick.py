@@ -55,13 +55,13 @@ class Picker:
         """
         ray = np.asarray(direction, np.float64) / np.linalg.norm(direction)
         depths, alphas, owners = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, int)]
-        for index, thing in enumerate(scene.objects):
-            if not thing.visible:
+        for index, obj in enumerate(scene.objects):
+            if not obj.visible:
                 continue
-            object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+            object_from_world = np.linalg.inv(obj.world_from_object.matrix())
             eye = object_from_world[:3, :3] @ origin + object_from_world[:3, 3]
             depth, alpha = along(
-                self._splats(index, thing, eye), eye, object_from_world[:3, :3] @ ray, spread
+                self._splats(index, obj, eye), eye, object_from_world[:3, :3] @ ray, spread
             )
             depths.append(depth)
             alphas.append(alpha)
@@ -75,8 +75,8 @@ class Picker:
         point = np.asarray(origin, np.float64) + depth[first] * ray
         return Hit(point, int(owner[first]), float(depth[first]))
 
-    def _splats(self, index: int, thing: SceneObject, eye: np.ndarray) -> _Decoded:
-        model, x = thing.model, control_of(thing)
+    def _splats(self, index: int, obj: SceneObject, eye: np.ndarray) -> _Decoded:
+        model, x = obj.model, control_of(obj)
         place = tuple(eye) if follows_eye(model) else None
         key = (id(model), np.asarray(x).tobytes(), place)
         found = self._decoded.get(index)

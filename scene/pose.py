@@ -1,4 +1,4 @@
-"""Where a thing is.  World is metres, +Y up, right-handed, the eye looks along -Z (OpenGL, OpenXR).
+"""Poses and views.  World is metres, +Y up, right-handed, the eye looks along -Z (OpenGL, OpenXR).
 
 Name transforms by what they give and take:  p_world = world_from_object @ p_object.
 """

@@ -7,7 +7,7 @@ import numpy as np
 from shapeshift.scene.pose import Pose, View
 
 PUPILS_M = 0.064  # metres between the eyes of a person
-LOOKED_FROM_M = 1.8  # metres: from where a person looks at a thing
+LOOKED_FROM_M = 1.8  # metres: from where a person looks at an object
 
 
 def eyes_apart(distances: np.ndarray) -> float:

@@ -79,7 +79,7 @@ def splats_backward(
     """Gradients of the splats and (N, 12) of the records by those of the image.
 
     depth: what is to be learned from a depth photo, for a drawing that has depth.  asked: what
-    rasterize_backward is to tell beside them.
+    rasterize_backward is to give besides them.
     """
     drawn = None if depth is None else drawing.depth_frame
     with timed("rasterize backward"):

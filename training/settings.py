@@ -94,7 +94,7 @@ class TrainSettings:
     view_dependent: bool = True
     """Let colours depend on the direction from which one looks."""
     anchor_attributes: str = ",".join(ANCHOR_ATTRIBUTES)
-    """What each anchor has beside its features: frame (sizes and axes), color (a base colour)."""
+    """What each anchor has besides its features: frame (sizes and axes), color (a base colour)."""
     grow: bool = True
     """Add anchors and move the least useful ones to where pictures need them."""
     grow_every: int = 100

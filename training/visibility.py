@@ -1,6 +1,6 @@
 """Which anchors a training step runs: those that its view can show at its stop.
 
-What lies beside the view, or is absent at the stop, has no gradient.  It is told by a sphere about
+What lies out of view, or is absent at the stop, has no gradient.  It is found by a sphere about
 each anchor that holds what its splats showed when it last ran at that stop; every LOOK-th step of a
 stop runs all anchors, so that what has changed since comes back.
 """

@@ -16,7 +16,7 @@ from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.shown import SHADERS
 
 REST = 0.35  # of the clearness while one moves
-RISES_S, FALLS_S = 0.08, 0.7  # time constants of that
+RISES_S, FALLS_S = 0.08, 0.7  # time constants of its clearness
 BRIGHT = 0.5  # mean of a background from which on lines are darker than it
 UP = np.array([0.0, 1.0, 0.0])
 

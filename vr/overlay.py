@@ -68,8 +68,8 @@ class Overlay:
         ctx = self._ctx
         before = ctx.fbo or ctx.detect_framebuffer(0)
         try:
-            things = self._draw_things(framebuffer.size, play_view, drawn, box) if box else None
-            self._lay_over(framebuffer, play_view, drawn, box, things)
+            objects = self._draw_things(framebuffer.size, play_view, drawn, box) if box else None
+            self._lay_over(framebuffer, play_view, drawn, box, objects)
         finally:
             ctx.enable_only(moderngl.NOTHING)
             before.use()
@@ -131,12 +131,12 @@ class Overlay:
 
     def _lay_over(
         self, framebuffer: moderngl.Framebuffer, view: View, drawn: Drawn, box: PixelBox | None,
-        things: moderngl.Texture | None,
+        objects: moderngl.Texture | None,
     ) -> None:  # fmt: skip
         dark = drawn.vignette > 0 or drawn.blink > 0
         program = self._over
-        if things is not None:
-            things.use(0)
+        if objects is not None:
+            objects.use(0)
         program["drawn"].value = 0
         program["box"].value = box or (0, 0, 0, 0)
         program["tangents"].value = view.tangents

@@ -24,7 +24,7 @@ class FramePace:
     dropped: int = 0  # the runtime showed an older one in their place
     over: int = 0  # frames whose own time was longer than the period
     own_ms: list[float] = field(default_factory=list)  # from the runtime's go to our hand-over
-    drawing_ms: list[float] = field(default_factory=list)  # of that, the splats of both eyes
+    drawing_ms: list[float] = field(default_factory=list)  # of own_ms, the splats of both eyes
     wait_ms: list[float] = field(default_factory=list)  # the runtime let us wait
     _periods: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))  # periods, seconds
     _seen_s: float | None = None  # when the last frame was to be seen

@@ -119,7 +119,7 @@ def pressed(
 
 
 def place(world: World, side: str, hand: Hand, play_space: PlaySpace, jumps: bool) -> Pose | None:
-    """Where the palm is in the world, told to the world; None: lost, and it has let go."""
+    """Where the palm is in the world, which is informed; None: lost, and it has let go."""
     if not hand.active or hand.grip is None:
         world.move_hand(side, None)
         return None

@@ -69,7 +69,7 @@ def choose(rows: Sequence[MeasuredSetting], target_ms: float, floor_db: float) -
     kept = [row for row in rows if row.db >= floor_db and 0 < row.ms] or [exact]
     reaching = [row for row in kept if row.ms <= target_ms]
     if reaching:
-        # The exact picture is the best there is, however slow beside the others.
+        # The exact picture is the best there is, however slow compared with the others.
         best = max(reaching, key=lambda row: (row.name == EXACT, row.db, -row.ms))
     else:
         best = min(kept, key=lambda row: (row.ms, -row.db))

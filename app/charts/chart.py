@@ -15,7 +15,7 @@ MOST_FRAMES = 1000
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    """Price at least 24 settings: frame time and image error beside those of the exact one.
+    """Price at least 24 settings: frame time and image error compared with the exact one.
 
     Writes rows.csv, chart.svg and chart.png.  Rows that are there are kept: Ctrl-C loses nothing.
     """

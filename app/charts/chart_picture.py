@@ -66,7 +66,7 @@ def draw_chart(
 
 
 def _beside_two_eyes(rows: list[ChartRow]) -> tuple[list[ChartRow], str]:
-    """Rows of two eyes with exact at 1: it was measured beside one eye; and what that gave."""
+    """Rows of two eyes with exact at 1: it was measured against one eye; and its ratio there."""
     second = next((row for row in rows if row.name == "stereo"), None)
     if second is None:
         return rows, ""

@@ -53,7 +53,7 @@ class ChartScene:
 
     def at(self, x: float) -> Scene:
         """The scene with every object at control value x."""
-        return Scene(tuple(replace(thing, x=x) for thing in self.scene.objects))
+        return Scene(tuple(replace(obj, x=x) for obj in self.scene.objects))
 
 
 def make_chart_scene(
@@ -89,7 +89,7 @@ def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
 
 def side_by_side(subjects: Sequence[Document], x: float | None) -> Scene:
     """Along the world's x, framed radii touching; the first stays where it is."""
-    things: list[SceneObject] = []
+    objects: list[SceneObject] = []
     at, before = 0.0, None
     for subject in subjects:
         centre, radius = subject.bounds()
@@ -99,8 +99,8 @@ def side_by_side(subjects: Sequence[Document], x: float | None) -> Scene:
             at += GAP * (before + radius)
             pose = Pose(np.array([left + at - centre[0], 0.0, 0.0]), IDENTITY.wxyz)
         before = radius
-        things += subject.at(x, pose).objects
-    return Scene(tuple(things))
+        objects += subject.at(x, pose).objects
+    return Scene(tuple(objects))
 
 
 def distances_of(points: tuple[np.ndarray, np.ndarray], path: Sequence[View]) -> Distances:
@@ -117,28 +117,28 @@ def distances_of(points: tuple[np.ndarray, np.ndarray], path: Sequence[View]) ->
     return Distances(float(f"{near:.4g}"), float(f"{far:.4g}"))
 
 
-def digest(*things: object) -> str:
+def digest(*objects: object) -> str:
     """16 hex digits of what models hold: equal contents, equal digits, wherever they came from."""
     hasher = hashlib.sha256()
-    for thing in things:
-        _feed(hasher, thing)
+    for obj in objects:
+        _feed(hasher, obj)
     return hasher.hexdigest()[:16]
 
 
-def _feed(hasher, thing: object) -> None:
-    if is_dataclass(thing):
-        for each in fields(thing):
+def _feed(hasher, value: object) -> None:
+    if is_dataclass(value):
+        for each in fields(value):
             if each.name != "provenance":  # where it came from draws nothing
-                _feed(hasher, getattr(thing, each.name))
-    elif isinstance(thing, np.ndarray):
-        hasher.update(f"{thing.dtype}{thing.shape}".encode())
-        hasher.update(np.ascontiguousarray(thing).tobytes())
-    elif isinstance(thing, dict):
-        for name in sorted(thing):
-            _feed(hasher, (name, thing[name]))
-    elif isinstance(thing, list | tuple):
-        hasher.update(f"[{len(thing)}".encode())
-        for each in thing:
+                _feed(hasher, getattr(value, each.name))
+    elif isinstance(value, np.ndarray):
+        hasher.update(f"{value.dtype}{value.shape}".encode())
+        hasher.update(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, dict):
+        for name in sorted(value):
+            _feed(hasher, (name, value[name]))
+    elif isinstance(value, list | tuple):
+        hasher.update(f"[{len(value)}".encode())
+        for each in value:
             _feed(hasher, each)
     else:
-        hasher.update(repr(thing).encode())
+        hasher.update(repr(value).encode())

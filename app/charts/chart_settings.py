@@ -29,7 +29,7 @@ class Named:
     changes: dict = field(default_factory=dict)  # fields of RenderSettings
     eyes: int = 1
     place: str = ""  # of max_distance: "near", "far" or none
-    beside_eyes: int = 0  # eyes of the exact frames beside it; 0: as many as its own
+    beside_eyes: int = 0  # eyes of the exact frames it is compared with; 0: as many as its own
     quick: bool = False  # also in the chart of a few seconds that a budget measures
 
 
@@ -96,7 +96,7 @@ SETTINGS = (
     Named("stop 1/256, 2/255, 1.5 px",
           {"min_transmittance": 1 / 256, "min_alpha": 2 / 255, "min_pixels": 1.5}, quick=True),
     *(row for row in _table_3() if row.eyes == 1),
-    # Beside one eye, so that its ratio is what the second eye costs.
+    # Compared with one eye, so that its ratio is what the second eye costs.
     Named("stereo", eyes=2, beside_eyes=1),
     Named("stereo, a sort each", {"stereo_sort": "each"}, eyes=2),
     Named("stereo, colours each", {"stereo_colors": "each"}, eyes=2),
@@ -118,7 +118,7 @@ def settings_of(drawing: str, quick: bool = False, eyes: int = 0) -> tuple[Named
 
 
 def named_settings(name: str, drawing: str) -> Named:
-    """The row of that name; UsageError says which there are, or that this drawing has it not."""
+    """The row of that name; UsageError says which there are, or that this drawing lacks it."""
     found = {row.name: row for row in SETTINGS}.get(name)
     if found is None:
         words = "; ".join(row.name for row in SETTINGS)

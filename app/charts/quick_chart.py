@@ -99,7 +99,7 @@ class QuickChart:
         self.frames = frames_for(self._settings)
 
     def time_exact(self, number: int) -> float:
-        """Milliseconds of one exact frame of the turn, beside the chart."""
+        """Milliseconds of one exact frame of the turn, measured with the chart."""
         return self._draw(self._exact, self._views[number % len(self._views)])
 
     def step(self) -> None:

@@ -23,7 +23,7 @@ LARGEST_RESULT = 1_000_000  # bytes
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    """Time frames on an orbit and an x sweep, and measure the image error beside them."""
+    """Time frames on an orbit and an x sweep, and measure the image error with them."""
 
     scene: Annotated[Path, POSITIONAL]
     """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""

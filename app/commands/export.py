@@ -74,7 +74,7 @@ def run(options: Options) -> int:
     check_output(options.out, options.scenes, options.overwrite)
     eye = parse_eye(options.eye)
     opened = [open_scene(path, options) for path in scenes]
-    models = [thing.model for scene in opened for thing in scene.scene.objects]
+    models = [obj.model for scene in opened for obj in scene.scene.objects]
     if package:
         return export_package(options, opened)
     if eye and not any(map(follows_eye, models)):
@@ -138,19 +138,19 @@ def open_scene(path: Path, options: Options):
     inputs = [file.path(name) for name in read if name != HULLS]
     check_output(options.out, inputs, options.overwrite)
     chosen = options.object if len(options.scenes) == 1 else ""
-    things = [
-        thing
-        for thing in subject.scene.objects
-        if (chosen in (thing.name, str(thing.label)) if chosen else thing.visible)
+    objects = [
+        obj
+        for obj in subject.scene.objects
+        if (chosen in (obj.name, str(obj.label)) if chosen else obj.visible)
     ]
-    if exact := [thing for thing in things if chosen and thing.name == chosen]:
-        things = exact  # a name that is a number, too
-    if not things and chosen:
-        names = ", ".join(f"{thing.label} {thing.name}" for thing in subject.scene.objects)
+    if exact := [obj for obj in objects if chosen and obj.name == chosen]:
+        objects = exact  # a name that is a number, too
+    if not objects and chosen:
+        names = ", ".join(f"{obj.label} {obj.name}" for obj in subject.scene.objects)
         raise UsageError(f"--object is {chosen}; there are {names}.")
-    if not things:
+    if not objects:
         raise UsageError(f"{path}: all objects are hidden; --object NAME exports one of them.")
-    return replace(subject, scene=Scene(tuple(things)))
+    return replace(subject, scene=Scene(tuple(objects)))
 
 
 def parts_of(path: Path, subject, position, options: Options) -> list:
@@ -166,11 +166,11 @@ def parts_of(path: Path, subject, position, options: Options) -> list:
     if options.x:
         subject = subject.placed(options.x)
     parts = []
-    for thing in subject.scene.objects:
-        part = make_part(path, thing.model, position, options, thing)
-        placed = moved_object(thing, Pose(position, IDENTITY.wxyz))
-        selectors = (*placed.selectors, *part.thing.selectors)
-        parts.append(replace(part, thing=replace(placed, selectors=selectors)))
+    for obj in subject.scene.objects:
+        part = make_part(path, obj.model, position, options, obj)
+        placed = moved_object(obj, Pose(position, IDENTITY.wxyz))
+        selectors = (*placed.selectors, *part.obj.selectors)
+        parts.append(replace(part, obj=replace(placed, selectors=selectors)))
     return parts
 
 
@@ -213,8 +213,8 @@ def make_part(path: Path, model, position, options: Options, known=None):
     except ValueError as error:
         raise UsageError(f"--only {error}") from None
     pose = Pose(position, IDENTITY.wxyz)
-    thing = SceneObject(path.stem or path.name, model, pose, x, selectors=selectors)
-    return Part(thing, inside or None, options.label or None)
+    obj = SceneObject(path.stem or path.name, model, pose, x, selectors=selectors)
+    return Part(obj, inside or None, options.label or None)
 
 
 def choose_x(text: str, model):
@@ -243,11 +243,11 @@ def x_words(parts: list) -> str:
     """x of what was written, with the stop's name where it is one."""
     from shapeshift.runtime_models.stop_weights import control_text
 
-    thing = parts[0].thing
-    if len({part.thing.x for part in parts}) > 1:
+    obj = parts[0].obj
+    if len({part.obj.x for part in parts}) > 1:
         return f"{len(parts)} objects, each at its own x"
-    name = next((stop.name for stop in thing.model.stops if stop.x == thing.x), "")
-    return f"x = {control_text(thing.x)}" + (f" ({name})" if name else "")
+    name = next((stop.name for stop in obj.model.stops if stop.x == obj.x), "")
+    return f"x = {control_text(obj.x)}" + (f" ({name})" if name else "")
 
 
 def export_package(options: Options, opened: list) -> int:
@@ -268,7 +268,7 @@ def export_package(options: Options, opened: list) -> int:
             f"a package holds every x and every part; leave {given[0]} out, or write plain splats "
             "(.ply, .spz, .glb ...)."
         )
-    models = [thing.model for subject in opened for thing in subject.scene.objects]
+    models = [obj.model for subject in opened for obj in subject.scene.objects]
     if len(models) != 1 or opened[0].file or not isinstance(models[0], AnchorModel):
         what = "several scenes" if len(models) != 1 else "plain splats"
         what = "objects of a scene file, which have places," if opened[0].file else what

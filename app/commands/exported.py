@@ -38,7 +38,7 @@ ANY_SIZE = (640, 360)  # of the view whose eye is asked for
 class Part:
     """What of one object is exported."""
 
-    thing: SceneObject  # with its x, its regions and its pose
+    obj: SceneObject  # with its x, its regions and its pose
     inside: tuple[Selector, ...] | None = None  # what lies in any of them; None: all
     label: int | str | None = None  # the splats of this object within it, or its name; None: all
 
@@ -63,7 +63,7 @@ def export(parts: Sequence[Part], look: ExportLook, path: Path, progress) -> Pla
     look = replace(look, sh_degree=min(look.sh_degree, writer.sh_degree))
     baked = []
     for number, part in enumerate(parts):
-        progress(f"baking {part.thing.name}", number / (len(parts) + 1))
+        progress(f"baking {part.obj.name}", number / (len(parts) + 1))
         baked.append(bake_part(part, look))
     progress(f"writing {path.name}", len(parts) / (len(parts) + 1))
     splats = truncate_harmonics(merged(baked), look.sh_degree)
@@ -80,35 +80,35 @@ def export(parts: Sequence[Part], look: ExportLook, path: Path, progress) -> Pla
 
 def bake_part(part: Part, look: ExportLook) -> PlainSplats:
     """One object as plain splats, where it stands in the world."""
-    thing = part.thing
-    eye, said = eye_of(thing, look)
-    x = control_of(thing)
-    recolor = shown_colors(thing, x) if look.palette else None
-    splats = bake(thing.model, x, eye, look.sh_degree, recolor, chosen_rows(part))
-    named = [replace(finding, file=thing.name) for finding in (*splats.findings, *said)]
-    pose = thing.world_from_object
+    obj = part.obj
+    eye, said = eye_of(obj, look)
+    x = control_of(obj)
+    recolor = shown_colors(obj, x) if look.palette else None
+    splats = bake(obj.model, x, eye, look.sh_degree, recolor, chosen_rows(part))
+    named = [replace(finding, file=obj.name) for finding in (*splats.findings, *said)]
+    pose = obj.world_from_object
     # Where a model's own zero lies in its file is in the pose already.
     splats = replace(splats, findings=tuple(named), origin=(0.0, 0.0, 0.0))
     return placed(splats, pose.matrix()[:3, :3], pose.position)
 
 
-def eye_of(thing: SceneObject, look: ExportLook) -> tuple[np.ndarray | None, tuple[Finding, ...]]:
+def eye_of(obj: SceneObject, look: ExportLook) -> tuple[np.ndarray | None, tuple[Finding, ...]]:
     """From where an object is seen (3,), in its frame, if that matters, and a word about it."""
-    if not follows_eye(thing.model):
+    if not follows_eye(obj.model):
         return None, ()
     if look.eye is None:
-        eye = default_view(thing.model, ANY_SIZE).world_from_eye.position
+        eye = default_view(obj.model, ANY_SIZE).world_from_eye.position
     else:
-        object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+        object_from_world = np.linalg.inv(obj.world_from_object.matrix())
         eye = (object_from_world @ np.append(look.eye, 1.0))[:3]
     place = ",".join(f"{c:.4g}" for c in eye)
     what = "which splats there are and their shape depend on the eye"
     return eye, (Finding(what, 0, f"baked as seen from {place}; --eye chooses another place"),)
 
 
-def shown_colors(thing: SceneObject, x: Controls) -> Recolor | None:
+def shown_colors(obj: SceneObject, x: Controls) -> Recolor | None:
     """Mixes colours and what thermal stops have in them, in their palettes, as much as x asks."""
-    model = thing.model
+    model = obj.model
     shade = shade_of(model, x)
     if not shade.heats:
         return None
@@ -127,15 +127,15 @@ def chosen_rows(part: Part) -> np.ndarray | None:
 
     Anchors are inside or not, with all their splats, as regions take them.
     """
-    model, keep = part.thing.model, None
+    model, keep = part.obj.model, None
     each = 1 if isinstance(model, SplatLayers) else model.splats_per_anchor
     if part.inside is not None:
-        keep = np.repeat(covered(part.thing, part.inside) >= 0.5, each)
+        keep = np.repeat(covered(part.obj, part.inside) >= 0.5, each)
         if not keep.any():
-            raise UsageError(f"nothing of {part.thing.name} lies inside; choose another place.")
+            raise UsageError(f"nothing of {part.obj.name} lies inside; choose another place.")
     if part.label is None:
         return keep
-    of_label = splat_labels(model) == label_of(model, part.label, part.thing.name)
+    of_label = splat_labels(model) == label_of(model, part.label, part.obj.name)
     return of_label if keep is None else keep & of_label
 
 

@@ -137,12 +137,12 @@ def sample_of_scene(scene):
     from shapeshift.scene.control import control_of
 
     parts = []
-    for thing in scene.objects:
-        if not (thing.visible and thing.model.splat_count):
+    for obj in scene.objects:
+        if not (obj.visible and obj.model.splat_count):
             continue
-        eye = default_view(thing.model, (640, 360)).world_from_eye.position
-        splats = evaluate(thing.model, control_of(thing), eye)
-        world = thing.world_from_object.matrix()
+        eye = default_view(obj.model, (640, 360)).world_from_eye.position
+        splats = evaluate(obj.model, control_of(obj), eye)
+        world = obj.world_from_object.matrix()
         means = splats.means @ world[:3, :3].T + world[:3, 3]
         parts.append((means, splats.scales, splats.opacity))
     return sample_of(*map(np.concatenate, zip(*parts, strict=True))) if parts else None

@@ -18,7 +18,7 @@ UP = 2  # filter: each row is the difference to the one above, which packs bette
 def write_png16(pixels: np.ndarray, path: Path, texts: dict[str, str] | None = None) -> None:
     """(H, W) or (H, W, 3) uint16 to a grey or colour PNG, whole or not at all.
 
-    texts: Latin-1, one tEXt entry each, beside the name of this program.
+    texts: Latin-1, one tEXt entry each, after the name of this program.
     """
     height, width = pixels.shape[:2]
     bytes_ = np.ascontiguousarray(pixels, ">u2").reshape(height, -1).view(np.uint8)

@@ -158,8 +158,8 @@ def with_selectors(scene, selectors: tuple):
     """The scene of one object with these parts; without any, as it is."""
     if not selectors:
         return scene
-    (thing,) = scene.objects
-    return replace(scene, objects=(replace(thing, selectors=selectors),))
+    (obj,) = scene.objects
+    return replace(scene, objects=(replace(obj, selectors=selectors),))
 
 
 def document_at(document, control: float | str | None):

@@ -1,4 +1,4 @@
-"""launch.py simulate: a scene file in motion, driven by a script, told as JSON lines."""
+"""launch.py simulate: a scene file in motion, driven by a script, written as JSON lines."""
 
 import json
 import math
@@ -25,7 +25,7 @@ class Options:
     out: Path
     """Folder for run.jsonl and the pictures."""
     script: Path | None = None
-    """JSON lines with times: hands, grabs, releases, rays.  Default: none, things only fall."""
+    """JSON lines with times: hands, grabs, releases, rays.  Default: none, objects only fall."""
     x: Annotated[str, CONTROL] = ""
     """Where the sliders of all objects stand at the start: a stop or state by its name, or a number
     from 0 to 1.  Default: what the scene file says for each."""
@@ -126,7 +126,7 @@ def refuse_taken(paths: list[Path], options: Options) -> None:
 def write_steps(simulation, steps: int, path: Path, options: Options):
     """Steps and writes what is new; gives the number of steps done, 0 at first.
 
-    Lines are whole at every moment: who stops it keeps what was told until then.
+    Lines are whole at every moment: an interrupted run keeps what was written until then.
     """
     from shapeshift.runtime_models.files.whole_file import open_lines
 

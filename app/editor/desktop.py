@@ -77,8 +77,8 @@ def run(options: Options) -> int:
 def read_selectors(texts: tuple[str, ...], state: EditorState) -> tuple[Selector, ...]:
     """What --select says about the first object; UsageError, one sentence, for what is none."""
     try:
-        things = state.scene.objects
-        stops = things[0].model.stops if things else ()
+        objects = state.scene.objects
+        stops = objects[0].model.stops if objects else ()
         return tuple(read_selector(text, stops) for text in texts)
     except ValueError as error:
         raise UsageError(f"--select {error}") from None

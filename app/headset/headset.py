@@ -22,7 +22,7 @@ class Options(ReadingOptions):
     """Walk into a scene and touch it, see docs/vr.md."""
 
     scene: Annotated[Path | None, POSITIONAL] = None
-    """A scene file, a package or splats.  Default: three things on a table."""
+    """A scene file, a package or splats.  Default: three objects on a table."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands at the start: a stop by its name, or a number from 0 to 1.  Default:
     the first stop, and in a scene file what it says for each object."""

@@ -110,8 +110,8 @@ def frame_row(done: DoneFrame) -> dict:
             for offer in done.state.user.touched.offers
         ],
         "objects": {
-            thing.name: {**pose_row(thing.world_from_object), "x": control_row(thing.x, DECIMALS)}
-            for thing in world.drawn().objects
+            obj.name: {**pose_row(obj.world_from_object), "x": control_row(obj.x, DECIMALS)}
+            for obj in world.drawn().objects
         },
         "panel": done.panel(),
         "events": [event for record in done.records for event in record.events],

@@ -32,9 +32,9 @@ PATIENCE_S = 4.0
 QUALITIES = (AUTO, *FIXED)
 PART = 0.85  # of the period may be ours: the runtime wants the rest
 SAME = 0.1  # of a period: how much another one may differ and ask for nothing new
-LEAST = 0.25  # of that is the splats', however long all else takes
-EASY = 0.6  # of that: what takes the exact picture no longer needs no chart
-OVER, LATE = 1.05, 24  # times that, as the median of so many frames, is late
+LEAST = 0.25  # of the own part is for splats, however long all else takes
+EASY = 0.6  # of the own part: what takes the exact picture no longer needs no chart
+OVER, LATE = 1.05, 24  # times the own part, as the median of so many frames, is late
 TRIES = 4  # exact frames that say whether shortcuts are needed at all; one before them warms up
 
 

@@ -40,8 +40,8 @@ def draw_head(state: EditorState, ui_scale: float) -> None:
         imgui.text_disabled("nothing here changes its shape")
     for index in state.sliders:
         imgui.push_id(index)
-        thing = state.scene.objects[index]
-        _named(state, thing.name, shown_stop(state.stops(index), thing.slider_x), ui_scale)
+        obj = state.scene.objects[index]
+        _named(state, obj.name, shown_stop(state.stops(index), obj.slider_x), ui_scale)
         draw_slider(state, index, ui_scale)
         imgui.pop_id()
     for sentence in state.messages.problems:

@@ -127,23 +127,23 @@ class WristMenu:
         self._unsettled -= 1
         editor, side = self._state.editor, self.carried.pointer
         before = picture.hovered, picture.active
-        xs = [thing.slider_x for thing in editor.scene.objects]
+        xs = [obj.slider_x for obj in editor.scene.objects]
         picture.draw(self._fill, pointing, notches, seconds)
         if picture.active and not before[1] and before[0]:
             self._actions.pulse(side, *CLICK)
         elif picture.hovered not in (0, before[0]) and not picture.active:
             self._actions.pulse(side, *TICK)
-        for index, (thing, x) in enumerate(zip(editor.scene.objects, xs, strict=False)):
-            if picture.active and thing.slider_x != x:
+        for index, (obj, x) in enumerate(zip(editor.scene.objects, xs, strict=False)):
+            if picture.active and obj.slider_x != x:
                 self._pulse_at_stop(side, index)
 
     def _shown(self) -> tuple:
         """What the panel tells; equal as long as its picture is right."""
         state, editor = self._state, self._state.editor
-        things = tuple((t.name, t.visible, t.slider_x) for t in editor.scene.objects)
+        objects = tuple((t.name, t.visible, t.slider_x) for t in editor.scene.objects)
         playing = tuple(sweep.playing for sweep in editor.sweeps)
         return (
-            things, playing, editor.chosen, editor.palette, editor.settings.debug,
+            objects, playing, editor.chosen, editor.palette, editor.settings.debug,
             editor.settings.background, tuple(editor.messages.problems),
             tuple(state.touch.reactions),
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
@@ -195,10 +195,10 @@ class WristMenu:
         (3,) metres, its knob, the ends of its slider and the middles of its items are.
         """
         carried, editor = self.carried, self._state.editor
-        thing, shown = None, ""
+        obj, shown = None, ""
         for index in editor.sliders[:1]:
-            thing = editor.scene.objects[index]
-            shown = shown_stop(editor.stops(index), thing.slider_x)
+            obj = editor.scene.objects[index]
+            shown = shown_stop(editor.stops(index), obj.slider_x)
         side = carried.home if carried.open else ""
         row: dict = {"open": carried.open, "hand": side, "shown": shown}
         pose = carried.play_from_panel
@@ -209,12 +209,12 @@ class WristMenu:
             return [round(float(number), 6) for number in PANEL.play_point(pose, at)]
 
         boxes = dict(self.picture.boxes)
-        row["object"] = thing.name if thing is not None else ""
+        row["object"] = obj.name if obj is not None else ""
         row["taken"] = [carried.pointer] if carried.taken else []
         box = boxes.pop("track", None)
-        if thing is not None and box is not None:
+        if obj is not None and box is not None:
             first, last = track_ends(box, theme.FONT_SIZE * UI_SCALE)
-            along = first[0] + thing.slider_x * (last[0] - first[0])
+            along = first[0] + obj.slider_x * (last[0] - first[0])
             row["knob"] = place((along, first[1]))
             row["slider"] = [place(first), place(last)]
         row["buttons"] = {

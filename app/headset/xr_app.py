@@ -183,12 +183,12 @@ class XrApp:
         lines: list[Capsule] = []
         carried = self.menu.carried
         for offer in self.state.user.touched.offers:
-            thing = self.state.world.objects[offer.object]
-            hull = self._outlines.hull(thing.collider)
+            obj = self.state.world.objects[offer.object]
+            hull = self._outlines.hull(obj.collider)
             points = carried.on_panel and offer.side == carried.pointer
             if hull is None or points:
                 continue
-            pose, ink = thing.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
+            pose, ink = obj.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
             lines += outline(hull, pose, self.state.play_space, frame.head.position, ink)
         return lines
 

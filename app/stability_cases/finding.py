@@ -1,4 +1,4 @@
-"""What a case of `launch.py stability` finds: figures beside bounds, and panels to look at."""
+"""What a case of `launch.py stability` finds: figures with their bounds, and panels to look at."""
 
 import math
 from collections.abc import Iterable

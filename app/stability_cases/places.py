@@ -1,4 +1,4 @@
-"""Cases of where the eye is: far from the origin, over all depths, within things, any lens."""
+"""Cases of where the eye is: far from the origin, over all depths, within objects, any lens."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""launch.py table: one shape-shifting model beside separate models and plain splats."""
+"""launch.py table: one shape-shifting model compared with separate models and plain splats."""
 
 import os
 from dataclasses import dataclass, field, fields, replace

@@ -95,7 +95,7 @@ def cells(rows: list[TableRow]) -> tuple[list[str], list[list[str]]]:
     for row in rows:
         more = [f"{row.vgg_distance:.4f}"] if isinstance(row, VggRow) else []
         name, before = NAMES[row.method] if row.method != before else "", row.method
-        whole = row.method != "joint" or row.modality == MEAN  # one file for all: told once
+        whole = row.method != "joint" or row.modality == MEAN  # one file for all: counted once
         size = [f"{row.mb:.2f}", f"{row.steps:,}", f"{row.seconds:.1f}"] if whole else [""] * 3
         likeness = [f"{row.psnr_db:.2f}", f"{row.median_db:.2f}", f"{row.ssim:.4f}", *more]
         lines.append([name, row.modality, *likeness, f"{row.splats:,}", *size])

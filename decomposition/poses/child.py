@@ -19,7 +19,7 @@ POLL_S = 0.5
 
 
 def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]:
-    """Does `what` of the job; gives what was told beside progress.
+    """Does `what` of the job; returns what it reports besides progress.
 
     Interrupted, it ends the process; what that wrote into its database stays for the next run.
     Raises BadFile where the process does not end well.

@@ -276,7 +276,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       if (!(max8(fmax(t.lo, t.hi)) >= min_transmittance)) open &= ~(1u << k);
     }
   }
-  // Premultiplied, over nothing: whoever shows it puts the background behind.
+  // Premultiplied, over nothing: the background is put behind it when it is shown.
   for (int k = 0; k < BLOCKS; k++)
     store_block(R[k], G[k], B[k], 1 - T[k], x0 + k % SIDE * SIDE, y0 + k / SIDE * SIDE, width,
                 height, image);

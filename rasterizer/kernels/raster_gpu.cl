@@ -75,7 +75,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
       // d from the mean, and power = d^T Q d with the conic Q.
       const float dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
       const float q = s[CONIC_A] * dx * dx + 2 * s[CONIC_B] * dx * dy + s[CONIC_C] * dy * dy;
-      // alpha below min alpha, told without its exponential; NaN is skipped, too.
+      // alpha below min alpha, found without its exponential; NaN is skipped, too.
       if (!(q <= s[POWER_THRESHOLD])) continue;
       // The weight alpha T, with alpha = min(0.99, o exp(-power / 2)).
       const float w = fmin(MAX_ALPHA, s[OPACITY] * exp(-0.5f * q)) * T;

@@ -12,7 +12,7 @@ inline uchar4 eight_bits(float4 color) {
 
 // palette: STEPS colours (alpha 0), then how each differs from the next.
 // image: premultiplied, row 0 on top.  mixed 0: its colours are final, else the palette makes them
-// of its luminance; or adds those of the heat beside it (value, weight), where there is one.
+// of its luminance; or adds those of its heat (value, weight), where there is one.
 __kernel void resolve(int width, int height, float red, float green, float blue, int mixed,
                       __global const float4* image, __global const float4* palette,
                       __global uchar4* pixels, __global const float2* heat) {

@@ -3,7 +3,7 @@
 A thermal stop gives values, a palette makes colours of them.  At a pure thermal stop the palette is
 laid over the whole picture, as a thermal camera does it: values are blended before they become
 colours.  Between such a stop and another one both stops' colours are decoded.  What is thermal, the
-heat, is then drawn beside the rest, splat by splat by its weight, and the palette is laid over the
+heat, is then drawn in addition, splat by splat by its weight, and the palette is laid over the
 heat alone: a white tool is not hot because it is white.  Where several palettes show at once there
 is no one picture of values; each splat's heat is coloured before it is drawn.
 """
@@ -73,7 +73,7 @@ class FalseColors:
     """How a scene's colours come about."""
 
     way: str = NO_HEAT
-    palette: str = ""  # of the picture, or of the heat beside it
+    palette: str = ""  # of the picture, or of its heat
     shades: tuple[Shade, ...] = ()  # one an object
 
 
@@ -82,14 +82,14 @@ def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
     shades = [shade_of(o.model, x) for o, x in zip(scene.objects, controls, strict=True)]
     shown = [
         shade
-        for thing, shade in zip(scene.objects, shades, strict=True)
-        if thing.visible and thing.model.splat_count
+        for obj, shade in zip(scene.objects, shades, strict=True)
+        if obj.visible and obj.model.splat_count
     ]
     names = {heat.palette for shade in shown for heat in shade.heats}
     if len(names) == 1 and all(shade.pure for shade in shown):
         plain = [
-            Shade(x if colors_follow_control(thing.model) else 0.0)
-            for thing, x in zip(scene.objects, controls, strict=True)
+            Shade(x if colors_follow_control(obj.model) else 0.0)
+            for obj, x in zip(scene.objects, controls, strict=True)
         ]
         return FalseColors(PICTURE, names.pop(), tuple(plain))
     way = (NO_HEAT, BESIDE)[len(names)] if len(names) < 2 else SPLATS

@@ -56,9 +56,9 @@ def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
     Name "" (the stop's colours are final) and weight 0: nothing to do.
     """
     best: tuple[str, float, Stop | None] = ("", 0.0, None)
-    for thing in scene.objects:
-        for x in (thing.x, *(selector.x for selector in thing.selectors)) if thing.visible else ():
-            weights, stop = thermal_weights(thing.model.blend, x)
+    for obj in scene.objects:
+        for x in (obj.x, *(selector.x for selector in obj.selectors)) if obj.visible else ():
+            weights, stop = thermal_weights(obj.model.blend, x)
             if stop is not None and weights[0] > best[1]:
                 best = (stop.palette, float(weights[0]), stop)
     return best
@@ -93,7 +93,7 @@ def apply_palette(rgba: np.ndarray, name: str) -> np.ndarray:
 
 
 def overlay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
-    """Premultiplied (H, W, 4) and the heat beside it, (H, W, 2) value and weight, both times alpha:
+    """Premultiplied (H, W, 4) and its heat, (H, W, 2) value and weight, both times alpha:
     with the palette's colour of the value, as much as the weight; as (H, W, 4).
     """
     value, weight = heat[..., 0], heat[..., 1]

@@ -55,7 +55,7 @@ def classify(
     place = eye_places(points, poses, view.eye_from_world())
     left, right, down, up = view.tangents
     focal_x, focal_y = view.size[0] / (right - left), view.size[1] / (up - down)
-    with np.errstate(all="ignore"):  # what is beside the eye or not finite fails its gate below
+    with np.errstate(all="ignore"):  # what is level with the eye or not finite fails its gate below
         depth = -place[2]
         per_depth = 1 / depth
         tangent_x, tangent_y = place[0] * per_depth, place[1] * per_depth

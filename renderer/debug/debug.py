@@ -77,7 +77,7 @@ def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndar
         part = np.clip(np.nan_to_num(depth / farthest_depth(depth)), 0, 1)
         return np.repeat(part[:, None], 3, axis=1)
     colors = np.empty((len(depth), 3), np.float32)
-    ranks = [label_ranks(thing.model)[1] for thing in scene.objects]
+    ranks = [label_ranks(obj.model)[1] for obj in scene.objects]
     counts = [len(parts) for parts in object_parts(scene)]
     firsts = np.cumsum([0, *counts])
     for i, start, end in runs(points[1], len(scene.objects)):
@@ -114,7 +114,7 @@ def debug_image(
     points, poses = drawing.splat_points(), object_poses(scene)
     if settings.debug == "depth":
         return depth_picture(rgba, -eye_places(points, poses, view.eye_from_world())[2])
-    antialiased = tuple(is_antialiased(thing.model) for thing in scene.objects)
+    antialiased = tuple(is_antialiased(obj.model) for obj in scene.objects)
     reason, pixel, depth = classify(points, poses, view, settings, antialiased)
     numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
     facts = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
@@ -196,11 +196,11 @@ def object_poses(scene: Scene) -> np.ndarray:
 def object_counts(scene: Scene) -> dict[str, float]:
     """Splats of each part of each object by its name; equal names get a number."""
     counts: dict[str, float] = {}
-    for i, (thing, parts) in enumerate(zip(scene.objects, object_parts(scene), strict=True)):
+    for i, (obj, parts) in enumerate(zip(scene.objects, object_parts(scene), strict=True)):
         for label, count in parts:
-            name = thing.name
+            name = obj.name
             if label is not None:
-                name += f", {name_of(thing.model, label) or f'label {label}'}"
+                name += f", {name_of(obj.model, label) or f'label {label}'}"
             counts[name if name not in counts else f"{name} {i + 1}"] = float(count)
     return counts
 
@@ -208,13 +208,13 @@ def object_counts(scene: Scene) -> dict[str, float]:
 def object_parts(scene: Scene) -> list[list[tuple[int | None, int]]]:
     """For each object (label, splats) of its commonest labels; one (None, all) without labels."""
     parts: list[list[tuple[int | None, int]]] = []
-    for thing in scene.objects:
-        labels, ranks = label_ranks(thing.model)
+    for obj in scene.objects:
+        labels, ranks = label_ranks(obj.model)
         counts = np.bincount(np.ravel(ranks), minlength=len(labels)).tolist()
         if labels:
             parts.append(list(zip(labels, counts, strict=True)))
         else:
-            parts.append([(None, thing.model.splat_count)])
+            parts.append([(None, obj.model.splat_count)])
     return parts
 
 

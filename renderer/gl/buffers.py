@@ -85,7 +85,7 @@ class Arena:
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
         self._pack = gpu.compute("pack.comp")
-        self._heats: dict[int, moderngl.Buffer] = {}  # set -> what is beside its colours
+        self._heats: dict[int, moderngl.Buffer] = {}  # set -> heat that goes with its colours
 
     def heat_of(self, which: int) -> moderngl.Buffer:
         """What thermal stops have in a set of colours; made, all zero, when first asked for."""

@@ -20,7 +20,7 @@ class Projector:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._variant(1, False, RenderSettings())  # a broken shader is told at the start
+        self._variant(1, False, RenderSettings())  # a broken shader is reported at the start
 
     def _variant(
         self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False,

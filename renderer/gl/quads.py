@@ -54,7 +54,7 @@ class QuadsDrawing(Drawing):
         self._models: list[Model] = []
         self._most: float | None = None  # brightest colour of these; None: not known yet
         self._last = 0  # row of the counts of the view drawn last
-        self.draws_heat = False  # beside the colours, from the next frame on
+        self.draws_heat = False  # in addition to the colours, from the next frame on
         self._arena: Arena  # these two from allocate() on
         self._decoder: Decoder
         self._allocated: list[Arena | Decoder] = []

@@ -18,7 +18,7 @@ UNWRITTEN = 0xFFFFFFFF  # no index of a splat
 def checked_sorter(gpu: Gpu, backend: str) -> tuple[Sorter, str]:
     """A Sorter and the name of what it sorts with: the backend asked for, or FAILED.
 
-    "gl" sorts known keys first.  A driver that gets one of them wrong is told of in the log.
+    "gl" sorts known keys first.  A driver that gets one of them wrong is named in the log.
     """
     sorter = Sorter(gpu, backend)
     if backend != "gl":

@@ -25,7 +25,7 @@ class Splatter:
         self._units: dict[int, float] = {}  # of the images
 
     def program_for(self, heat: bool) -> tuple[moderngl.Program, moderngl.VertexArray]:
-        """What draws pictures with heat beside them, or without; compiled at the first call."""
+        """What draws pictures with heat, or without; compiled at the first call."""
         if heat not in self._programs:
             program = self._gpu.program("splat.vert", "splat.frag", HEAT=int(heat))
             # No attributes and no indices: the shader pulls what it draws from the arena.
@@ -44,7 +44,7 @@ class Splatter:
         """Draws the arena as it was last projected and sorted, into the image of view i.
 
         row: which of the views that were projected together.  heat: what is drawn into a second
-        image beside it.
+        image in addition.
         """
         target = self.target_of(i, size, heat is not None)
         with self._gpu.drawing_into(target):
@@ -73,7 +73,7 @@ class Splatter:
     def texture(self, i: int, of: int = 0) -> moderngl.Texture:
         """The image of view i on the GPU, row 0 at the bottom; its colours count in unit_of(i).
 
-        of 1: the heat beside it, value and weight, of which the value counts so.
+        of 1: its heat, value and weight, of which the value counts so.
         """
         return self._targets[i].color_attachments[of]
 

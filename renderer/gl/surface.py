@@ -13,7 +13,7 @@ from shapeshift.renderer.surface import Surface
 from shapeshift.scene.pose import View
 
 VECS = 3  # vec4 a splat
-OUTPUTS = {"depth": 0, "normal": 1}  # what one draw leaves beside coverage
+OUTPUTS = {"depth": 0, "normal": 1}  # what one draw leaves in addition to coverage
 
 
 def draw_surface(gpu: Gpu, arena: Arena, view: View, settings: RenderSettings) -> Surface:

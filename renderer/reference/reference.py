@@ -85,12 +85,12 @@ def reference_image(
 def shaded_objects(
     scene: Scene, view: View, settings: RenderSettings, eye: np.ndarray
 ) -> tuple[list[ReferenceSplats], FalseColors]:
-    """The visible objects; colours are (N, 3), or (N, 5) with the heat that is drawn beside."""
-    colors = false_colors(scene, [control_of(thing) for thing in scene.objects])
+    """The visible objects; colours are (N, 3), or (N, 5) with the heat."""
+    colors = false_colors(scene, [control_of(obj) for obj in scene.objects])
     found = [
-        gate_object(thing, view, settings, eye, (colors.way, shade))
-        for thing, shade in zip(scene.objects, colors.shades, strict=True)
-        if thing.visible
+        gate_object(obj, view, settings, eye, (colors.way, shade))
+        for obj, shade in zip(scene.objects, colors.shades, strict=True)
+        if obj.visible
     ]
     return found, colors
 
@@ -117,40 +117,40 @@ def reference_counts(
 
 
 def project_object(
-    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray
+    obj: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray
 ) -> tuple:
     """depth (M,), mean_px (M, 2), covariance_px (M, 2, 2), opacity (M,), color (M, 3) of what is
     drawn.
     """
-    all_ = gate_object(thing, view, settings, eye)
+    all_ = gate_object(obj, view, settings, eye)
     names = ("depth", "mean_px", "covariance", "opacity", "color")
     return tuple(getattr(all_, name)[all_.reason == 0] for name in names)
 
 
 def gate_object(
-    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray,
+    obj: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray,
     shading: tuple[str, Shade] | None = None,
 ) -> ReferenceSplats:  # fmt: skip
     """Projects every splat and finds the first gate that it fails.
 
     shading: how the scene's heat is shown and what of the object is heat; None: none is.
     """
-    world_from_object = thing.world_from_object.matrix()
+    world_from_object = obj.world_from_object.matrix()
     camera_from_world, fx, fy, cx, cy = view.pinhole()
     camera_from_object = camera_from_world @ world_from_object
     object_from_world = np.linalg.inv(world_from_object)
     eye_object = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
-    splats = evaluate(thing.model, control_of(thing), eye_object)
+    splats = evaluate(obj.model, control_of(obj), eye_object)
     means, scales, wxyz, opacity = (
         np.asarray(a, np.float64)
         for a in (splats.means, splats.scales, splats.wxyz, splats.opacity)
     )
-    color = shaded_color(thing.model, splats.color, eye_object, shading)
+    color = shaded_color(obj.model, splats.color, eye_object, shading)
     turned = np.isfinite(wxyz).all(axis=1, keepdims=True)  # (N, 1)
     scales = np.where(turned, scales, np.nan)
-    if not thing.visible:
+    if not obj.visible:
         means = np.full_like(means, np.nan)
-    with np.errstate(all="ignore"):  # splats that are not finite, or beside or behind the eye
+    with np.errstate(all="ignore"):  # splats that are not finite, or level with or behind the eye
         mean = means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres
         depth = mean[:, 2]
         axes = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3) metres
@@ -159,7 +159,7 @@ def gate_object(
         bare = screen_covariance(mean, in_camera, (fx, fy), (-most_x, most_x, -most_y, most_y))
         covariance = bare + settings.low_pass * np.eye(2)
         seen = (
-            opacity * mip_compensation(bare, covariance) if is_antialiased(thing.model) else opacity
+            opacity * mip_compensation(bare, covariance) if is_antialiased(obj.model) else opacity
         )
         # The arena keeps covariances as float32: what is infinite there is so here.
         overflow: np.ndarray = np.asarray(

@@ -75,7 +75,7 @@ class TilesDrawing(Drawing):
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
         self._world_from_objects = np.zeros((0, 4, 4))
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
-        self.draws_heat = False  # beside the colours, from the next frame on
+        self.draws_heat = False  # in addition to the colours, from the next frame on
         self._heat_images: dict[int, np.ndarray] = {}
 
     def allocate(self, models: list[Model]) -> None:
@@ -91,7 +91,7 @@ class TilesDrawing(Drawing):
         self._covariance = device.zeros((self.splats, 8))
         self._colors: list = [device.zeros((self.splats, 4))]  # for all views, or one a view
         self._color, self._set = self._colors[0], 0  # that decoding writes into
-        self._heats: list = [None]  # beside them, (N, 4) once an object has any
+        self._heats: list = [None]  # of the same splats, (N, 4) once an object has any
         self._antialiased = tuple(map(is_antialiased, models))
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)

@@ -95,5 +95,5 @@ def member_names(path: Path) -> list[str]:
     try:
         with opened_zip(path, path.name, Memory().of(path)) as archive:
             return archive.namelist()
-    except BadFile:  # whoever reads it says what is wrong with it
+    except BadFile:  # its reader says what is wrong with it
         return []

@@ -1,4 +1,4 @@
-"""Which rows of a file's splats need a second look, told fast: nearly always none does."""
+"""Which rows of a file's splats need a second look, found fast: nearly always none does."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def invalid_rows(raw: RawSplats) -> np.ndarray:
     """(K,) rising rows with a number that is not usual as it is filed.
 
     NaN or Inf anywhere, a quaternion of next to no or of boundless length, a scale or opacity that
-    its coding does not have.  A block is told by its least and largest numbers; only where those
+    its coding does not have.  A block is judged by its least and largest numbers; only where those
     are odd is it looked at row by row.
     """
     found: list[np.ndarray] = []

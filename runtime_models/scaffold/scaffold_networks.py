@@ -167,7 +167,7 @@ def with_inputs(
     mlps: dict[str, Mlp], appearance: int, shape: Shape, folder: Path
 ) -> tuple[dict[str, Mlp], tuple[Finding, ...]]:
     """The networks with their inputs named, an appearance of the colours left out."""
-    extra = {}  # inputs beside features, direction and appearance
+    extra = {}  # inputs other than features, direction and appearance
     for role, size in SCAFFOLD_HEADS.items():
         mlp, own = mlps[role], appearance if role == "color" else 0
         extra[role] = mlp.width_in - shape.features - 3 - own
@@ -211,7 +211,7 @@ def takes_level(
         return bank.width_in == 4, ()
     if set(extra.values()) != {1}:
         return 2 in extra.values(), ()
-    what = "every network takes one number beside features and direction, and no cfg_args says what"
+    what = "every network takes one number after features and direction, and no cfg_args says what"
     return False, (Finding(what, 0, "read as the distance", (), "opacity_mlp.pt", repaired=False),)
 
 

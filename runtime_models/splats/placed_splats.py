@@ -14,7 +14,7 @@ from shapeshift.runtime_models.splats.plain_splats import RawSplats
 
 EVEN = 1e-5  # how much the scales of a node may differ and still be one
 BLOCK = 1 << 16  # splats at a time whose shapes are decomposed
-MOVING = 96  # bytes a splat beside its harmonics while a matrix moves it
+MOVING = 96  # bytes a splat without its harmonics while a matrix moves it
 
 
 def moved(raw: RawSplats, world_from_mesh: np.ndarray) -> RawSplats:

@@ -58,7 +58,7 @@ class Reading:
 class RawSplats:
     """A file's splats as they are written, in its axes and its coding: not judged, not turned.
 
-    The arrays are the reader's own: whoever judges them may change them in place.
+    The arrays are the reader's own: a check of them may change them in place.
     """
 
     means: np.ndarray  # (N, 3) float32, or float64 where the file holds that

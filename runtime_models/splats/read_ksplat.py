@@ -24,7 +24,7 @@ BUCKETS = struct.Struct("<IIH")  # full, partly filled; SH degree
 BUCKETS_AT = 32
 HARMONICS = (0, 9, 24, 45)  # numbers a splat beyond the first three, by SH degree; 3 is written
 #                              by other converters, GaussianSplats3D itself stops at 2
-UNPACKED = 64  # bytes a splat of what is needed on the way, beside its harmonics
+UNPACKED = 64  # bytes a splat of what is needed on the way, without its harmonics
 RANGE = 32767  # codes on either side of a bucket's centre, where a section does not say
 BYTE_HARMONIC = 1.5  # largest 8-bit harmonic, where the header does not say
 

@@ -1,6 +1,6 @@
 """Splats that move (SpacetimeGaussians, Li et al. 2024), held still at one time.
 
-Its PLY has, beside 3DGS's columns, motion_0..8, trbf_center, trbf_scale and omega_0..3.  With
+Its PLY has, besides 3DGS's columns, motion_0..8, trbf_center, trbf_scale and omega_0..3.  With
 dt = t - trbf_center (its section 4.1) a splat is at place + motion_0..2 dt + motion_3..5 dt^2 +
 motion_6..8 dt^3, its quaternion + omega dt, its opacity times exp(-(dt / exp(trbf_scale))^2).
 f_dc are colours from 0 to 1.

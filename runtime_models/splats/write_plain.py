@@ -57,7 +57,7 @@ def writer_of(path: Path) -> Writer:
 
 
 def describe_losses(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
-    """What the splats have and the format has no place for, beside what its codes round."""
+    """What the splats have and the format has no place for, apart from what its codes round."""
     findings = []
     if splats.antialiased and not writer.antialiased:
         what = "the splats were trained antialiased"

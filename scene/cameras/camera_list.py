@@ -92,7 +92,7 @@ def ours_from_world(reading: CameraReading, up: str = DATA_UP) -> np.ndarray:
 
 
 def flipped(reading: CameraReading) -> np.ndarray:
-    """(4, 4) what --flip adds to a turn that the file itself has told."""
+    """(4, 4) what --flip adds to a turn that the file itself states."""
     turn = np.eye(4)
     turn[:3, :3] = UPSIDE_DOWN if reading.flip else np.eye(3)
     return turn

@@ -37,7 +37,7 @@ def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, fl
     low, high = np.percentile(points, PERCENTILES, axis=0)
     centre = (low + high) / 2
     radius = float(np.percentile(np.linalg.norm(points - centre, axis=1), PERCENTILES[1]))
-    # beside its place a smaller one is lost in rounding: the eye would lie in what it looks at
+    # next to its numbers a smaller one is lost in rounding: the eye would lie in what it looks at
     least = max(SMALLEST_PART * float(np.abs(centre).max()), SMALLEST_RADIUS)
     return centre, radius if radius > least else max(FALLBACK_RADIUS, 1000 * least)
 
@@ -163,7 +163,7 @@ def common_side(views: Sequence[View]) -> float | None:
     """The side from which cameras look, radians about +Y from +Z; None where they look from all.
 
     The mean of their directions over the ground, where it is longer than COMMON: photos of one
-    side of a thing say which side is its front.
+    side of an object say which side is its front.
     """
     ahead = np.array([-view.world_from_eye.matrix()[:3, 2] for view in views]).reshape(-1, 3)
     level = ahead[:, [0, 2]]  # (V, 2) x, z

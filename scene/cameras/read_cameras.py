@@ -1,4 +1,4 @@
-"""Views to draw from: whichever form a file or folder of cameras has, told by what is in it."""
+"""Views to draw from: whichever form a file or folder of cameras has, found from its content."""
 
 from pathlib import Path
 

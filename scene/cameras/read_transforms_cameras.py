@@ -105,7 +105,7 @@ def view_of(
 
 
 def focal_of(fields: Fields, pixels: str, angle: str, side: float) -> float:
-    """Focal length in pixels, or 0 where neither it nor the angle of view is told."""
+    """Focal length in pixels, or 0 where neither it nor the angle of view is given."""
     if pixels in fields.data:
         return fields.number(pixels, wanted="a number of pixels above 0", low=LEAST, high=MOST)
     if angle in fields.data:
@@ -117,7 +117,7 @@ def focal_of(fields: Fields, pixels: str, angle: str, side: float) -> float:
 
 
 def size_of(fields: Fields, folder: Path, notes: Notes) -> tuple[float, float]:
-    """(width, height) as told, else of the photo if it is there, else of Blender's sets."""
+    """(width, height) as given, else of the photo if it is there, else of Blender's sets."""
     entry = fields.data
     if "w" in entry and "h" in entry:
         return (

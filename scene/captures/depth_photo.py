@@ -95,7 +95,7 @@ def load_depth(photo: Photo, factor: int | None = None) -> np.ndarray:
 def _at_pixels(depth: np.ndarray, photo: Photo, factor: int) -> np.ndarray:
     """What lies at the centre of each pixel of the photo as training sees it.
 
-    Means would put points between a thing and what is behind it.
+    Means would put points between an object and what is behind it.
     """
     width, height = photo.view.divided(factor).size
     x, y = ((np.arange(side) + 0.5) * factor for side in (width, height))

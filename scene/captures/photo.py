@@ -64,7 +64,7 @@ def load_photo(photo: Photo, factor: int = 1) -> Pixels:
     channel, the colours are laid over black with the latter.  Of a bent lens the pixels are those
     of its straight camera, scene.undistort.
     """
-    if photo.lens is not None:  # what is made of it is beside it in memory
+    if photo.lens is not None:  # what is made of it is in memory at the same time
         charge_pixels(photo.path, photo.view.size)
     image, file_size = decoded(photo.path, photo.counts, factor)
     mask_image, has_alpha = None, image.mode == "RGBA"
@@ -189,7 +189,7 @@ def charge_pixels(path: Path, size: tuple[int, int], most: int = 0) -> None:
             f"{path}: {size[0]}x{size[1]} pixels, at most {usual:,} are read out of "
             f"{bytes_there:,} bytes; scale it down, save it again{more}"
         )
-    # What it may have is told in pixels: of the account only the machine's bound counts.
+    # What it may have is given in pixels: of the account only the machine's bound counts.
     whole.of(path, PIXEL * MOST_PIXELS).charge(PIXEL * pixels, f"{pixels:,} pixels")
 
 

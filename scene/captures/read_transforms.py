@@ -239,7 +239,7 @@ def photo_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path) 
 
 
 def lens_of(shot: Shot) -> ColmapCamera:
-    """The lens as the file states it, of the size that it states; else of that of the photo."""
+    """The lens as the file states it, of the size that it states, else of the photo's."""
     entry, where = shot.entry, shot.where
     fields = Fields(entry, where)
     for key in LENS:

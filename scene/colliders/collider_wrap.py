@@ -22,7 +22,7 @@ OFFSET = 0.9  # cells that the surface runs outside of the points before it is m
 FAR = 4.0  # cells; no distance beyond is needed, and to look for them takes minutes
 LEAST_HALF = 0.35  # cells that half of a thin part keeps
 LEAST_PART = 0.01  # of the cells of the largest piece; a smaller piece is a floater
-LEAST_ROOM = 4000  # cells of a room inside of a hollow thing; what is smaller is filled
+LEAST_ROOM = 4000  # cells of a room inside of a hollow object; what is smaller is filled
 LEAKS = 2.0  # times the solid cells that closing more must give for the skin to have leaked
 MOST_POINTS = 400_000  # that distances are measured to
 MOST_OVER = 1.1  # times the faces wanted that a simplified mesh may have
@@ -73,7 +73,7 @@ def fill(
 
 
 def all_solid(away: np.ndarray) -> np.ndarray:
-    """Cells that count as solid, of a thing that is solid throughout; of a leaking skin, too.
+    """Cells that count as solid, of an object that is solid throughout; of a leaking skin, too.
 
     away: cells from each to the nearest taken one.
     """

@@ -18,7 +18,7 @@ LONGEST_NAME = 100  # letters, as the reader takes them
 MOST_OBJECTS = 1000  # as the reader takes them
 DECIMALS, FINER = 6, 9  # of metres and of a quaternion: hands are no finer, files are short
 MOST_STEPS = 500  # that can be undone
-MOST_BYTES = 256 << 20  # of what the steps keep beside the file: painted regions of large scenes
+MOST_BYTES = 256 << 20  # of what the steps keep besides the file: painted regions of large scenes
 
 
 def find(file: SceneFile, name: str) -> SceneItem | None:
@@ -196,7 +196,7 @@ class HistoryStep:
     file: SceneFile
     what: str = ""
     together: str = ""  # edits in a row with the same word are one step: a drag
-    regions: tuple = ()  # edited beside the file, until it is saved
+    regions: tuple = ()  # edited apart from the file, until it is saved
     bytes: int = 0  # that this step alone keeps
 
 

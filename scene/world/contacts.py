@@ -2,7 +2,7 @@
 
 The engine merges the touching faces of a body's hulls into clusters, which halves its cost, and
 then counts impulses of clusters up to four times.  So impulses are taken from the momentum that
-bodies gained: a body that touched one thing alone got all of it there, which leaves what its
+bodies gained: a body that touched one object alone got all of it there, which leaves what its
 neighbour got elsewhere, and so on.  Only in a ring of bodies, or of held ones, the engine's count
 stays.
 """
@@ -19,7 +19,7 @@ HARDER = 1.1  # as hard as this a substep takes over the place of a contact
 
 @dataclass(frozen=True)
 class Contact:
-    """Two things that touched during a step; every pair is told once."""
+    """Two objects that touched during a step; every pair comes once."""
 
     a: int  # id, less than b
     b: int

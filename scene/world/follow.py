@@ -35,9 +35,9 @@ def follow(world: World, file: SceneFile, models: Mapping[str, Model], colliders
             world.add(item, models[item.name], colliders.get(item.name), label)
         else:
             change(world, item, models[item.name], colliders.get(item.name))
-        thing = world.objects[item.name]
-        if thing.drawn.label != label:
-            world.objects[item.name] = replace(thing, drawn=replace(thing.drawn, label=label))
+        obj = world.objects[item.name]
+        if obj.drawn.label != label:
+            world.objects[item.name] = replace(obj, drawn=replace(obj.drawn, label=label))
     world.objects = {name: world.objects[name] for name in wanted}
 
 
@@ -48,11 +48,11 @@ def rename(world: World, wanted: Mapping[str, SceneItem]) -> None:
         same = [n for n in gone if changed(world.objects[n].item, item) == {"name"}]
         if same:
             gone.remove(same[0])
-            thing = world.objects.pop(same[0])
-            drawn = replace(thing.drawn, name=item.name)
-            world.objects[item.name] = replace(thing, item=item, drawn=drawn)
-            if thing.body is not None:
-                world.names[thing.body] = item.name
+            obj = world.objects.pop(same[0])
+            drawn = replace(obj.drawn, name=item.name)
+            world.objects[item.name] = replace(obj, item=item, drawn=drawn)
+            if obj.body is not None:
+                world.names[obj.body] = item.name
 
 
 def change(world: World, item: SceneItem, model: Model, collider) -> None:
@@ -67,10 +67,10 @@ def change(world: World, item: SceneItem, model: Model, collider) -> None:
         drawn = object_of(item, world.objects[item.name].drawn.model, label)
         world.objects[item.name] = replace(world.objects[item.name], drawn=drawn)
     if new & set(ANSWERS):
-        thing = world.objects[item.name]
+        obj = world.objects[item.name]
         machine = machine_of(item, model)
-        reaction_state = start(machine, thing.reaction_state.x)
-        world.objects[item.name] = replace(thing, machine=machine, reaction_state=reaction_state)
+        reaction_state = start(machine, obj.reaction_state.x)
+        world.objects[item.name] = replace(obj, machine=machine, reaction_state=reaction_state)
     if new & {"position", "wxyz"}:
         world.move_object(item.name, item.pose)
     if "x" in new:
@@ -105,8 +105,8 @@ def reset_objects(world: World) -> None:
     """Everything where its item says, at rest, at its first x; hands are empty."""
     for hand in list(world.holds):
         world.release(hand)
-    for name, thing in world.objects.items():
-        world.move_object(name, thing.item.pose)
-        fresh = start(thing.machine, thing.item.x)
+    for name, obj in world.objects.items():
+        world.move_object(name, obj.item.pose)
+        fresh = start(obj.machine, obj.item.x)
         world.objects[name] = replace(world.objects[name], reaction_state=fresh)
     world.impulses = {}

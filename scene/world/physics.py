@@ -1,4 +1,4 @@
-"""How things fall, rest, collide and are held: the one class behind which the engine hides.
+"""How objects fall, rest, collide and are held: the one class behind which the engine hides.
 
 The engine is Rapier (Apache-2.0, pinned).  World metres, +Y up.  It computes in float32.  The same
 calls in the same order give the same bits, in every process on one kind of machine.
@@ -46,10 +46,10 @@ MOST_REACH = 2e4  # metres along a ray
 
 
 class Physics:
-    """A world of static things and bodies, stepped by 1 / hz seconds.
+    """A world of static objects and bodies, stepped by 1 / hz seconds.
 
     Bad input is refused with a ValueError before it reaches the engine.  What was changed on the
-    way in (a mass out of range) is told in `findings`.  Raises BadFile where there is no engine.
+    way in (a mass out of range) is named in `findings`.  Raises BadFile where there is no engine.
     """
 
     def __init__(
@@ -98,10 +98,10 @@ class Physics:
         friction: float = 0.6,
         restitution: float = 0.0,
     ) -> int:
-        """A thing that never moves: a mesh (an open one gets a back), or hulls (V, 3) metres."""
+        """An object that never moves: a mesh (an open one gets a back), or hulls (V, 3) metres."""
         from rapier3d import RigidBody
 
-        at = isometry(checked_pose(pose, "a static thing"))
+        at = isometry(checked_pose(pose, "a static object"))
         if isinstance(shape, TriangleMesh):
             engine_shape, findings = mesh_shape(shape)
             self.findings += findings
@@ -119,9 +119,9 @@ class Physics:
         friction: float = 0.6,
         restitution: float = 0.0,
     ) -> int:
-        """A thing that moves, made of convex pieces (V, 3) metres, object frame.
+        """An object that moves, made of convex pieces (V, 3) metres, object frame.
 
-        A mass outside 0.05 to 5 kg is clamped and told in `findings`.
+        A mass outside 0.05 to 5 kg is clamped and named in `findings`.
         """
         from rapier3d import RigidBody
 
@@ -170,7 +170,7 @@ class Physics:
             self._meshes.add(number)
 
     def remove(self, number: int) -> None:
-        """Takes a thing out; hands that held it are empty, and what lay on it falls."""
+        """Takes an object out; hands that held it are empty, and what lay on it falls."""
         handle = self._handle(number)
         for grab in [g for g, hold in self._holds.items() if hold.body == number]:
             self._remove_hand(grab)
@@ -182,9 +182,9 @@ class Physics:
         self._queries_stale = True
 
     def set_pose(self, number: int, pose: Pose) -> None:
-        """Puts a thing somewhere else, at rest: undo, reset and the gizmo."""
+        """Puts an object somewhere else, at rest: undo, reset and the gizmo."""
         body = self._world.rigid_bodies[self._handle(number)]
-        body.position = isometry(checked_pose(pose, f"thing {number}"))
+        body.position = isometry(checked_pose(pose, f"object {number}"))
         if number in self._masses:
             body.linvel = body.angvel = (0.0, 0.0, 0.0)
         self._world.wake_up_all()
@@ -201,11 +201,11 @@ class Physics:
     # ---- what it tells
 
     def ids(self) -> tuple[int, ...]:
-        """Every thing, the floor too, in the order they came."""
+        """Every object, the floor too, in the order they came."""
         return tuple(self._handles)
 
     def bodies(self) -> tuple[int, ...]:
-        """The things that move."""
+        """The objects that move."""
         return tuple(self._masses)
 
     def pose(self, number: int) -> Pose:
@@ -228,7 +228,7 @@ class Physics:
         return self._body(number).is_sleeping
 
     def cast_ray(self, origin: Any, direction: Any) -> tuple[int, float] | None:
-        """The nearest thing along a ray and its distance in metres; 0 from inside of one."""
+        """The nearest object along a ray and its distance in metres; 0 from inside of one."""
         from rapier3d import Ray
 
         start = checked_point(origin, "the origin of a ray")
@@ -262,7 +262,7 @@ class Physics:
 
     def _handle(self, number: int) -> Any:
         if number not in self._handles:
-            raise ValueError(f"there is no thing {number}; it was removed, or never added.")
+            raise ValueError(f"there is no object {number}; it was removed, or never added.")
         return self._handles[number]
 
     def _collider(self, number: int) -> Any:
@@ -271,7 +271,7 @@ class Physics:
     def _body(self, number: int) -> Any:
         handle = self._handle(number)
         if number not in self._masses:
-            raise ValueError(f"thing {number} is static; only a body moves.")
+            raise ValueError(f"object {number} is static; only a body moves.")
         return self._world.rigid_bodies[handle]
 
     # ---- time

@@ -6,9 +6,9 @@ from typing import Any
 from shapeshift.runtime_models.model import BadFile, Finding
 
 MOST_SPEED = 40.0  # m/s: whatever is faster is slowed to it
-LENGTH_UNIT = 0.1  # metres: what things to be held measure; scales the engine's tolerances
+LENGTH_UNIT = 0.1  # metres: what objects to be held measure; scales the engine's tolerances
 SOLVER_ITERATIONS = 8  # a substep; with the default of 4 a stack of 1 : 100 sinks
-# Hz and damping ratio of contacts: the default of 30 Hz lets things rest 12 mm deep.
+# Hz and damping ratio of contacts: the default of 30 Hz lets objects rest 12 mm deep.
 CONTACT, STATIC_CONTACT = (240.0, 10.0), (480.0, 10.0)
 PREDICTION = 0.02  # metres: contacts are foreseen this far; with 2 mm, 12 mm go in at 5 m/s
 # m/s: above, a step has twice and four times its substeps, so that nothing passes a thin plate.
@@ -28,7 +28,7 @@ def engine() -> ModuleType:
 
 
 def new_world(gravity_m_s2: float) -> Any:
-    """An empty world of the engine in which small, light, stiff things keep apart."""
+    """An empty world of the engine in which small, light, stiff objects keep apart."""
     from rapier3d import PhysicsWorld, SpringCoefficients
 
     world = PhysicsWorld(gravity=(0.0, -gravity_m_s2, 0.0))

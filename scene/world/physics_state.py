@@ -33,7 +33,7 @@ def unpack(data: bytes) -> tuple[dict, bytes]:
 
 
 def hash_of(rows: Iterable[tuple[int, Pose, np.ndarray, np.ndarray]]) -> str:
-    """SHA-256 of things: id, pose, (3,) m/s and (3,) rad/s of each, to the bit."""
+    """SHA-256 of objects: id, pose, (3,) m/s and (3,) rad/s of each, to the bit."""
     digest = hashlib.sha256()
     for number, pose, linear, turning in rows:
         row = np.concatenate([[number], pose.position, pose.wxyz, linear, turning])

@@ -3,7 +3,7 @@ function.
 
 A Machine is what a scene file declares, a ReactionState is where one object is in it.  `advance`
 makes the next ReactionState of the one before, the time and what happened: no clock, no engine, no
-state beside it, so the same events give the same x for ever.
+state in addition to it, so the same events give the same x for ever.
 """
 
 import math

@@ -12,7 +12,7 @@ from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.world.reactions import Machine, ReactionState, start
 from shapeshift.scene.world.read_script import between
 
-LEADS, FOLLOWS = 6, 18  # steps in which a thing that is taken, or let go, changes its lead
+LEADS, FOLLOWS = 6, 18  # steps in which an object that is taken, or let go, changes its lead
 
 
 @dataclass(frozen=True)
@@ -68,40 +68,40 @@ def add_body(physics, item: SceneItem, collider) -> int | None:
 
 
 def after_step(
-    thing: RigidObject, pose: Pose, reaction_state: ReactionState, held: bool
+    obj: RigidObject, pose: Pose, reaction_state: ReactionState, held: bool
 ) -> RigidObject:
     """Where it stands now; what is taken gets ahead in LEADS steps, let go it falls back slowly."""
-    lead = thing.lead + (1 / LEADS if held else -1 / FOLLOWS)
+    lead = obj.lead + (1 / LEADS if held else -1 / FOLLOWS)
     return replace(
-        thing,
+        obj,
         reaction_state=reaction_state,
         pose=pose,
-        before=thing.pose,
+        before=obj.pose,
         lead=min(max(lead, 0.0), 1.0),
     )
 
 
-def drawn_object(thing: RigidObject, part: float | None) -> RigidObject:
+def drawn_object(obj: RigidObject, part: float | None) -> RigidObject:
     """With what is drawn at a part 0..1 of the way from the step before to this one; None: now.
 
-    The same thing, and the same SceneObject in it, where that is what was drawn last.
+    The same object, and the same SceneObject in it, where that is what was drawn last.
     """
-    if part is None or thing.before is thing.pose:
-        pose = thing.pose
+    if part is None or obj.before is obj.pose:
+        pose = obj.pose
     else:
-        pose = between(thing.before, thing.pose, part + thing.lead)
-    drawn, x = thing.drawn, thing.reaction_state.x
+        pose = between(obj.before, obj.pose, part + obj.lead)
+    drawn, x = obj.drawn, obj.reaction_state.x
     if drawn.x == x and same_pose(drawn.world_from_object, pose):
-        return thing
-    return replace(thing, drawn=replace(drawn, world_from_object=pose, x=x))
+        return obj
+    return replace(obj, drawn=replace(drawn, world_from_object=pose, x=x))
 
 
-def middle_of(thing: RigidObject) -> np.ndarray:
+def middle_of(obj: RigidObject) -> np.ndarray:
     """(3,) metres, world: of the box around what can be touched of it."""
-    assert thing.collider is not None, "asked of what can be touched"
-    corners = np.concatenate(thing.collider.parts)
+    assert obj.collider is not None, "asked of what can be touched"
+    corners = np.concatenate(obj.collider.parts)
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    return (thing.pose.matrix() @ np.append(middle, 1.0))[:3]
+    return (obj.pose.matrix() @ np.append(middle, 1.0))[:3]
 
 
 def same_pose(a: Pose, b: Pose) -> bool:

@@ -37,12 +37,12 @@ class Simulation:
         self.world.grab(act.hand, act.reach_m)
 
     def control(self, act: Act) -> None:
-        thing = self.world.object_named(act.item)
+        obj = self.world.object_named(act.item)
         x: Control | None = act.x
         if x is None:
-            axes, balance, power = thing.item.two_axes, act.balance, act.power
+            axes, balance, power = obj.item.two_axes, act.balance, act.power
             assert axes is not None and balance is not None and power is not None, "as read"
-            x = axes.x(balance, power, thing.machine.blend)
+            x = axes.x(balance, power, obj.machine.blend)
         self.world.control(act.item, x)
 
 

@@ -112,24 +112,24 @@ class World:
         if item.name in self.objects:
             raise ValueError(f"there is an object '{item.name}'; each wants a name of its own.")
         if label is None:
-            label = max((thing.drawn.label for thing in self.objects.values()), default=0) + 1
+            label = max((obj.drawn.label for obj in self.objects.values()), default=0) + 1
         known = len(self.physics.findings)
-        thing = new_rigid_object(item, model, collider, label, self.physics)
+        obj = new_rigid_object(item, model, collider, label, self.physics)
         of = f"object '{item.name}'"
         self.findings += [replace(new, file=of) for new in self.physics.findings[known:]]
-        self.objects[item.name] = thing
+        self.objects[item.name] = obj
         self._stirred.add(item.name)
-        if thing.body is not None:
-            self.names[thing.body] = item.name
+        if obj.body is not None:
+            self.names[obj.body] = item.name
 
     def remove(self, name: str) -> None:
         """Takes an object out; hands that held it are empty, and what lay on it falls."""
-        thing = self.object_named(name)
+        obj = self.object_named(name)
         for hand in [hand for hand in self.holds if self.held(hand) == name]:
             self._release_hand(hand, "release")
-        if thing.body is not None:
-            self.physics.remove(thing.body)
-            del self.names[thing.body]
+        if obj.body is not None:
+            self.physics.remove(obj.body)
+            del self.names[obj.body]
         del self.objects[name]
         self._events.pop(name, None)
         self._recorded.pop(("pose", name), None)
@@ -137,24 +137,22 @@ class World:
 
     def move_object(self, name: str, pose: Pose) -> None:
         """Puts an object somewhere else, at rest."""
-        thing = self.object_named(name)
-        if thing.body is not None:
-            self.physics.set_pose(thing.body, pose)
-        self.objects[name] = replace(thing, pose=pose, before=pose)
+        obj = self.object_named(name)
+        if obj.body is not None:
+            self.physics.set_pose(obj.body, pose)
+        self.objects[name] = replace(obj, pose=pose, before=pose)
         self._stirred.add(name)
 
     def control(self, name: str, x: Control) -> None:
         """Puts an object's x there at once; no reaction under way goes on."""
-        thing = self.object_named(name)
-        self.objects[name] = replace(
-            thing, reaction_state=steer(thing.machine, thing.reaction_state, x)
-        )
+        obj = self.object_named(name)
+        self.objects[name] = replace(obj, reaction_state=steer(obj.machine, obj.reaction_state, x))
         self._stirred.add(name)
 
     def show(self, name: str, visible: bool) -> None:
         """Draws an object or does not; a hidden one is touched as before."""
-        thing = self.object_named(name)
-        self.objects[name] = replace(thing, drawn=replace(thing.drawn, visible=visible))
+        obj = self.object_named(name)
+        self.objects[name] = replace(obj, drawn=replace(obj.drawn, visible=visible))
 
     # ---- hands
 
@@ -182,8 +180,8 @@ class World:
 
     def grab_body(self, name: str, object_name: str, point: np.ndarray) -> str | None:
         """A hand takes that object at a point (3,) of the world; None where it cannot be held."""
-        thing = self.objects.get(object_name)
-        held = object_name if thing is not None and thing.moves and name in self.hands else None
+        obj = self.objects.get(object_name)
+        held = object_name if obj is not None and obj.moves and name in self.hands else None
         return self._grab_object(name, held, point)
 
     def _grab_object(self, hand: str, name: str | None, point: np.ndarray) -> str | None:
@@ -276,10 +274,10 @@ class World:
         if self.holds or self._events:
             return False
         return all(
-            thing.reaction_state.motion is None
-            and same_pose(thing.before, thing.pose)
-            and (not thing.moves or self.physics.sleeps(thing.body_id))
-            for thing in self.objects.values()
+            obj.reaction_state.motion is None
+            and same_pose(obj.before, obj.pose)
+            and (not obj.moves or self.physics.sleeps(obj.body_id))
+            for obj in self.objects.values()
         )
 
     def step(self) -> Record:
@@ -305,7 +303,7 @@ class World:
         throws has its speed however frames and steps fall.
         """
         if self.paused:
-            self._hands_before = dict(self.hands)  # whoever moves meanwhile has no speed
+            self._hands_before = dict(self.hands)  # a hand that moves meanwhile has no speed
             return []
         if not seconds > 0:
             return []
@@ -344,15 +342,15 @@ class World:
 
     def _react(self, name: str, record: Record, events: list[Event], held: bool) -> None:
         """The object's new pose and x; what has changed is recorded."""
-        thing = self.objects[name]
-        pose = self.physics.pose(thing.body_id) if thing.moves else thing.pose
-        still = same_pose(pose, thing.pose)
-        if still and not events and thing.waits and name not in self._stirred:
+        obj = self.objects[name]
+        pose = self.physics.pose(obj.body_id) if obj.moves else obj.pose
+        still = same_pose(pose, obj.pose)
+        if still and not events and obj.waits and name not in self._stirred:
             return
         reaction_state, fired = advance(
-            thing.machine, thing.reaction_state, self.time_s, events, pose.position
+            obj.machine, obj.reaction_state, self.time_s, events, pose.position
         )
-        self.objects[name] = after_step(thing, thing.pose if still else pose, reaction_state, held)
+        self.objects[name] = after_step(obj, obj.pose if still else pose, reaction_state, held)
         record.events += [event_row(name, answer) for answer in fired]
         row = tuple(rounded(n) for n in (*pose.position, *pose.wxyz))
         x = control_row(reaction_state.x, DECIMALS)
@@ -372,7 +370,7 @@ class World:
         holds where it will be, so that it does not lag behind the hand.
         """
         self.objects = {name: drawn_object(t, self._part) for name, t in self.objects.items()}
-        objects = tuple(thing.drawn for thing in self.objects.values())
+        objects = tuple(obj.drawn for obj in self.objects.values())
         if list(map(id, objects)) != list(map(id, self._drawn.objects)):
             self._drawn = Scene(objects)
         return self._drawn

@@ -27,9 +27,9 @@ def stops_of(subject: Document) -> tuple[Stop, ...]:
     """The stops of all objects by x, as a scene file names them; one of each name."""
     found: dict[str, Stop] = {}
     items = {item.name: item for item in subject.file.all_items} if subject.file else {}
-    for thing in subject.scene.objects:
-        item = items.get(thing.name)
-        for stop in named_stops(item, thing.model) if item else thing.model.stops:
+    for obj in subject.scene.objects:
+        item = items.get(obj.name)
+        for stop in named_stops(item, obj.model) if item else obj.model.stops:
             found.setdefault(stop.name, stop)
     return tuple(sorted(found.values(), key=lambda stop: stop.x))
 
@@ -39,9 +39,9 @@ def describe(subject: Document, path: Path | None) -> dict[str, Any]:
     from shapeshift.app.scene_files import describe_scene
     from shapeshift.runtime_models.read_scene import describe as describe_model
 
-    things = subject.scene.objects
+    objects = subject.scene.objects
     if subject.file is not None and path is not None:
-        return describe_scene(subject.file, {thing.name: thing.model for thing in things}, path)
+        return describe_scene(subject.file, {obj.name: obj.model for obj in objects}, path)
     if len(subject.models) != 1:
         raise UsageError("this scene has several models; take scene.object(NAME).model.")
     if path is not None:
@@ -53,30 +53,30 @@ def describe(subject: Document, path: Path | None) -> dict[str, Any]:
 
 def changed(
     subject: Document,
-    thing: SceneObject,
+    obj: SceneObject,
     position: Sequence[float] | None,
     wxyz: Sequence[float] | None,
     x: "X | None",
     visible: bool | None,
 ) -> Document:
     """With one object elsewhere, or at another x, in what is drawn and in its scene file."""
-    before, file = thing.world_from_object, subject.file
+    before, file = obj.world_from_object, subject.file
     pose = Pose(
         np.array(before.position if position is None else position, np.float64),
         np.array(before.wxyz if wxyz is None else wxyz, np.float64),
     )
-    shown = thing.visible if visible is None else visible
-    moved = replace(thing, world_from_object=pose, visible=shown)
+    shown = obj.visible if visible is None else visible
+    moved = replace(obj, world_from_object=pose, visible=shown)
     if isinstance(x, str):
         states = {item.name: item.states for item in file.all_items} if file else {}
         (moved,) = placed([moved], x, "x", states)
     elif x is not None:
         moved = replace(moved, x=x if isinstance(x, StopWeights) else float(x))
-    things = tuple(moved if each is thing else each for each in subject.scene.objects)
+    objects = tuple(moved if each is obj else each for each in subject.scene.objects)
     if file is not None:  # as a simulation takes it
         place = {"position": tuple(map(float, pose.position)), "wxyz": tuple(map(float, pose.wxyz))}
-        file = edits.change(file, thing.name, x=moved.x, visible=shown, **place)
-    return Document(DrawnScene(things), file)
+        file = edits.change(file, obj.name, x=moved.x, visible=shown, **place)
+    return Document(DrawnScene(objects), file)
 
 
 def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayers:

@@ -1,4 +1,4 @@
-"""Photos to a scene, and a scene beside photos."""
+"""Photos to a scene, and a scene compared with photos."""
 
 import time
 from collections.abc import Callable

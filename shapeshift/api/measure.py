@@ -95,7 +95,7 @@ def bench(
     progress: Callable[[str], None] | None = None,
 ) -> Measured:
     """Frame times of an orbit, mono and stereo in turns, and of a sweep of x, in milliseconds, with
-    the PSNR in dB to the float64 reference beside them: the rows of `shapeshift bench --json`.
+    the PSNR in dB to the float64 reference: the rows of `shapeshift bench --json`.
 
     frames, sweep: 2 or more; 3 more do not count.  size, quality_size: width, height in pixels, of
     what is timed and of what is compared.  settings: None is exact.  progress: called with what is

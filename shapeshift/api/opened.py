@@ -40,7 +40,7 @@ class OpenedScene:
     def objects(self) -> tuple[SceneObject, ...]:
         """Each with name, model, world_from_object (Pose, metres), x, label, visible, selectors.
 
-        [thing.name for thing in ss.load("room.scene.json").objects]
+        [obj.name for obj in ss.load("room.scene.json").objects]
         """
         return self._subject.scene.objects
 
@@ -78,10 +78,10 @@ class OpenedScene:
 
         cup = ss.load("room.scene.json").object("cup")
         """
-        for thing in self.objects:
-            if thing.name == name:
-                return thing
-        names = ", ".join(thing.name for thing in self.objects)
+        for obj in self.objects:
+            if obj.name == name:
+                return obj
+        names = ", ".join(obj.name for obj in self.objects)
         raise UsageError(f"there is no object '{name}'; there are {names}.")
 
     def _one(self, name: str | None) -> SceneObject:
@@ -211,9 +211,9 @@ class OpenedScene:
 
             scene.with_regions(ss.Sphere(centre=(0, 0.4, 0), radius=0.3, x=1.0, border=0.1))
         """
-        thing = self._one(name)
-        chosen = regions_of(regions, thing.model, self._subject.view(DEFAULT_SIZE))
-        things = tuple(
-            replace(each, selectors=chosen) if each is thing else each for each in self.objects
+        obj = self._one(name)
+        chosen = regions_of(regions, obj.model, self._subject.view(DEFAULT_SIZE))
+        objects = tuple(
+            replace(each, selectors=chosen) if each is obj else each for each in self.objects
         )
-        return self._with(replace(self._subject, scene=DrawnScene(things)))
+        return self._with(replace(self._subject, scene=DrawnScene(objects)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeshift.app.errors import UsageError
 
-KINDS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WebP"}  # beside .npy
+KINDS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WebP"}  # in addition to .npy
 JPEG_QUALITY = 92
 NOTHING = 0.25  # grey of pixels that hold no number, in what a notebook shows of depth
 

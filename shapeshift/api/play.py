@@ -56,7 +56,7 @@ def simulate(
     """The objects of a scene file in motion, step by step of 1/90 s: gravity, contacts, reactions.
 
     scene: a scene file, or one that was opened and rearranged (`with_object`).  script: JSON lines
-    of hands, grabs, rays and controls with times (docs/scene.md); None: things only fall.  seconds:
+    of hands, grabs, rays and controls with times (docs/scene.md); None: all just falls.  seconds:
     None is two more than the script.  x: where all sliders stand at the start.  progress: of the
     colliders, which are made once and kept in the user's cache.  The same scene and script give the
     same steps for ever.  Raises BadFile, UsageError before the first step.
@@ -90,9 +90,9 @@ def world_of(scene: OpenedScene, progress: Progress | None):
 
     file = scene.subject.file
     assert file is not None
-    for thing in scene.objects:
-        file = edits.change(file, thing.name, x=thing.x)
-    models = {thing.name: thing.model for thing in scene.objects}
+    for obj in scene.objects:
+        file = edits.change(file, obj.name, x=obj.x)
+    models = {obj.name: obj.model for obj in scene.objects}
     return World(file, models, colliders_of(file, models, progress), hz=HZ)
 
 

@@ -188,7 +188,7 @@ class Scene(OpenedScene):
         return compare(self, other, **how)
 
     def bench(self, **how: Any) -> "Measured":
-        """Frame times beside the image error: as `ss.bench`.
+        """Frame times and the image error: as `ss.bench`.
 
         scene.bench(frames=20)["frame_ms"]["p50"]
         """

@@ -72,16 +72,16 @@ def export(
         return save(scene, out, overwrite)
     writer_of(out)  # before any work
     check_output(out, [scene.path] if scene.path and scene.path.exists() else [], overwrite, "")
-    things = scene.at(x).objects
+    objects = scene.at(x).objects
     if object is not None:
-        things = (scene.at(x).object(object),)
+        objects = (scene.at(x).object(object),)
     view = scene.subject.view((640, 360))
     if scene.subject.file is None and scene.path is not None:
-        things = tuple(replace(thing, name=scene.path.stem or "scene") for thing in things)
+        objects = tuple(replace(obj, name=scene.path.stem or "scene") for obj in objects)
     parts = [
-        Part(thing, regions_of(only, thing.model, view) or None, label)
-        for thing in things
-        if thing.visible or object is not None
+        Part(obj, regions_of(only, obj.model, view) or None, label)
+        for obj in objects
+        if obj.visible or object is not None
     ]
     if not parts:
         raise UsageError("all objects are hidden; name one of them: object=.")
@@ -131,7 +131,7 @@ def bake_scene(
 ) -> PlainSplats:
     """What Scene.splats gives: arrays that nothing else holds."""
     look = look_of(sh_degree, palette, eye)
-    baked = [bake_part(Part(thing), look) for thing in scene.objects if thing.visible]
+    baked = [bake_part(Part(obj), look) for obj in scene.objects if obj.visible]
     if not baked:
         raise UsageError("all objects are hidden; nothing is there to be taken.")
     splats = truncate_harmonics(merged(baked), sh_degree)

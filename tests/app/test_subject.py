@@ -74,10 +74,10 @@ def refused(capsys, said: str, *words) -> None:
 
 def test_a_subject_tells_what_its_objects_have(scene):
     subject = opened(scene)
-    assert [thing.label for thing in subject.scene.objects] == [1, 2, 3, 4, 5]
+    assert [obj.label for obj in subject.scene.objects] == [1, 2, 3, 4, 5]
     assert len(subject.models) == 2 and subject.stops == (0.0, 0.5, 1.0)
     assert subject.x is None and not subject.origin.any() and subject.background == (0, 0, 0)
-    assert {thing.x for thing in subject.at(0.25).objects} == {0.25}
+    assert {obj.x for obj in subject.at(0.25).objects} == {0.25}
     assert subject.at(None) == subject.scene
     one = replace(read_model(scene.parent / "cloud.ply"), origin=(3.0, 0.0, -2.0))
     assert Document.of(one).x == 0 and Document.of(one).origin.tolist() == [3, 0, -2]
@@ -168,9 +168,9 @@ def test_export_of_one_object(renderer, scene, tmp_path, capsys):
     for chosen, at in (("parts", 3), ("4", 3), ("ghost", 4), ("2", 2)):  # "2" is a name here
         out = tmp_path / f"{chosen}.ply"
         assert run("export", scene, "--object", chosen, "--out", out) == 0
-        thing = replace(subject.scene.objects[at], visible=True)
+        obj = replace(subject.scene.objects[at], visible=True)
         found = drawn(renderer, baked(out).scene, view)
-        assert psnr(found[..., :3], drawn(renderer, Scene((thing,)), view)[..., :3]) > 70
+        assert psnr(found[..., :3], drawn(renderer, Scene((obj,)), view)[..., :3]) > 70
     capsys.readouterr()
     refused(capsys, "1 turned, 2 still, 3 2, 4 parts, 5 ghost",
             "export", scene, "--object", "nobody", "--out", tmp_path / "x.ply")  # fmt: skip
@@ -216,7 +216,7 @@ def test_compare(scene, tmp_path, capsys):
 def test_a_stop_of_a_scene_file_is_of_the_objects_that_have_it(scene):
     def xs(at: str) -> list[float]:
         side = open_side(f"{scene}@{at}", ReadingOptions())
-        return [thing.x for thing in side.subject.scene.objects]
+        return [obj.x for obj in side.subject.scene.objects]
 
     assert xs("hot") == [0, 0, 1, 1, 0] and xs("Half Way") == [0, 0, 1, 0.5, 0]
     assert xs("0.75") == [0.75] * 5

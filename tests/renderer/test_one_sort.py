@@ -152,8 +152,8 @@ def test_posed_objects_are_the_cloud_baked_in_place_in_the_reference(wxyz):
 def test_a_hidden_object_takes_no_part(renderer, hidden):
     clouds = interleaved(coefficients=4)
     scene = in_objects(clouds)
-    things = [replace(o, visible=i != hidden) for i, o in enumerate(scene.objects)]
-    (image,) = draw(renderer, Scene(tuple(things)), [VIEW])
+    objects = [replace(o, visible=i != hidden) for i, o in enumerate(scene.objects)]
+    (image,) = draw(renderer, Scene(tuple(objects)), [VIEW])
     np.testing.assert_array_equal(image, draw(renderer, alone(clouds[1 - hidden]), [VIEW])[0])
 
 
@@ -173,11 +173,11 @@ def test_one_model_as_several_objects_at_several_x(renderer):
     model = random_layers(500, coefficients=16, layers=3)
     places = [np.array([-0.3, 0.0, 0.1]), np.array([0.2, 0.1, -0.2]), np.array([0.0, -0.2, 0.0])]
     turns = [UPRIGHT, CYCLE, np.array([0.6, 0.0, 0.8, 0.0])]
-    things = [
+    objects = [
         SceneObject(f"{i}", model, Pose(place, turn), x)
         for i, (place, turn, x) in enumerate(zip(places, turns, (0.0, 0.5, 1.0), strict=True))
     ]
-    copies = [replace(thing, model=replace(model)) for thing in things]
-    (image,) = draw(renderer, Scene(tuple(things)), [VIEW])
+    copies = [replace(obj, model=replace(model)) for obj in objects]
+    (image,) = draw(renderer, Scene(tuple(objects)), [VIEW])
     np.testing.assert_array_equal(image, draw(renderer, Scene(tuple(copies)), [VIEW])[0])
-    assert psnr_db(image, reference_image(Scene(tuple(things)), VIEW)) > 70  # quads round records
+    assert psnr_db(image, reference_image(Scene(tuple(objects)), VIEW)) > 70  # quads round records

@@ -146,21 +146,21 @@ SHAPES = [
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
 def test_selectors_in_the_objects_space_turn_with_it(renderer, shape):
     model = random_layers(1500, coefficients=9, layers=2)
-    thing = SceneObject("thing", model, HERE, selectors=(shape,))
-    (turned,) = draw(renderer, Scene((thing,)), [VIEW])
-    still = replace(thing, world_from_object=IDENTITY)
+    obj = SceneObject("thing", model, HERE, selectors=(shape,))
+    (turned,) = draw(renderer, Scene((obj,)), [VIEW])
+    still = replace(obj, world_from_object=IDENTITY)
     (seen,) = draw(renderer, Scene((still,)), [turned_view(VIEW, HERE)])
     assert psnr_db(turned, seen) > SAME
-    (bare,) = draw(renderer, Scene((replace(thing, selectors=()),)), [VIEW])
+    (bare,) = draw(renderer, Scene((replace(obj, selectors=()),)), [VIEW])
     assert psnr_db(bare, turned) < APART, "the selector shows something"
 
 
 @pytest.mark.parametrize("shape", SHAPES[:3], ids=lambda shape: type(shape).__name__)
 def test_selectors_in_the_world_stay_while_an_object_turns_through_them(renderer, shape):
     model, shape = random_layers(1500, coefficients=4, layers=2), replace(shape, space="world")
-    thing = SceneObject("thing", model, HERE, selectors=(shape,))
-    (turned,) = draw(renderer, Scene((thing,)), [VIEW])
-    baked = replace(thing, model=put(model, HERE), world_from_object=IDENTITY)
+    obj = SceneObject("thing", model, HERE, selectors=(shape,))
+    (turned,) = draw(renderer, Scene((obj,)), [VIEW])
+    baked = replace(obj, model=put(model, HERE), world_from_object=IDENTITY)
     assert psnr_db(draw(renderer, Scene((baked,)), [VIEW])[0], turned) > SAME
-    fixed = replace(thing, selectors=(replace(shape, space="object"),))
+    fixed = replace(obj, selectors=(replace(shape, space="object"),))
     assert psnr_db(draw(renderer, Scene((fixed,)), [VIEW])[0], turned) < APART

@@ -154,9 +154,9 @@ def test_scaffold_models_are_baked_from_one_eye(tmp_path):
 # As the program shows it: false colours, regions, poses
 
 
-def drawn(*things, view) -> np.ndarray:
+def drawn(*objects, view) -> np.ndarray:
     with Renderer(None) as renderer:
-        renderer.update(Scene(things))
+        renderer.update(Scene(objects))
         renderer.draw([view])
         return renderer.resolved(0).copy()
 
@@ -168,14 +168,14 @@ def as_layers(plain) -> SplatLayers:
 
 def test_a_region_looks_as_it_is_shown(model):
     inside = Sphere(centre=(0.3, 0, 0), radius=0.5, x=1.0, border=0.2)
-    thing = SceneObject("random", model, selectors=(inside,))
-    plain = bake_part(Part(thing), ExportLook())
+    obj = SceneObject("random", model, selectors=(inside,))
+    plain = bake_part(Part(obj), ExportLook())
     view = default_view(model, (90, 60))
-    wanted = drawn(thing, view=view)
+    wanted = drawn(obj, view=view)
     found = drawn(SceneObject("baked", as_layers(plain)), view=view)
     # The palette is laid over each splat here, and over the blended heat on screen.
     assert psnr(found, wanted) > 35
-    plainly = bake_part(Part(thing), ExportLook(palette=False))
+    plainly = bake_part(Part(obj), ExportLook(palette=False))
     assert psnr(drawn(SceneObject("b", as_layers(plainly)), view=view), wanted) < 35
 
 
@@ -212,27 +212,27 @@ def test_coloring_anew_is_the_fit_of_the_new_colors(count, coefficients):
 
 
 def test_inside_is_by_anchor_and_by_paint(model):
-    thing = SceneObject("random", model)
+    obj = SceneObject("random", model)
     ball = Sphere(centre=(0.0, 0, 0), radius=0.6, x=0.0)
     near = np.linalg.norm(model.anchors, axis=1) <= 0.6
-    whole, part = (bake_part(Part(thing, i), ExportLook(0)) for i in (None, (ball,)))
+    whole, part = (bake_part(Part(obj, i), ExportLook(0)) for i in (None, (ball,)))
     rows = np.repeat(near, 4)[evaluate(model, 0.0, np.zeros(3)).opacity >= LEAST_ALPHA]
     np.testing.assert_array_equal(part.means, whole.means[rows])
-    painted = bake_part(Part(thing, (Painted(near, 0.5),)), ExportLook(0))
+    painted = bake_part(Part(obj, (Painted(near, 0.5),)), ExportLook(0))
     np.testing.assert_array_equal(painted.means, part.means)
-    both = bake_part(Part(thing, (ball, Painted(~near, 0.5))), ExportLook(0))
+    both = bake_part(Part(obj, (ball, Painted(~near, 0.5))), ExportLook(0))
     np.testing.assert_array_equal(both.means, whole.means)
 
 
 def test_objects_are_merged_where_they_stand():
     one, two = random_layers(70, seed=1), random_layers(50, seed=2, coefficients=16)
     pose = Pose(np.array([0.5, -0.2, 0.1]), np.array([0.5, 0.5, -0.5, 0.5]))
-    things = (SceneObject("one", one), SceneObject("two", two, pose))
-    whole = merged([bake_part(Part(thing), ExportLook()) for thing in things])
+    objects = (SceneObject("one", one), SceneObject("two", two, pose))
+    whole = merged([bake_part(Part(obj), ExportLook()) for obj in objects])
     assert whole.sh.shape == (len(whole.means), 16, 3)
     whole = replace(whole, means=whole.means + np.float32(whole.origin))
     view = default_view(one, (90, 60))
-    wanted = drawn(*things, view=view)
+    wanted = drawn(*objects, view=view)
     assert psnr(drawn(SceneObject("merged", as_layers(whole)), view=view), wanted) > 60
 
 

@@ -82,13 +82,13 @@ def test_what_is_nowhere_is_in_no_selector(border):
             assert not replace(shape, border=border).weights(nowhere).any()
 
 
-def slow_control(thing: SceneObject, places: np.ndarray) -> np.ndarray:
+def slow_control(obj: SceneObject, places: np.ndarray) -> np.ndarray:
     """control_of, one anchor after the other in float64."""
     out = []
-    pose = thing.world_from_object.matrix()
+    pose = obj.world_from_object.matrix()
     for i, place in enumerate(places.astype(np.float64)):
-        x = thing.x
-        for selector in thing.selectors:
+        x = obj.x
+        for selector in obj.selectors:
             at = place if selector.space == "object" else pose[:3, :3] @ place + pose[:3, 3]
             if isinstance(selector, Painted):
                 weight = float(selector.weight[i])
@@ -105,11 +105,11 @@ def test_control_is_mixed_in_turn_a_later_selector_above(model):
     painted = Painted(np.random.default_rng(2).uniform(size=len(places)), 0.7)
     pose = Pose(np.array([0.4, 0, 0]), np.array(TURNED))
     selectors = (SHAPES[2], painted, replace(SHAPES[1], x=0.25, space="world"), SHAPES[0])
-    thing = SceneObject("thing", model, pose, 0.1, selectors=selectors)
-    x = control_of(thing)
+    obj = SceneObject("thing", model, pose, 0.1, selectors=selectors)
+    x = control_of(obj)
     assert x.dtype == np.float32 and x.shape == (len(places),) and x.min() >= 0 and x.max() <= 1
-    np.testing.assert_allclose(x, slow_control(thing, places), atol=1e-6)
-    alone = control_of(replace(thing, selectors=(*selectors, Painted(np.ones(len(places)), 0.5))))
+    np.testing.assert_allclose(x, slow_control(obj, places), atol=1e-6)
+    alone = control_of(replace(obj, selectors=(*selectors, Painted(np.ones(len(places)), 0.5))))
     assert alone == 0.5
 
 
@@ -117,19 +117,19 @@ def test_a_border_leads_from_outside_to_inside_without_a_third_stop():
     stops = tuple(Stop(name, x) for name, x in (("a", 0.0), ("b", 0.4), ("c", 0.5), ("d", 1.0)))
     model = replace(make_random_model(400), stops=stops)
     ball = Sphere(centre=(0, 0, 0), radius=0.3, border=0.6, x=1.0)
-    thing = SceneObject("thing", model, x=0.0, selectors=(ball,))
-    inside, rows = ball.weights(model.anchors), control_of(thing)
+    obj = SceneObject("thing", model, x=0.0, selectors=(ball,))
+    inside, rows = ball.weights(model.anchors), control_of(obj)
     assert rows.shape == (400, 4) and rows.dtype == np.float32
     np.testing.assert_allclose(rows, np.stack([1 - inside, 0 * inside, 0 * inside, inside], 1))
     assert ((inside > 0.1) & (inside < 0.9)).sum() > 50  # there is a border to speak of
     # A later one over it, from whatever is there, and one that is a blend itself.
     blend = StopWeights((("b", 0.25), ("d", 0.75)))
     half = HalfSpace(point=(0, 0, 0), normal=(1, 0, 0), border=0.2, x=blend)
-    over = control_of(replace(thing, selectors=(ball, half)))
+    over = control_of(replace(obj, selectors=(ball, half)))
     share = half.weights(model.anchors)[:, None]
     np.testing.assert_allclose(over, rows * (1 - share) + share * [0, 0.25, 0, 0.75], atol=1e-6)
     whole = Painted(np.ones(400), blend)
-    assert control_of(replace(thing, selectors=(ball, whole))) == blend
+    assert control_of(replace(obj, selectors=(ball, whole))) == blend
 
 
 def test_a_border_follows_the_pace_of_its_pair():
@@ -142,11 +142,11 @@ def test_a_border_follows_the_pace_of_its_pair():
 
 
 def test_how_much_lies_in_any_of_several():
-    thing = SceneObject("thing", make_random_model(50))
+    obj = SceneObject("thing", make_random_model(50))
     some = [Painted(np.random.default_rng(i).uniform(size=50), 0.5) for i in range(2)]
     wanted = 1 - (1 - some[0].weight) * (1 - some[1].weight)
-    np.testing.assert_allclose(covered(thing, some), wanted, atol=1e-7)
-    assert not covered(thing, ()).any()
+    np.testing.assert_allclose(covered(obj, some), wanted, atol=1e-7)
+    assert not covered(obj, ()).any()
 
 
 def test_an_object_has_no_blend_of_stops_that_its_model_has_not():
@@ -157,9 +157,9 @@ def test_an_object_has_no_blend_of_stops_that_its_model_has_not():
 
 
 def test_what_selects_nothing_costs_nothing():
-    thing = SceneObject("thing", make_random_model(50), x=0.3)
+    obj = SceneObject("thing", make_random_model(50), x=0.3)
     away = Sphere(centre=(90, 0, 0), radius=1, x=1.0)
-    assert control_of(thing) == 0.3 == control_of(replace(thing, selectors=(away,)))
+    assert control_of(obj) == 0.3 == control_of(replace(obj, selectors=(away,)))
 
 
 def test_a_moved_object_passes_through_what_stands_in_the_world():

@@ -79,22 +79,22 @@ def public_of_the_face() -> list:
     """Functions and methods, with the name that an error message needs."""
     out = []
     for name in ss.__all__:
-        thing = getattr(ss, name)
-        if not getattr(thing, "__module__", "").startswith("shapeshift.api"):
+        obj = getattr(ss, name)
+        if not getattr(obj, "__module__", "").startswith("shapeshift.api"):
             continue
-        out.append((name, thing))
-        if inspect.isclass(thing):
+        out.append((name, obj))
+        if inspect.isclass(obj):
             out += [
                 (f"{name}.{n}", m.fget if isinstance(m, property) else getattr(m, "__func__", m))
-                for n, m in vars(thing).items()
+                for n, m in vars(obj).items()
                 if not n.startswith("_") and (isinstance(m, property | staticmethod) or callable(m))
             ]
     return out
 
 
 @pytest.mark.parametrize(("name", "thing"), public_of_the_face())
-def test_every_public_thing_says_what_it_does_and_shows_it(name, thing):
-    text = inspect.getdoc(thing)
+def test_every_public_thing_says_what_it_does_and_shows_it(name, obj):
+    text = inspect.getdoc(obj)
     assert text and len(text) > 40, name
 
 
@@ -113,7 +113,7 @@ def test_it_opens_what_the_commands_open_and_refuses_as_they_do(demo, tmp_path):
     model = read_model(ss.DEMO)
     np.testing.assert_array_equal(demo.model.anchors, model.anchors)
     assert demo.stops == model.stops and demo.x == model.stops[0].x
-    assert [thing.name for thing in ss.load(ss.TOUCH).objects][:2] == ["background", "cube"]
+    assert [obj.name for obj in ss.load(ss.TOUCH).objects][:2] == ["background", "cube"]
     with pytest.raises(ss.BadFile, match=r"nothing\.ply does not exist; wanted is"):
         ss.load(tmp_path / "nothing.ply")
     with pytest.raises(ss.UsageError, match="up is for one model"):

@@ -41,11 +41,11 @@ def scene_at(line: dict) -> Scene:
     scene = scene_of(*read_models(file))
     objects = [
         replace(
-            thing,
-            world_from_object=pose_of(line["objects"][thing.name]),
-            x=line["objects"][thing.name]["x"],
+            obj,
+            world_from_object=pose_of(line["objects"][obj.name]),
+            x=line["objects"][obj.name]["x"],
         )
-        for thing in scene.objects
+        for obj in scene.objects
     ]
     return replace(scene, objects=tuple(objects))
 

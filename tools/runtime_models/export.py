@@ -72,19 +72,19 @@ def measure(renderer: Renderer, name: str, model, x: float, folder: Path) -> lis
     """The rows of one scene at one x."""
     background = default_background(model, (0.0, 0.0, 0.0))
     renderer.settings = type(renderer.settings)(background=background)
-    thing = SceneObject(name, model, x=x)
+    obj = SceneObject(name, model, x=x)
     views = orbit_path(VIEWS, *frame_points(*model_points(model)), SIZE)
-    wanted = draw(renderer, thing, views)
+    wanted = draw(renderer, obj, views)
     stop = next((stop.name for stop in model.stops if stop.x == x), "")
     rows = []
     for degree in DEGREES:
         look = ExportLook(degree)
-        baked = draw(renderer, as_object(bake_part(Part(thing), look)), views)
+        baked = draw(renderer, as_object(bake_part(Part(obj), look)), views)
         for writer in WRITERS:
             if degree > writer.sh_degree:
                 continue
             path = folder / f"out{writer.ending}"
-            splats = export([Part(thing)], look, path, lambda *_: None)
+            splats = export([Part(obj)], look, path, lambda *_: None)
             found = draw(renderer, SceneObject("file", read_model(path)), views)
             likeness = [psnr(a, b) for a, b in zip(found, wanted, strict=True)]
             codes = [psnr(a, b) for a, b in zip(found, baked, strict=True)]
@@ -104,8 +104,8 @@ def as_object(splats: PlainSplats) -> SceneObject:
     return SceneObject("baked", SplatLayers(*arrays, layer, stops))
 
 
-def draw(renderer: Renderer, thing: SceneObject, views: list) -> list[np.ndarray]:
-    renderer.update(Scene((thing,)))
+def draw(renderer: Renderer, obj: SceneObject, views: list) -> list[np.ndarray]:
+    renderer.update(Scene((obj,)))
     pictures = []
     for view in views:
         renderer.draw([view])

@@ -62,8 +62,8 @@ def moved(models: list[Model], x: float, by: np.ndarray, one_x: float) -> Scene:
     """All objects moved by (3,) metres; the first at another x."""
     pose = Pose(by, np.array([1.0, 0.0, 0.0, 0.0]))
     xs = [one_x] + [x] * (len(models) - 1)
-    things = zip(models, xs, strict=True)
-    return Scene(tuple(SceneObject(f"{i}", m, pose, x) for i, (m, x) in enumerate(things)))
+    objects = zip(models, xs, strict=True)
+    return Scene(tuple(SceneObject(f"{i}", m, pose, x) for i, (m, x) in enumerate(objects)))
 
 
 def frames_of(

@@ -1,6 +1,6 @@
 """Plain 3DGS splats of one modality, trained with the anchor model's rasterizer, loss and photos.
 
-The yardstick: what an anchor model saves and gains is told beside this.
+The yardstick: what an anchor model saves and gains is compared with this.
 """
 
 from dataclasses import replace

@@ -9,7 +9,7 @@ from shapeshift.training.reference import directions
 def decode_plain_reference(parameters: dict[str, np.ndarray], eye: np.ndarray, used: int) -> tuple:
     """(means, scales, wxyz, opacity, color) of an optimiser's values seen from `eye` (3,).
 
-    used: how many coefficients beside the first count.
+    used: how many coefficients count besides the first.
     """
     values = {name: np.asarray(array, np.float64) for name, array in parameters.items()}
     harmonics = np.concatenate([values["base"][:, None], values["rest"][:, :used]], axis=1)

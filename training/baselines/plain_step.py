@@ -16,7 +16,7 @@ from shapeshift.training.losses.losses import ImageLoss, Target
 # one sigma, wxyz (N, 4) any length, opacity (N,) logits, base (N, 3) first coefficient of the
 # harmonics, rest (N, (n + 1)^2 - 1, 3) the others.
 GROUPS = ("means", "scales", "wxyz", "opacity", "base", "rest")
-REST = (0, 3, 8, 15)  # coefficients beside the first, of degree 0 to 3
+REST = (0, 3, 8, 15)  # coefficients after the first, of degree 0 to 3
 
 
 class PlainDensificationStats:

@@ -116,7 +116,7 @@ def search(
 def reference_of(capture: Capture, modality: str) -> Stop:
     """The modality whose cameras are taken as right: visible light, else the nearest by x.
 
-    Raises BadFile where there is no such modality, or none beside it.
+    Raises BadFile where there is no such modality, or no other one.
     """
     names = [stop.name for stop in capture.stops]
     if modality not in names:

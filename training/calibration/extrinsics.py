@@ -99,7 +99,7 @@ def with_extrinsics(capture: Capture, rig: str) -> Capture:
 
 
 def rig_of(provenance: dict) -> str:
-    """TrainSettings.rig of the run that a package was trained in; empty where none is told."""
+    """TrainSettings.rig of the run that a package was trained in; empty where it names none."""
     settings = provenance.get("settings")
     return settings.get("rig", "") if isinstance(settings, dict) else ""
 

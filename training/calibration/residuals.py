@@ -60,7 +60,7 @@ class ShapeResiduals:
         return moved
 
     def move_cameras(self, eye_from_found: np.ndarray) -> None:
-        """Put all cameras `eye_from_found` (4, 4) beside their stated poses."""
+        """Put all cameras `eye_from_found` (4, 4) away from their stated poses."""
         self.views = [offset_view(photo.view, eye_from_found) for photo in self.photos]
         blank = self.device.zeros((self.count, 3))
         self.tiles = [

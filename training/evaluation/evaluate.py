@@ -1,4 +1,4 @@
-"""How good a scene is: its pictures beside held-out photos of a capture."""
+"""How good a scene is: its pictures compared with held-out photos of a capture."""
 
 import math
 import time

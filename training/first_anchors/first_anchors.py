@@ -54,7 +54,7 @@ def first_anchors(
 
 
 def choose_positions(first: InitialPoints, most: int) -> np.ndarray:
-    """(A, 3) at most so many places: of the points, and of the guesses beside them."""
+    """(A, 3) at most so many places: of the points and of the guesses added to them."""
     guesses = subsample(first.guesses, int(GUESSES * most))
     points = np.unique(first.points, axis=0)  # scans have some of them twice
     if len(first.shapes) > 1:  # hulls lie over each other where stops have the same outlines

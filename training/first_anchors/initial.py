@@ -81,7 +81,7 @@ def common_box(views: list[View]) -> tuple[np.ndarray, float]:
 
 
 def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | None:
-    """(H, W) bool where the photo shows the object; None where it cannot be told."""
+    """(H, W) bool where the photo shows the object; None where that is unknown."""
     if photo.see_through:
         return photo.rgba[..., 3] >= 128
     if background is None:
@@ -225,7 +225,7 @@ def with_guesses(
     points: np.ndarray, origin: str, capture: Capture, photos: list[LoadedPhoto],
     rng: np.random.Generator,
 ) -> InitialPoints:  # fmt: skip
-    """The points, and guesses beside them where the photos have no known background."""
+    """The points, with guesses added where the photos have no known background."""
     if capture.background is not None or any(p.see_through for p in photos):
         return InitialPoints(points, origin, (points,))
     guesses = filler_points(points, photos, rng)

@@ -1,7 +1,7 @@
 """How much model a scene needs: parts are taken away one by one, and held-out photos decide.
 
 A change is judged by differences of the same photo and seed, so what is hard about a photo falls
-out of it.  A part goes where every modality, by its mean change less the error of that, stays
+out of it.  A part goes where every modality, by its mean change less its standard error, stays
 within the tolerance of the model before, and of the largest one: neither may several parts cost
 more together, nor one part use up what another happened to win.
 """

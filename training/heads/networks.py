@@ -13,7 +13,7 @@ DIRECTION = 3
 CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients are summed apart
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
 RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
-# What anchors may have beside their features, and the optimiser's group of it.
+# What anchors may have besides their features, and the optimiser's group of it.
 ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors"}
 ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3}  # numbers an anchor, see gaussians.cl
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
@@ -37,7 +37,7 @@ class HeadLayout:
     control: int = 16  # d of Psi
     fixed: tuple[str, ...] = ()  # heads that do not see Psi: what they give is shared by all stops
     view_dependent: bool = True  # whether colour sees the direction from the eye
-    attributes: tuple[str, ...] = tuple(ANCHOR_ATTRIBUTES)  # of anchors, beside their features
+    attributes: tuple[str, ...] = tuple(ANCHOR_ATTRIBUTES)  # of anchors, besides their features
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -168,7 +168,7 @@ def initial_weights(layout: HeadLayout, rng: np.random.Generator) -> np.ndarray:
         "color": rng.uniform(-1, 1, 3 * k) / np.sqrt(layout.hidden),
     }
     gain = {"offset": 1.0, "scale": 0.5, "rotation": 0.5, "opacity": 0.5, "color": 1.0}
-    if "color" in layout.attributes:  # the base colours are known; the network begins beside them
+    if "color" in layout.attributes:  # the base colours are known; the network adds to them
         last_bias["color"], gain["color"] = np.zeros(3 * k), 0.3
     everything = replace(layout, fixed=(), view_dependent=True)
     networks = {}

@@ -2,7 +2,7 @@
 // decides on.  The activations of 3DGS:
 //  scale = exp(h) metres, opacity = sigmoid(h), rotation as it comes, wxyz;
 //  colour = max(0, 0.5 + sum of basis(mean - eye) * coefficient), basis and signs of 3DGS.
-// Needs:   REST = 0, 3, 8 or 15 coefficients beside the first, from plain_step.py.  Of those the
+// Needs:   REST = 0, 3, 8 or 15 coefficients after the first, from plain_step.py.  Of those the
 //          first `used` count (a degree is switched on after the other); the others get a gradient
 //          of 0.
 // Reads:   means, log scales, logits, base and rest coefficients; backward the Gaussians and

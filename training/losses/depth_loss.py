@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.rasterizer.surface import DepthFrame
 from shapeshift.training.heads.networks import KERNELS
 
-# What light that comes through counts beside depth.  Much of it makes soft edges hard: in short
+# What light that comes through counts against depth.  Much of it makes soft edges hard: in short
 # runs on the balls RGB lost 0.6 dB with 1 and nothing with 0.1; with 0 dark things stayed holes.
 HOLE = 0.1
 

@@ -1,4 +1,4 @@
-"""How bright each photo is beside the others of its modality, found while the model learns.
+"""How bright each photo is compared with the others of its modality, found while the model learns.
 
 A camera that chooses exposure and white balance by itself shows the same thing in other colours in
 each photo.  A photo is taken to be the model's picture times a gain a channel; targets are photos

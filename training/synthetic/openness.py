@@ -1,4 +1,4 @@
-"""How much sky a point sees, from the distance to the nearest thing a little above it.
+"""How much sky a point sees, from the distance to the nearest object a little above it.
 
 The distances are computed once, on a grid; a walk of a few steps along the normal reads them.
 """

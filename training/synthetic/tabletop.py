@@ -187,7 +187,7 @@ def write_box(half: np.ndarray, y: float, path: Path) -> None:
 
 
 def scene(folder: Path) -> SceneFile:
-    """The three things, what they answer to, and where they stand."""
+    """The three objects, what they answer to, and where they stand."""
     states = tuple(
         State(name, i / 4) for i, name in enumerate(("normal", "ice", "fire", "charcoal"))
     )

@@ -1,6 +1,6 @@
 """The bundled demo's capture: a workshop bench photographed as it looks, as it radiates, opened.
 
-Three stops on one slider.  RGB and Thermal show the same things; Opened has other geometry: the
+Three stops on one slider.  RGB and Thermal show the same objects; Opened has other geometry: the
 insulation is off the pipe and the motor is cut open.
 """
 

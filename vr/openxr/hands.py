@@ -69,8 +69,8 @@ class Hands:
         import xr
 
         both = [self._paths[side] for side in SIDES]
-        told = name.replace("_", " ").capitalize()
-        info = xr.ActionCreateInfo(name, kind, subaction_paths=both, localized_action_name=told)
+        label = name.replace("_", " ").capitalize()
+        info = xr.ActionCreateInfo(name, kind, subaction_paths=both, localized_action_name=label)
         return xr.create_action(self._set, info)
 
     def _suggest(self, profile: str) -> bool:
@@ -126,7 +126,7 @@ class Hands:
         return Hand(True, grip, aim, squeeze, trigger, stick, **click)
 
     def _pose(self, name: str, side: str, play_space: Any, time_ns: int) -> Pose | None:
-        """None where the controller is off, unseen or told as no number."""
+        """None where the controller is off, unseen or has no number."""
         import xr
 
         if not xr.get_action_state_pose(self._session, self._asked[name, side]).is_active:
@@ -176,11 +176,11 @@ class Hands:
         """Of each side the controller that the runtime has bound; "" where there is none."""
         import xr
 
-        told = {}
+        bound = {}
         for side, path in self._paths.items():
             found = xr.get_current_interaction_profile(self._session, path).interaction_profile
-            told[side] = xr.path_to_string(self._instance, found) if found else ""
-        return told
+            bound[side] = xr.path_to_string(self._instance, found) if found else ""
+        return bound
 
     def detach(self) -> None:
         """Before the session ends for good."""

@@ -63,7 +63,7 @@ class Session:
         self.kept: list[np.ndarray] = []
         self._pending: list[Recentred] = []
         self._open: Any | None = None  # the runtime's state of the frame under way
-        self._views: tuple = ()  # the runtime's, of that frame
+        self._views: tuple = ()  # the runtime's, of the open frame
         self._start_ns: int | None = None
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0

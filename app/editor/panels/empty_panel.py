@@ -13,7 +13,7 @@ DEMO_LABEL, TOUCH_LABEL, OPEN = "The demo", "Things to touch", "Open\u2026"
 CHOICES = {
     OPEN: "Name a file or folder. Ctrl+O.",
     DEMO_LABEL: "A workshop bench in three stops: photo, thermal, opened.",
-    TOUCH_LABEL: "A table with things that can be grabbed and thrown.",
+    TOUCH_LABEL: "A table with objects that can be grabbed and thrown.",
 }
 
 

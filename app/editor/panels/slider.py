@@ -48,7 +48,7 @@ def draw_slider_bar(state: EditorState, bar: Box | None, ui_scale: float) -> Box
 
 def draw_slider(state: EditorState, index: int, ui_scale: float) -> None:
     """Play button, seconds a way, track, value of one object; without keys no value to type."""
-    thing, sweep = state.scene.objects[index], state.sweeps[index]
+    obj, sweep = state.scene.objects[index], state.sweeps[index]
     height = ROW * ui_scale
     if _play_button(sweep.playing, height, ui_scale):
         state.toggle_play(index)
@@ -57,14 +57,14 @@ def draw_slider(state: EditorState, index: int, ui_scale: float) -> None:
         _pace(state, index, height, ui_scale)
     imgui.same_line(0, 14 * ui_scale)
     named = len(state.sliders) == 1 < len(state.movable)  # one of several: say which
-    name_width = min(imgui.calc_text_size(thing.name).x, WIDEST_NAME * ui_scale) if named else 0.0
+    name_width = min(imgui.calc_text_size(obj.name).x, WIDEST_NAME * ui_scale) if named else 0.0
     value_width = max(VALUE * ui_scale, name_width)
     after = SPLIT * ui_scale if state.split.possible else 0.0
     beside = value_width + after + 12 * ui_scale if theme.has_keys() else 0.0
     room = imgui.get_content_region_avail().x - beside
     stops = state.stops(index)
-    second = state.split.on and state.split.name == thing.name
-    xs = (thing.slider_x, state.split.x) if second else (thing.slider_x,)
+    second = state.split.on and state.split.name == obj.name
+    xs = (obj.slider_x, state.split.x) if second else (obj.slider_x,)
     moved = track(stops, xs, state.grip, height, room)
     if moved.stop is not None:
         go_to_stop(state, index, moved.stop)
@@ -80,7 +80,7 @@ def draw_slider(state: EditorState, index: int, ui_scale: float) -> None:
     if named:
         imgui.push_clip_rect(origin, Vec(left + value_width, origin.y + height), True)
         draw = imgui.get_window_draw_list()
-        draw.add_text(Vec(left, origin.y), theme.color(theme.TEXT), thing.name)
+        draw.add_text(Vec(left, origin.y), theme.color(theme.TEXT), obj.name)
         imgui.pop_clip_rect()
     line_y = origin.y + height * LINE - imgui.get_frame_height() / 2
     imgui.set_cursor_screen_pos(Vec(left, line_y))

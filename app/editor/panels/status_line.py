@@ -18,17 +18,17 @@ UNITS = ("bytes", "kB", "MB", "GB", "TB")
 
 def scene_words(state: EditorState) -> list[str]:
     """Format, splats, degree of the harmonics, stops and bytes of what is shown."""
-    things, sources = state.scene.objects, state.sources
-    if not things:
+    objects, sources = state.scene.objects, state.sources
+    if not objects:
         return ["nothing is open"]
     splats = f"{number(state.scene.splat_count)} splats"
     size = sum(source.facts.get("bytes", 0) for source in sources)
     size_words = [bytes_text(size)] if size else []
-    if len(things) > 1:
-        return [f"{len(things)} objects", splats, *size_words]
+    if len(objects) > 1:
+        return [f"{len(objects)} objects", splats, *size_words]
     facts = sources[0].facts if sources else {}
     degree = facts.get("sh_degree")
-    stops = len(things[0].model.stops)
+    stops = len(objects[0].model.stops)
     words = [str(facts["format"])] if "format" in facts else []
     words += [splats] + ([f"SH {degree}"] if degree is not None else [])
     return [*words, f"{stops} stop{'s' * (stops != 1)}", *size_words]

@@ -20,7 +20,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 
 LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
-MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less is not told
+MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less counts as unmoved
 COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 
 
@@ -55,8 +55,8 @@ def go_back(state: EditorState, history: History) -> None:
     turn_to(state, history.amend(edits.with_x_of(history.file, now.file)))
     if history.regions != now.regions:
         state.regions.restore(history.regions)
-        for index, thing in enumerate(state.scene.objects):
-            state.regions.fit_painted(index, thing)
+        for index, obj in enumerate(state.scene.objects):
+            state.regions.fit_painted(index, obj)
     state.edited.amend_regions(state.regions)
 
 
@@ -83,7 +83,7 @@ def turn_to(state: EditorState, history: History) -> None:
 def arrange(state: EditorState, changed: Sequence[Change]) -> None:
     """The scene's objects as the file has them now; the rest goes on as it stands."""
     of = {change.after.name: change for change in changed if change.after is not None}
-    was = {thing.name: index for index, thing in enumerate(state.scene.objects)}
+    was = {obj.name: index for index, obj in enumerate(state.scene.objects)}
     rows, moved = [], {}
     for number, (label, item) in enumerate(labelled(state.edited.file)):
         change = of.get(item.name)
@@ -96,8 +96,8 @@ def arrange(state: EditorState, changed: Sequence[Change]) -> None:
         if index is None:
             rows.append(fresh_row(state, item, label))
         else:
-            thing = changed_thing(state.scene.objects[index], item, change)
-            rows.append((thing, state.filed[index], state.sweeps[index], state.sources[index]))
+            obj = changed_object(state.scene.objects[index], item, change)
+            rows.append((obj, state.filed[index], state.sweeps[index], state.sources[index]))
             moved[index] = number
     state.reorder_rows(rows, moved)
     if any(
@@ -115,22 +115,22 @@ def fresh_row(
 ) -> tuple[SceneObject, object, Sweep, Source]:
     """What the state holds of an object that was not there."""
     source = state.edited.sources[key_of(item)]
-    thing = object_of(item, state.in_palette(source.model), label)
+    obj = object_of(item, state.in_palette(source.model), label)
     sweep = Sweep.over(source.model.blend)
     sweep.resume_at(item.x)
-    return thing, source.model, sweep, source
+    return obj, source.model, sweep, source
 
 
-def changed_thing(thing: SceneObject, item: SceneItem, change: Change | None) -> SceneObject:
+def changed_object(obj: SceneObject, item: SceneItem, change: Change | None) -> SceneObject:
     """An object that is there already, with what was edited."""
     if change is None:
-        return thing
+        return obj
     values: dict = {"name": item.name, "visible": item.visible, "selectors": item.selectors}
     if change.fields & {"position", "wxyz"}:
         values["world_from_object"] = item.pose
     if "x" in change.fields:
         values["x"] = item.x
-    return replace(thing, **values)
+    return replace(obj, **values)
 
 
 def steer(state: EditorState, index: int, x: Control) -> None:
@@ -138,11 +138,11 @@ def steer(state: EditorState, index: int, x: Control) -> None:
 
     It is a look and no edit: undoing leaves it as it is.
     """
-    thing = state.scene.objects[index]
+    obj = state.scene.objects[index]
     state.set_x(index, x)
-    if not state.running and edits.find(state.edited.file, thing.name) is not None:
+    if not state.running and edits.find(state.edited.file, obj.name) is not None:
         history = state.edited.history
-        state.edited.history = history.amend(edits.set_x(history.file, thing.name, x))
+        state.edited.history = history.amend(edits.set_x(history.file, obj.name, x))
         state.bodies.follow(state.edited)
 
 
@@ -193,14 +193,14 @@ def all_go_to_stop(state: EditorState, number: int) -> None:
 
 def leave_for_stop(state: EditorState, index: int, number: int) -> None:
     """Straight there, to rest; where the object starts is there at once."""
-    thing, stops = state.scene.objects[index], state.stops(index)
+    obj, stops = state.scene.objects[index], state.stops(index)
     if number >= len(stops):
         return
     state.sweeps[index].playing = False
-    if (end := stops[number].x) != thing.x:
+    if (end := stops[number].x) != obj.x:
         steer(state, index, end)
-        state.set_x(index, thing.x)
-        state.shifts[index] = Shift(thing.x, end, thing.model.blend)
+        state.set_x(index, obj.x)
+        state.shifts[index] = Shift(obj.x, end, obj.model.blend)
 
 
 def place(state: EditorState, index: int, pose: Pose) -> None:
@@ -217,17 +217,17 @@ def place(state: EditorState, index: int, pose: Pose) -> None:
 def as_it_stands(state: EditorState) -> SceneFile:
     """The file with everything where it is now, at its x.  ValueError for what has flown off."""
     file = state.edited.file
-    for thing in state.scene.objects:
-        file = edits.set_pose(file, thing.name, thing.world_from_object)
-        file = edits.set_x(file, thing.name, thing.x)
+    for obj in state.scene.objects:
+        file = edits.set_pose(file, obj.name, obj.world_from_object)
+        file = edits.set_x(file, obj.name, obj.x)
     return file
 
 
-def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, float]:
+def copy_offset(obj: SceneObject, points: np.ndarray) -> tuple[float, float, float]:
     """Metres along the world's x that a copy of points (N, 3), object frame, stands beside it."""
     if not len(points):
         return (0.0, 0.0, 0.0)
-    along = points @ thing.world_from_object.matrix()[0, :3]
+    along = points @ obj.world_from_object.matrix()[0, :3]
     low, high = np.percentile(along, (2, 98))
     return (float(COPY_BESIDE * (high - low)), 0.0, 0.0)
 
@@ -235,9 +235,9 @@ def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, f
 def stands_elsewhere(state: EditorState) -> bool:
     """Whether anything is not where it starts, or at another x."""
     items = {item.name: item for item in state.edited.file.all_items}
-    for thing in state.scene.objects:
-        item, pose = items[thing.name], thing.world_from_object
-        if thing.x != item.x or math.dist(pose.position, item.position) > MOVED_M:
+    for obj in state.scene.objects:
+        item, pose = items[obj.name], obj.world_from_object
+        if obj.x != item.x or math.dist(pose.position, item.position) > MOVED_M:
             return True
         if abs(sum(a * b for a, b in zip(pose.wxyz, item.wxyz, strict=True))) < 1 - TURNED:
             return True

@@ -129,7 +129,7 @@ class Bodies:
         from shapeshift.scene.world.world import World
 
         models, ground = edited.models_by_name(), (file.floor_y, file.gravity_m_s2)
-        if self.world is None or self._ground != ground:  # a floor is no thing that comes or goes
+        if self.world is None or self._ground != ground:  # a floor is no object that comes or goes
             paused = self.world is None or self.world.paused
             self.world, self._ground = World(file, models, colliders, hz=HZ), ground
             self.world.paused = paused

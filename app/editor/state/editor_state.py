@@ -101,11 +101,11 @@ class EditorState:
         if scene.objects:
             background = default_background(scene.objects[0].model, DARK)
             self.settings = replace(self.settings, background=background)
-        self.filed = tuple(thing.model for thing in scene.objects)
+        self.filed = tuple(obj.model for obj in scene.objects)
         self.palette = AS_FILED
-        self.sweeps = [Sweep.over(thing.model.blend) for thing in scene.objects]
-        for sweep, thing in zip(self.sweeps, scene.objects, strict=True):
-            sweep.resume_at(thing.x)
+        self.sweeps = [Sweep.over(obj.model.blend) for obj in scene.objects]
+        for sweep, obj in zip(self.sweeps, scene.objects, strict=True):
+            sweep.resume_at(obj.x)
         self.reframe()
         self.regions.clear()
         self.regions.radius = self.radius
@@ -126,7 +126,7 @@ class EditorState:
         self.centre, self.radius = frame_points(*self._points)
 
     def replace_model(self, index: int, model: Model) -> None:
-        """Another model of the same thing: x, sweep, regions, camera and settings stay.
+        """Another model of the same object: x, sweep, regions, camera and settings stay.
 
         For finer levels of detail.  What was painted on another number of splats is unpainted.
         """
@@ -162,12 +162,12 @@ class EditorState:
     def title(self) -> str:
         """What is open: the scene file, else the names of the objects."""
         path = self.edited.path
-        return path.name if path else ", ".join(thing.name for thing in self.scene.objects)
+        return path.name if path else ", ".join(obj.name for obj in self.scene.objects)
 
     @property
     def findings(self) -> list[Finding]:
         """What was wrong in the files that are shown."""
-        return [finding for thing in self.scene.objects for finding in thing.model.findings]
+        return [finding for obj in self.scene.objects for finding in obj.model.findings]
 
     def fit(self, view: View, fov_y: float, size: tuple[int, int]) -> float:
         """Metres from the centre at which all fits size (W, H), looking as the view does."""
@@ -183,11 +183,11 @@ class EditorState:
         made_of = (self.scene, self.regions.version, eye)
         before, scene = self._shown
         if before is None or before[0] is not self.scene or before[1:] != made_of[1:]:
-            things = [
-                replace(thing, selectors=thing.selectors + self.regions.selectors(index, view))
-                for index, thing in enumerate(self.scene.objects)
+            objects = [
+                replace(obj, selectors=obj.selectors + self.regions.selectors(index, view))
+                for index, obj in enumerate(self.scene.objects)
             ]
-            scene = Scene(tuple(things))
+            scene = Scene(tuple(objects))
             self._shown = (made_of, scene)
         return scene
 
@@ -198,10 +198,10 @@ class EditorState:
 
     def add_region(self, kind: str) -> None:
         """A region of the first object, in the middle of the scene until it is placed."""
-        thing = self.scene.objects[0]
-        object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+        obj = self.scene.objects[0]
+        object_from_world = np.linalg.inv(obj.world_from_object.matrix())
         centre = object_from_world @ np.append(self.centre, 1.0)
-        self.regions.add(kind, 0, thing, centre[:3])
+        self.regions.add(kind, 0, obj, centre[:3])
 
     def toggle_lens(self) -> bool:
         """Switches the lens on or off; returns whether it is on."""
@@ -216,8 +216,8 @@ class EditorState:
                 regions.choose(numbers[-1])
             else:
                 regions.add("painted", 0, self.scene.objects[0], np.zeros(3))
-        thing = self.scene.objects[regions.items[regions.chosen].index]
-        regions.paint(view, cursor, radius, thing, erase)
+        obj = self.scene.objects[regions.items[regions.chosen].index]
+        regions.paint(view, cursor, radius, obj, erase)
 
     @property
     def world(self) -> "World | None":
@@ -233,9 +233,9 @@ class EditorState:
         """Takes over where the world's objects are and what their x is."""
         drawn = self.world.drawn() if self.world is not None else None
         if drawn is not None and drawn is not self._followed:
-            stood = {thing.name: thing for thing in drawn.objects}
-            things = [stood_as(thing, stood.get(thing.name)) for thing in self.scene.objects]
-            self.scene, self._followed = Scene(tuple(things)), drawn
+            stood = {obj.name: obj for obj in drawn.objects}
+            objects = [stood_as(obj, stood.get(obj.name)) for obj in self.scene.objects]
+            self.scene, self._followed = Scene(tuple(objects)), drawn
 
     def rest(self) -> None:
         """The hand has let go: the next edit is a step of its own."""
@@ -243,10 +243,10 @@ class EditorState:
 
     def move(self, index: int, pose: Pose) -> None:
         """Puts an object elsewhere, at rest; what the file says stays."""
-        thing = self.scene.objects[index]
-        self._replace_object(index, replace(thing, world_from_object=pose))
-        if self.world is not None and thing.name in self.world.objects:
-            self.world.move_object(thing.name, pose)
+        obj = self.scene.objects[index]
+        self._replace_object(index, replace(obj, world_from_object=pose))
+        if self.world is not None and obj.name in self.world.objects:
+            self.world.move_object(obj.name, pose)
 
     def reorder_rows(self, rows: Sequence[tuple], moved: dict[int, int]) -> None:
         """Other objects, each with model as read, sweep and source; camera and settings stay.
@@ -266,21 +266,21 @@ class EditorState:
 
     def set_x(self, index: int, x: Control) -> None:
         """Moves an object's x; what the file says stays."""
-        thing = self.scene.objects[index]
-        self._replace_object(index, replace(thing, x=x))
-        if self.world is not None and thing.name in self.world.objects:
-            self.world.control(thing.name, x)
+        obj = self.scene.objects[index]
+        self._replace_object(index, replace(obj, x=x))
+        if self.world is not None and obj.name in self.world.objects:
+            self.world.control(obj.name, x)
 
-    def _replace_object(self, index: int, thing: SceneObject) -> None:
+    def _replace_object(self, index: int, obj: SceneObject) -> None:
         objects = list(self.scene.objects)
-        objects[index] = thing
+        objects[index] = obj
         self.scene = Scene(tuple(objects))
 
     def stops(self, index: int) -> tuple[Stop, ...]:
         """The stops of an object's slider, by x, under the names that the scene gives them."""
-        thing = self.scene.objects[index]
-        item = edits.find(self.edited.file, thing.name)
-        return named_stops(item or SceneItem(name=thing.name, model=""), thing.model)
+        obj = self.scene.objects[index]
+        item = edits.find(self.edited.file, obj.name)
+        return named_stops(item or SceneItem(name=obj.name, model=""), obj.model)
 
     def finish_shifts(self) -> None:
         """Objects on their way to a stop are there."""
@@ -319,8 +319,8 @@ class EditorState:
     def movable(self) -> list[int]:
         """Indices of the objects that have somewhere to go: two stops or more."""
         if self._movable[0] is not self.scene:  # asked several times a frame, of many objects
-            things = enumerate(self.scene.objects)
-            found = [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
+            objects = enumerate(self.scene.objects)
+            found = [index for index, obj in objects if len({s.x for s in obj.model.stops}) > 1]
             self._movable = (self.scene, found)
         return self._movable[1]
 
@@ -336,7 +336,7 @@ class EditorState:
     @property
     def chosen_index(self) -> int | None:
         """Where the chosen object is in the scene; None: none is."""
-        names = [thing.name for thing in self.scene.objects]
+        names = [obj.name for obj in self.scene.objects]
         return names.index(self.chosen) if self.chosen in names else None
 
     @property
@@ -375,8 +375,8 @@ class EditorState:
         """Shows every thermal stop in that palette; AS_FILED gives back the scene's own."""
         self.palette = name
         objects = [
-            replace(thing, model=self.in_palette(model))
-            for thing, model in zip(self.scene.objects, self.filed, strict=True)
+            replace(obj, model=self.in_palette(model))
+            for obj, model in zip(self.scene.objects, self.filed, strict=True)
         ]
         self.scene = Scene(tuple(objects))
 
@@ -387,14 +387,14 @@ class EditorState:
     @property
     def has_palettes(self) -> bool:
         """Whether any thermal stop is drawn through a palette at all."""
-        return any(stop.palette for thing in self.scene.objects for stop in thing.model.stops)
+        return any(stop.palette for obj in self.scene.objects for stop in obj.model.stops)
 
     @property
     def has_legend(self) -> bool:
         """Whether any thermal stop that may be seen has values to tell."""
         if self._legend[0] is not self.scene:  # asked several times a frame, of many objects
-            seen = [thing for thing in self.scene.objects if thing.visible]
-            stops = [stop for thing in seen for stop in thing.model.stops]
+            seen = [obj for obj in self.scene.objects if obj.visible]
+            stops = [stop for obj in seen for stop in obj.model.stops]
             found = any(stop.palette and stop.value_range is not None for stop in stops)
             self._legend = (self.scene, found)
         return self._legend[1]

@@ -1,6 +1,6 @@
 """Where the overlay's parts lie in a window of any size, and what they leave free for the scene.
 
-Numbers only: whoever draws asks for boxes.  Lengths of the constants are units of the overlay: of
+Numbers only: the panels ask for boxes.  Lengths of the constants are units of the overlay: of
 `scale` logical pixels each.
 """
 

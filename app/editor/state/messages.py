@@ -26,7 +26,7 @@ class Messages:
         return over
 
     def fail(self, sentence: str) -> None:
-        """Adds a problem; the same again is told once, as the newest."""
+        """Adds a problem; the same again is kept once, as the newest."""
         if len(sentence) > LONGEST:
             sentence = sentence[: LONGEST - 1] + "\u2026"
         others = [other for other in self.problems if other != sentence]

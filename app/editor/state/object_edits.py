@@ -53,17 +53,17 @@ class ObjectEdits:
         index = state.chosen_index
         if index is None:
             return
-        thing = state.scene.objects[index]
-        by = copy_offset(thing, model_points(thing.model)[0])
+        obj = state.scene.objects[index]
+        by = copy_offset(obj, model_points(obj.model)[0])
         known = {item.name for item in state.edited.file.all_items}
-        pose = thing.world_from_object
+        pose = obj.world_from_object
 
         def beside(file: SceneFile) -> SceneFile:
             """The copy stands by what is seen, wherever that may have gone since the start."""
             file = edits.duplicate(file, name, by)
             copy = next(item.name for item in file.items if item.name not in known)
             file = edits.set_pose(file, copy, Pose(pose.position + by, pose.wxyz))
-            return edits.set_x(file, copy, thing.x)
+            return edits.set_x(file, copy, obj.x)
 
         if self.edit(beside, what=f"copy {name}"):
             state.chosen = next(i.name for i in state.edited.file.items if i.name not in known)

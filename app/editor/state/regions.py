@@ -46,7 +46,7 @@ class Region:
 class Regions:
     """The list of regions, which of them is being edited, and what the mouse does to it.
 
-    `version` goes up with every edit, so that whoever depends on regions knows when they changed;
+    `version` goes up with every edit, so that what is made of regions knows when they changed;
     `did` says in words what the last one was, "" where nobody edited: undoing passes over it.
     """
 
@@ -67,8 +67,8 @@ class Regions:
     def choose(self, number: int) -> None:
         self.chosen, self.placing = number, False
 
-    def add(self, kind: str, index: int, thing: SceneObject, point: np.ndarray) -> Region:
-        """A new region of the object `thing`, about `point` (3,) in its frame; it is chosen.
+    def add(self, kind: str, index: int, obj: SceneObject, point: np.ndarray) -> Region:
+        """A new region of the object `obj`, about `point` (3,) in its frame; it is chosen.
 
         It shows the stop farthest from what the object shows, so that it is seen at once.
         """
@@ -76,10 +76,10 @@ class Regions:
         count = next(n for n in range(1, len(names) + 2) if f"{kind} {n}" not in names)
         region = Region(
             kind, f"{kind} {count}", index,
-            x=farthest_stop(thing), border=FIRST_BORDER * self.radius,
+            x=farthest_stop(obj), border=FIRST_BORDER * self.radius,
             centre=np.asarray(point, np.float64),
             half=np.full(3, FIRST_SIZE * self.radius),
-            painted=np.zeros(len(anchor_places(thing.model)), bool) if kind == "painted" else None,
+            painted=np.zeros(len(anchor_places(obj.model)), bool) if kind == "painted" else None,
         )  # fmt: skip
         self.items = (*self.items, region)
         self.choose(len(self.items) - 1)
@@ -165,35 +165,35 @@ class Regions:
         did = f"{word} {before.name}" if before.kind != "lens" else ""
         self._changed(did, did)
 
-    def place(self, point: np.ndarray, index: int, things: tuple[SceneObject, ...]) -> None:
+    def place(self, point: np.ndarray, index: int, objects: tuple[SceneObject, ...]) -> None:
         """Moves the chosen region to a world point (3,), into the object that was met there.
 
         A painted region stays with its object: its anchors mean nothing in another one.
         """
-        world_from_object = things[index].world_from_object.matrix()
+        world_from_object = objects[index].world_from_object.matrix()
         local = np.linalg.inv(world_from_object) @ np.append(point, 1.0)
         self.edit(self.chosen, index=index, centre=local[:3])
 
-    def fit_painted(self, index: int, thing: SceneObject) -> None:
+    def fit_painted(self, index: int, obj: SceneObject) -> None:
         """Unpaints the regions of object `index` where it now has another number of splats."""
-        count = len(anchor_places(thing.model))
+        count = len(anchor_places(obj.model))
         for number, region in enumerate(self.items):
             painted = region.painted
             if region.index == index and painted is not None and len(painted) != count:
                 self.edit(number, painted=np.zeros(count, bool))
                 self.did = ""  # by nobody's hand
 
-    def toggle_lens(self, thing: SceneObject) -> bool:
+    def toggle_lens(self, obj: SceneObject) -> bool:
         """Switches the lens on or off, adding one the first time; returns whether it is on."""
         for number, region in enumerate(self.items):
             if region.kind == "lens":
                 self.edit(number, enabled=not region.enabled)
                 return not region.enabled
-        self.add("lens", 0, thing, np.zeros(3))
+        self.add("lens", 0, obj, np.zeros(3))
         return True
 
     def paint(
-        self, view: View, cursor: tuple[float, float], radius: float, thing: SceneObject,
+        self, view: View, cursor: tuple[float, float], radius: float, obj: SceneObject,
         erase: bool,
     ) -> int:  # fmt: skip
         """Paints or erases the chosen region's anchors under a brush; returns how many changed.
@@ -202,7 +202,7 @@ class Regions:
         """
         before = self.items[self.chosen].painted
         assert before is not None  # a painted region has a mask from `add` on
-        under = brushed(view, anchor_places(thing.model), thing, cursor, radius)
+        under = brushed(view, anchor_places(obj.model), obj, cursor, radius)
         painted = before.copy()
         painted[under] = not erase
         changed = int(np.count_nonzero(painted != before))
@@ -253,14 +253,14 @@ def same(one: Any, other: Any) -> bool:
     return one is other or bool(np.array_equal(one, other))
 
 
-def farthest_stop(thing: SceneObject) -> float:
+def farthest_stop(obj: SceneObject) -> float:
     """x of the stop that differs most from what the object shows."""
-    xs = [stop.x for stop in thing.model.stops] or [0.0, 1.0]
-    return max(xs, key=lambda x: abs(x - thing.slider_x))
+    xs = [stop.x for stop in obj.model.stops] or [0.0, 1.0]
+    return max(xs, key=lambda x: abs(x - obj.slider_x))
 
 
 def brushed(
-    view: View, places: np.ndarray, thing: SceneObject, cursor: tuple[float, float],
+    view: View, places: np.ndarray, obj: SceneObject, cursor: tuple[float, float],
     radius: float,
 ) -> np.ndarray:  # fmt: skip
     """Indices of the places (A, 3), object frame, within `radius` pixels of the cursor.
@@ -268,7 +268,7 @@ def brushed(
     Just those of the nearest surface: at most DEEP brush radii, in metres at its depth, behind its
     front.
     """
-    eye_from_object = view.eye_from_world() @ thing.world_from_object.matrix()
+    eye_from_object = view.eye_from_world() @ obj.world_from_object.matrix()
     in_eye = places @ eye_from_object[:3, :3].T + eye_from_object[:3, 3]  # (A, 3) metres
     depth = -in_eye[:, 2]
     ahead = np.flatnonzero(depth > view.near)

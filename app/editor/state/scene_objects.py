@@ -22,20 +22,20 @@ def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
         pose = Pose(moved, IDENTITY.wxyz) if moved.any() else IDENTITY
         start = first_stop(model).x if x is None else x
         name = path.name if path.is_dir() else path.stem
-        name = free_name({thing.name for thing in objects}, name)
+        name = free_name({obj.name for obj in objects}, name)
         objects.append(SceneObject(name, model, pose, x=start))
     return Scene(tuple(objects))
 
 
-def stood_as(thing: SceneObject, other: SceneObject | None) -> SceneObject:
+def stood_as(obj: SceneObject, other: SceneObject | None) -> SceneObject:
     """The object where another of its name is; the very same where nothing differs."""
     if other is None:
-        return thing
-    here, there = thing.world_from_object, other.world_from_object
+        return obj
+    here, there = obj.world_from_object, other.world_from_object
     same = (*here.position, *here.wxyz) == (*there.position, *there.wxyz)
-    if same and thing.x == other.x:
-        return thing
-    return replace(thing, world_from_object=there, x=other.x)
+    if same and obj.x == other.x:
+        return obj
+    return replace(obj, world_from_object=there, x=other.x)
 
 
 def origin_of(model: Model) -> np.ndarray:

@@ -18,23 +18,22 @@ class SplitState:
     x: float = 1.0
     possible: bool = False  # whether there is anybody to draw it
 
-    def toggle(self, thing: SceneObject) -> None:
+    def toggle(self, obj: SceneObject) -> None:
         """On for this object, at a thermal stop, else the one farthest from its x; or off."""
-        self.on = not self.on or self.name != thing.name
-        if self.name != thing.name or self.x == thing.slider_x:
-            thermal = [stop.x for stop in thing.model.stops if stop.kind == "thermal"]
-            others = [x for x in thermal if abs(x - thing.slider_x) > ON_STOP]
-            self.name, self.x = thing.name, (others or [farthest_stop(thing)])[0]
+        self.on = not self.on or self.name != obj.name
+        if self.name != obj.name or self.x == obj.slider_x:
+            thermal = [stop.x for stop in obj.model.stops if stop.kind == "thermal"]
+            others = [x for x in thermal if abs(x - obj.slider_x) > ON_STOP]
+            self.name, self.x = obj.name, (others or [farthest_stop(obj)])[0]
 
     def right(self, scene: Scene) -> Scene:
         """The scene right of the line; the same one where the object is gone."""
-        if not any(thing.name == self.name for thing in scene.objects):
+        if not any(obj.name == self.name for obj in scene.objects):
             return scene
-        things = [
-            replace(thing, x=self.x) if thing.name == self.name else thing
-            for thing in scene.objects
+        objects = [
+            replace(obj, x=self.x) if obj.name == self.name else obj for obj in scene.objects
         ]
-        return Scene(tuple(things))
+        return Scene(tuple(objects))
 
 
 def name_of(x: float, stops: tuple[Stop, ...]) -> str:

@@ -15,8 +15,8 @@ from shapeshift.scene.world.record import Record
 from shapeshift.scene.world.world import World
 
 HAND = "mouse"
-HOW, HOW_S = "Drag a thing. X shoots. T stops.", 9.0  # said once, for so many seconds
-STILL, MOVING = "things hold still: T lets them move", "drag a thing, X shoots, T stops"
+HOW, HOW_S = "Drag an object. X shoots. T stops.", 9.0  # said once, for so many seconds
+STILL, MOVING = "objects hold still: T lets them move", "drag an object, X shoots, T stops"
 REMEMBERED = 6  # reactions that the panel lists
 WORDS = {"collision": "struck", "grab": "taken", "ray": "hit by a ray", "enter": "arrived"}
 LABEL_S, FLASH_S = 1.8, 0.4  # how long they are seen
@@ -43,7 +43,7 @@ class TouchState:
     """What the mouse holds, and what has just happened in the scene's world."""
 
     def __init__(self, state: EditorState, play: bool) -> None:
-        """`play`: every scene opens with its things in motion, not only the bundled one."""
+        """`play`: every scene opens with its objects in motion, not only the bundled one."""
         self._state, self.play = state, play
         self.hand: MouseHand | None = None  # while it holds something
         self.pads: dict[str, tuple[float, float]] = {}  # name -> balance, power as last put there
@@ -74,7 +74,7 @@ class TouchState:
         return self._state.chosen
 
     def forget(self) -> None:
-        """Another scene: nothing of the old one is held or told."""
+        """Another scene: nothing of the old one is held or listed."""
         self.hand = self._known = None
         self.pads.clear()
         self.reactions.clear()
@@ -115,16 +115,16 @@ class TouchState:
         self.hand = None
 
     def toggle(self) -> None:
-        """Lets things move, or holds them still."""
+        """Lets objects move, or holds them still."""
         self.release()
         world = self.world
         if world is None:
             return
         world.paused = not world.paused
-        self._state.say("Things hold still. T lets them move." if world.paused else HOW)
+        self._state.say("Objects hold still. T lets them move." if world.paused else HOW)
 
     def step(self) -> None:
-        """One step by hand; things hold still after it."""
+        """One step by hand; objects hold still after it."""
         self.release()
         if self.world is not None:
             self.world.paused = True
@@ -141,7 +141,7 @@ class TouchState:
 
     def control(self, name: str, x: Control) -> None:
         """A pad puts an object's x there."""
-        names = [thing.name for thing in self._state.scene.objects]
+        names = [obj.name for obj in self._state.scene.objects]
         steer(self._state, names.index(name), x)
 
     def meet_world(self) -> bool:
@@ -150,7 +150,7 @@ class TouchState:
         if world is None:
             self.hand = None
             if self._state.bodies.busy and self.opens_playing:
-                self._state.say("Getting things ready to be touched \u2026")
+                self._state.say("Getting objects ready to be touched \u2026")
             return False
         if world is not self._known:
             self.meet(world)
@@ -178,7 +178,7 @@ class TouchState:
         return bool(self.labels or self.flashes)
 
     def follow(self, records: list[Record]) -> None:
-        """Shows where things are now, and what has answered."""
+        """Shows where objects are now, and what has answered."""
         self._state.follow_world()
         for record in records:
             for event in record.events:

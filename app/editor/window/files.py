@@ -118,13 +118,13 @@ class Files:
 
     def use_cameras(self, found: OpenedFiles, look_through: bool) -> None:
         """The cameras of a file for n and p; of a scene without any there are none."""
-        cameras, things = found.cameras, self._state.scene.objects
+        cameras, objects = found.cameras, self._state.scene.objects
         if cameras is None and found.floor is not None and not found.sources:
             cameras = found.floor
         if cameras is None and not found.sources:
             return
-        if cameras is not None and things:
-            cameras = in_scene(cameras, things[0].model)
+        if cameras is not None and objects:
+            cameras = in_scene(cameras, objects[0].model)
         self._viewpoint.follow_cameras(cameras, look_through)
 
     def draw_row(self, ui_scale: float) -> None:

@@ -74,7 +74,7 @@ class Gizmo:
             if len(state.scene.objects) == 1:
                 state.chosen = state.scene.objects[0].name
             else:
-                state.say("Click a thing, or its name, to choose what to move.")
+                state.say("Click an object, or its name, to choose what to move.")
 
     @property
     def _under_mouse(self) -> bool:
@@ -89,22 +89,22 @@ class Gizmo:
             self.holding = False
         if index is None:
             return
-        thing, view = state.scene.objects[index], self._viewpoint.view()
+        obj, view = state.scene.objects[index], self._viewpoint.view()
         if state.overlay and not self.holding:
-            self._outline(thing, view, ui_scale)
+            self._outline(obj, view, ui_scale)
         if self._shown:
-            self._handles(index, thing, view, ui_scale)
+            self._handles(index, obj, view, ui_scale)
 
-    def _handles(self, index: int, thing: SceneObject, view: View, ui_scale: float) -> None:
+    def _handles(self, index: int, obj: SceneObject, view: View, ui_scale: float) -> None:
         gizmo, mode = imguizmo.im_guizmo, self._state.handles
         gizmo.begin_frame()
         gizmo.set_drawlist(imgui.get_background_draw_list())
         gizmo.set_rect(0, 0, *self._window.logical_size)
         gizmo.set_gizmo_size_clip_space(0.12 * ui_scale)
-        world_from_pivot, pivot = self._frame(thing)
+        world_from_pivot, pivot = self._frame(obj)
         matrix = flat(world_from_pivot)
         before = unflat(matrix)
-        gizmo.push_id(thing.name)
+        gizmo.push_id(obj.name)
         changed = gizmo.manipulate(
             flat(view.eye_from_world()),
             flat(view.clip_from_eye()),
@@ -114,34 +114,34 @@ class Gizmo:
         )
         gizmo.pop_id()
         if changed and self.holding:
-            place(self._state, index, pose_after(thing, before, unflat(matrix), pivot))
+            place(self._state, index, pose_after(obj, before, unflat(matrix), pivot))
 
-    def _frame(self, thing: SceneObject) -> tuple[np.ndarray, np.ndarray]:
+    def _frame(self, obj: SceneObject) -> tuple[np.ndarray, np.ndarray]:
         """(4, 4) world_from_pivot, and the pivot (3,) in the object: where its splats are."""
         pivot, world_from_object = (
-            self._corners(thing).mean(axis=0),
-            thing.world_from_object.matrix(),
+            self._corners(obj).mean(axis=0),
+            obj.world_from_object.matrix(),
         )
         world_from_pivot = world_from_object.copy()
         world_from_pivot[:3, 3] += world_from_object[:3, :3] @ pivot
         return world_from_pivot, pivot
 
-    def _corners(self, thing: SceneObject) -> np.ndarray:
+    def _corners(self, obj: SceneObject) -> np.ndarray:
         """(2, 3) metres, object frame: from where to where its splats are, a few floaters aside."""
-        if self._box[0] is not thing.model:
-            points, opacity = model_points(thing.model)
+        if self._box[0] is not obj.model:
+            points, opacity = model_points(obj.model)
             seen = points[opacity > MIN_OPACITY]
             points = seen if len(seen) else points
             corners = (
                 np.percentile(points, PERCENTILES, axis=0) if len(points) else np.zeros((2, 3))
             )
-            self._box = (thing.model, corners)
+            self._box = (obj.model, corners)
         return self._box[1]
 
-    def _outline(self, thing: SceneObject, view: View, ui_scale: float) -> None:
+    def _outline(self, obj: SceneObject, view: View, ui_scale: float) -> None:
         """The corners of the chosen object's box."""
-        low, high = self._corners(thing)
-        lines = moved(corner_lines(low, high), thing.world_from_object.matrix())
+        low, high = self._corners(obj)
+        lines = moved(corner_lines(low, high), obj.world_from_object.matrix())
         ink = theme.color(theme.ACCENT, 0.8)
         draw = imgui.get_background_draw_list()
         for (x0, y0), (x1, y1) in on_screen(view, lines, self._window.logical_size):
@@ -160,15 +160,13 @@ def corner_lines(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return np.array(lines)
 
 
-def pose_after(
-    thing: SceneObject, before: np.ndarray, after: np.ndarray, pivot: np.ndarray
-) -> Pose:
+def pose_after(obj: SceneObject, before: np.ndarray, after: np.ndarray, pivot: np.ndarray) -> Pose:
     """Where the object is once its pivot has gone from one (4, 4) to another, both float32.
 
     Only the difference counts, so that rounding moves and turns nothing by itself.  Never farther
     away than the physics reaches.
     """
-    pose = thing.world_from_object
+    pose = obj.world_from_object
     middle = pose.position + pose.matrix()[:3, :3] @ pivot + (after - before)[:3, 3]
     turn = np.eye(4)
     turn[:3, :3] = after[:3, :3] @ before[:3, :3].T @ pose.matrix()[:3, :3]

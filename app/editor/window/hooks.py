@@ -11,7 +11,7 @@ from shapeshift.app.editor.window.window import Event
 
 @dataclass
 class Hooks:
-    """Lists that whoever adds to the viewer appends to, before or while it runs."""
+    """Lists that parts of the viewer append to, before or while it runs."""
 
     sections: list[Section] = field(default_factory=list)  # the panel knows their order by name
     top: list[Callable[[float], None]] = field(default_factory=list)  # under the title, ui_scale

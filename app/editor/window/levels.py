@@ -22,7 +22,7 @@ def attach_refiner(
     def swap() -> bool:
         if (pair := refiner.next_level()) is not None:
             before, after = pair
-            places = [i for i, thing in enumerate(state.scene.objects) if thing.model is before]
+            places = [i for i, obj in enumerate(state.scene.objects) if obj.model is before]
             for index in places:
                 show(index, before, after)
         if refiner.problem:
@@ -40,7 +40,7 @@ def attach_refiner(
         scene_changed()
 
     def follow() -> None:
-        refiner.follow([thing.model for thing in state.scene.objects])
+        refiner.follow([obj.model for obj in state.scene.objects])
 
     hooks.each_frame.append(swap)
     hooks.opened.append(follow)

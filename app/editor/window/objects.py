@@ -20,7 +20,7 @@ from shapeshift.app.editor.window.window import (
 )
 
 KEYS = (
-    ("click", "choose a thing"),
+    ("click", "choose an object"),
     ("M", "handles: move, turn, none"),
     ("Ctrl+D, Delete", "copy, delete the chosen one"),
 )
@@ -53,7 +53,7 @@ class Objects:
         self._opened, self._click, self.edits.typed = True, None, ("", "")
 
     def opens(self) -> bool:
-        """True once for a scene of several things: the section unfolds for it."""
+        """True once for a scene of several objects: the section unfolds for it."""
         opened, self._opened = self._opened, False
         several = len(self.state.scene.objects) > 1
         return opened and (several or self.state.edited.path is not None)
@@ -119,11 +119,11 @@ class Objects:
 
     def choose_at(self, x: float, y: float) -> None:
         """Chooses what lies there, logical pixels; of a single object nothing is asked."""
-        things = self.state.scene.objects
-        if len(things) < 2:
+        objects = self.state.scene.objects
+        if len(objects) < 2:
             return
         hit = self._hands.point_at(x, y)
-        self.state.chosen = things[hit.index].name if hit is not None else ""
+        self.state.chosen = objects[hit.index].name if hit is not None else ""
 
     def each_frame(self) -> bool:
         """The end of a drag, what is being read; True while that goes on."""

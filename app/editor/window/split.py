@@ -59,7 +59,7 @@ def splitting(
 
     def draw(request: FrameRequest) -> None:
         split_state.on = split_state.on and any(
-            thing.name == split_state.name for thing in request.scene.objects
+            obj.name == split_state.name for obj in request.scene.objects
         )
         if not split_state.on:
             return
@@ -101,7 +101,7 @@ def splitting(
 
 def sides_of(state: EditorState) -> tuple[str, str]:
     """What is left and right of the line: a stop's name, else x."""
-    names = [thing.name for thing in state.scene.objects]
+    names = [obj.name for obj in state.scene.objects]
     index = names.index(state.split.name)
     stops = state.stops(index)
     return name_of(state.scene.objects[index].slider_x, stops), name_of(state.split.x, stops)

@@ -1,4 +1,4 @@
-"""The mouse as a hand: it grabs, carries, turns and throws things, and shoots a ray."""
+"""The mouse as a hand: it grabs, carries, turns and throws objects, and shoots a ray."""
 
 import glfw
 
@@ -36,10 +36,10 @@ from shapeshift.scene.world.rigid_object import middle_of
 from shapeshift.scene.world.world import World
 
 KEYS = (
-    ("T", "let things move, hold them still"),
+    ("T", "let objects move, hold them still"),
     ("Shift+T", "one step of 1/90 s"),
     ("R", "put everything back"),
-    ("drag a thing", "carry it, while things move"),
+    ("drag an object", "carry it, while objects move"),
     ("wheel, carrying", "farther, nearer"),
     ("Shift, carrying", "drag turns it, wheel rolls it"),
     ("X", "a ray at the mouse"),
@@ -147,8 +147,8 @@ class MouseTouch:
         hit = world.aim(*ray(view, place, self._window.logical_size)) if world else None
         if world is None or hit is None:
             return None
-        thing = world.objects.get(hit.object)
-        return hit.object if thing is not None and thing.moves else None
+        obj = world.objects.get(hit.object)
+        return hit.object if obj is not None and obj.moves else None
 
     def drag(self, hand: MouseHand, dx: float, dy: float) -> None:
         if self._hands.shift:

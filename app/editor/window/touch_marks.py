@@ -55,20 +55,20 @@ class Marks:
         gpu_lines = self._lines or Lines(Gpu(self._window.ctx))
         self._lines = gpu_lines
         wires = [
-            Wire(self.edges(thing, thing.collider), where(request, thing), self._ink(name, thing))
-            for name, thing in touch.world.objects.items()
-            if thing.collider is not None
+            Wire(self.edges(obj, obj.collider), where(request, obj), self._ink(name, obj))
+            for name, obj in touch.world.objects.items()
+            if obj.collider is not None
         ]
         gpu_lines.draw(self._window.screen(), request.view, wires)
 
-    def _ink(self, name: str, thing: RigidObject) -> tuple[float, float, float, float]:
+    def _ink(self, name: str, obj: RigidObject) -> tuple[float, float, float, float]:
         held = name == self._touch.held
-        rgb = HELD_INK if held else MOVES_INK if thing.moves else STAYS_INK
+        rgb = HELD_INK if held else MOVES_INK if obj.moves else STAYS_INK
         return (*rgb, 0.9 if held else 0.6)
 
-    def edges(self, thing: RigidObject, collider: Collider) -> np.ndarray:
+    def edges(self, obj: RigidObject, collider: Collider) -> np.ndarray:
         """(S, 2, 3) of its collider, made once."""
-        is_mesh = thing.item.name == BACKGROUND
+        is_mesh = obj.item.name == BACKGROUND
         key = (id(collider), is_mesh)
         if key not in self._edges:
             made = (mesh_edges if is_mesh else hull_edges)(collider)
@@ -78,7 +78,7 @@ class Marks:
     # ---- over the picture
 
     def draw(self, ui_scale: float) -> None:
-        """The grip, or what could be taken; flashes of rays; what things have become."""
+        """The grip, or what could be taken; flashes of rays; what objects have become."""
         touch = self._touch
         if touch.world is None:
             return
@@ -101,8 +101,8 @@ class Marks:
             return
         draw, ink = imgui.get_background_draw_list(), theme.color(theme.ACCENT, 0.8)
         held = self._touch.held
-        thing = None if held is None else world.objects.get(held)
-        middle = on_picture(view, middle_of(thing), size) if thing else None
+        obj = None if held is None else world.objects.get(held)
+        middle = on_picture(view, middle_of(obj), size) if obj else None
         if middle is not None:
             draw.add_line(Vec(*middle), Vec(*at), ink, 2 * ui_scale)
         draw.add_circle_filled(Vec(*at), 4 * ui_scale, theme.color(theme.ACCENT))
@@ -128,16 +128,16 @@ class Marks:
 
 def where(request: FrameRequest, touched: RigidObject) -> np.ndarray:
     """(4, 4) where the object is drawn, else where it stands."""
-    for thing in request.scene.objects:
-        if thing.name == touched.item.name:
-            return thing.world_from_object.matrix()
+    for obj in request.scene.objects:
+        if obj.name == touched.item.name:
+            return obj.world_from_object.matrix()
     return touched.pose.matrix()
 
 
 def draw_label(label: Label, world: World, view: View, size: Size, ui_scale: float) -> None:
-    """What a thing has become, rising from it; nothing where the thing is gone."""
-    thing = world.objects.get(label.object)
-    at = on_picture(view, thing.pose.position, size) if thing else None
+    """What an object has become, rising from it; nothing where it is gone."""
+    obj = world.objects.get(label.object)
+    at = on_picture(view, obj.pose.position, size) if obj else None
     if at is not None:
         part = label.age_s / LABEL_S
         left = Vec(at[0], at[1] - (24 + RISE * part) * ui_scale)

@@ -111,7 +111,7 @@ class TwoPictures:
             self._target = None
 
     def release(self) -> None:
-        """What of the GPU is its own; the renderer belongs to whoever made it."""
+        """What of the GPU is its own; the renderer belongs to its maker."""
         self._release_target()
         self._resolve.release()
 

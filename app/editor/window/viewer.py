@@ -356,7 +356,7 @@ class Viewer:
             draw_brush(window.cursor, state.regions.brush * scale, erasing, scale)
 
     def show_scene(self) -> None:
-        """The state has another scene: a new camera, and whoever depends on it is told."""
+        """The state has another scene: a new camera, and the parts that depend on it hear of it."""
         self.viewpoint.start_anew()
         self.dial.forget()
         for changed in self.hooks.opened:

@@ -1,4 +1,4 @@
-"""Another scene beside the one that is open: a line parts the two pictures, likeness is told."""
+"""Another scene compared with the open one: a line parts the two pictures, PSNR is shown."""
 
 import time
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-// limits: what project_arena is told beside the splats, as rasterizer/project_arena.py packs it.
+// limits: what project_arena is given besides the splats, as rasterizer/project_arena.py packs it.
 // Reads:   nothing.
 // Defines: the places of a frame's limits, of a view, and the numbers of the gates.
 // Units:   pixels and metres; limits with _2 are squared, those with PER_ inverted, on the host.

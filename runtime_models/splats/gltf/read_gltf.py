@@ -24,7 +24,7 @@ FIRST, COLOR = f"{PREFIX}SH_DEGREE_0_COEF_0", "COLOR_0"
 NAME = "glTF"
 # Required extensions that do not touch what is read here: materials are ignored by the extension.
 HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_")
-ROW = 44  # bytes of a splat beside its harmonics
+ROW = 44  # bytes of a splat without its harmonics
 
 
 def is_gltf(head: bytes, path: Path) -> bool:

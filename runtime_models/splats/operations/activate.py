@@ -10,7 +10,7 @@ from shapeshift.runtime_models.rotation import normalize
 from shapeshift.runtime_models.splats.operations.rotate_splats import rotator
 from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats
 
-ODD = 140  # bytes of an odd splat's numbers in float64, beside two copies as they are filed
+ODD = 140  # bytes of an odd splat's numbers in float64, in addition to two copies as they are filed
 
 
 def activate(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawSplats]:

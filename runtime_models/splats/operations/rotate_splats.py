@@ -103,7 +103,7 @@ def half_turn_rotator(signs: np.ndarray, count: int) -> Callable[..., None]:
 def signs_of_harmonics(signs: np.ndarray, count: int) -> np.ndarray:
     """(count,) float32: of each basis function after half a turn of the world, itself or minus it.
 
-    Told by its values at directions before and after the turn.
+    Found from its values at directions before and after the turn.
     """
     directions = np.random.default_rng(0).normal(size=(8, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

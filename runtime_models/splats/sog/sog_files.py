@@ -18,7 +18,7 @@ EXPORT_AGAIN = "export it again"  # what to do about a wrong value
 LARGEST_META = 4 << 20  # bytes; real ones have some kilobytes
 LONGEST_NAME = 255  # bytes, of a file or a folder on disks
 SMALL = 1 << 16  # bytes that any file may have
-DECODED = 12  # bytes a pixel that a decoder and its copies take beside the pixels that come out
+DECODED = 12  # bytes a pixel that a decoder and its copies take besides the pixels that come out
 # Pillow on a damaged or hostile picture; DecompressionBombError is no ValueError.
 UNREADABLE = (
     UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError,

@@ -97,7 +97,7 @@ def is_spz(head: bytes) -> bool:
 def unpack_spz(data: bytes, file: str, memory: Account) -> Spz:
     """The container of a whole file in memory, nothing of it decompressed yet.  Raises BadFile.
 
-    What decompressing takes by itself is charged; the splats are for whoever takes them.
+    What decompressing takes by itself is charged; the splats are charged by their reader.
     """
     if data[:4] != MAGIC and data[:2] != GZIP:
         raise BadFile(f"{file} begins neither with NGSP nor as gzip, as an .spz does.")

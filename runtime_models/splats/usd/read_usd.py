@@ -91,7 +91,7 @@ def run(path: Path, made: Path, memory: Account) -> None:
     script, size = str(Path(__file__).with_name("usd_run.py")), path.stat().st_size
     said = made.with_name("said")
     command = [sys.executable, "-P", script, str(path.resolve()), str(made), str(memory.left)]
-    # Neither plugins nor search paths of whoever opens it, and no threads that reserve memory.
+    # Neither plugins nor search paths of the user, and no threads that reserve memory.
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("PXR_", "USD_", "TF_"))}
     kept |= {"PXR_WORK_THREAD_LIMIT": "1", "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}
     with open(said, "wb") as errors:

@@ -14,7 +14,7 @@ from shapeshift.app.charts import budget_chart
 from shapeshift.app.charts.budget import FrameBudget, choose, least_scale, read_budget
 from shapeshift.app.charts.budget_chart import (
     BudgetRow,
-    Drawn,
+    ChartSubject,
     budget_rows,
     read_rows,
     steady,
@@ -166,9 +166,9 @@ def test_measured_once_for_each_thing_that_matters(cache, monkeypatch):
     monkeypatch.setattr(budget_chart, "measure", lambda *what: calls.append(what) or list(ROWS))
     model = make_random_model(20)
     with Renderer(None) as renderer:
-        first = Drawn(Document.of(model), 0.0, (40, 30))
+        first = ChartSubject(Document.of(model), 0.0, (40, 30))
         assert budget_rows(renderer, None, first) == ROWS
-        again = Drawn(Document.of(make_random_model(20)), 0.0, (40, 30))
+        again = ChartSubject(Document.of(make_random_model(20)), 0.0, (40, 30))
         assert budget_rows(renderer, None, again) == ROWS
         assert len(calls) == 1
         others = [replace(first, x=0.5), replace(first, size=(30, 40)), replace(first, eyes=2),

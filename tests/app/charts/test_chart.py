@@ -259,15 +259,15 @@ def test_scenes_stand_side_by_side():
     large = replace(large, anchors=large.anchors * 3 + np.float32([50, 2, 1]))
     scene = side_by_side([Document.of(m) for m in (small, large, small)], 0.5)
     centres, radii = [], []
-    for thing in scene.objects:
-        centre, radius = frame_points(*model_points(thing.model))
-        centres.append(centre[0] + thing.world_from_object.position[0])
+    for obj in scene.objects:
+        centre, radius = frame_points(*model_points(obj.model))
+        centres.append(centre[0] + obj.world_from_object.position[0])
         radii.append(radius)
     assert np.array_equal(scene.objects[0].world_from_object.position, np.zeros(3))
     for i, gap in enumerate(np.diff(centres)):
         assert radii[i] + radii[i + 1] < gap < 1.2 * (radii[i] + radii[i + 1])
     assert scene.objects[0].model is scene.objects[2].model
-    assert [thing.x for thing in scene.objects] == [0.5] * 3
+    assert [obj.x for obj in scene.objects] == [0.5] * 3
 
 
 def test_near_and_far_are_in_the_scale_of_the_scene():

@@ -10,10 +10,10 @@ from shapeshift.app.charts.chart_settings import (
     NOT_READ,
     SETTINGS,
     Distances,
+    changed_settings,
     named_settings,
     render_settings,
     settings_of,
-    told_changes,
 )
 from shapeshift.app.charts.comparison import exact
 from shapeshift.app.errors import UsageError
@@ -86,6 +86,6 @@ def test_a_name_that_is_not_there_is_one_sentence():
 
 
 def test_told_changes():
-    assert told_changes(RenderSettings(background=(1, 1, 1))) == ""
-    told = told_changes(RenderSettings(min_alpha=2 / 255, key_bits=16, skip_unseen=True))
+    assert changed_settings(RenderSettings(background=(1, 1, 1))) == ""
+    told = changed_settings(RenderSettings(min_alpha=2 / 255, key_bits=16, skip_unseen=True))
     assert told == "min_alpha=0.0078431 key_bits=16 skip_unseen=True"

@@ -23,10 +23,10 @@ def scene(tmp_path) -> Path:
     sh = np.zeros((len(cloud.means), 1, 3), np.float32)
     write_ply(PlainSplats(*(np.float32(c) for c in cloud.columns), sh), tmp_path / "ball.ply")
     body = {"model": "ball.ply", "collider": "hulls"}
-    things = [{"name": name, **body} for name in ("one", "two", "a/b", "a:b")]
-    things[1]["x"] = 0.5
-    things.append({"name": "seen", "model": "ball.ply"})
-    (tmp_path / "room.scene.json").write_text(json.dumps({"objects": things}))
+    objects = [{"name": name, **body} for name in ("one", "two", "a/b", "a:b")]
+    objects[1]["x"] = 0.5
+    objects.append({"name": "seen", "model": "ball.ply"})
+    (tmp_path / "room.scene.json").write_text(json.dumps({"objects": objects}))
     return tmp_path / "room.scene.json"
 
 

@@ -96,8 +96,8 @@ def test_off_centre_stereo_from_our_own_list(scene, tmp_path):
     assert render(scene, "--camera", file, "--stereo", "0.3", "--out", tmp_path, *TINY) == 0
     (view,) = read_cameras(file, (40, 30))
     got = picture(tmp_path / "0000_x0.000.png")
-    thing = Scene((SceneObject("scene", read_model(scene)),))
-    halves = [reference_image(thing, eye)[..., :3] for eye in stereo_pair(view, 0.3)]
+    obj = Scene((SceneObject("scene", read_model(scene)),))
+    halves = [reference_image(obj, eye)[..., :3] for eye in stereo_pair(view, 0.3)]
     assert psnr(got, np.concatenate(halves, axis=1).clip(0, 1)) > 50
 
 

@@ -37,12 +37,12 @@ def test_the_picture_is_the_scenes_with_these_selectors(scene, tmp_path):
     model = read_model(scene)
     view = default_view(model, (40, 30))
     selectors = tuple(read_selector(text, STOPS, view.world_from_eye) for text in texts)
-    thing = SceneObject("scene", model, selectors=selectors)
-    assert len(np.unique(control_of(thing))) > 3
+    obj = SceneObject("scene", model, selectors=selectors)
+    assert len(np.unique(control_of(obj))) > 3
     from shapeshift.renderer.renderer import Renderer
 
     with Renderer(None) as renderer:
-        renderer.update(Scene((thing,)))
+        renderer.update(Scene((obj,)))
         renderer.draw([view])
         wanted = renderer.resolved()
     np.testing.assert_allclose(picture(tmp_path / "a"), wanted.clip(0, 1), atol=0.51 / 255)

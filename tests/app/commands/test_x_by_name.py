@@ -169,7 +169,7 @@ def test_the_viewer_and_the_headset_start_there(package, objects):
     def shown(*paths: Path, x: str) -> dict[str, float]:
         found = read_files(paths, lambda path, told: read_model(path), CameraReading(), None)
         scene, edited = opened_scene(found, x)
-        xs = {thing.name: thing.x for thing in scene.objects}
+        xs = {obj.name: obj.x for obj in scene.objects}
         assert {item.name: item.x for item in edited.file.all_items} == xs
         assert not edited.history.undoes
         return xs
@@ -181,5 +181,5 @@ def test_the_viewer_and_the_headset_start_there(package, objects):
     for path, x in ((package, {"random": 1.0}), (objects, {"cube": 1.0, "cloud": 0.0})):
         text = "Thermal" if path == package else "hot"
         _, editor = open_xr(path, ReadingOptions(), text)
-        assert {thing.name: thing.x for thing in editor.world.drawn().objects} == x
-        assert {thing.name: thing.x for thing in editor.scene.objects} == x
+        assert {obj.name: obj.x for obj in editor.world.drawn().objects} == x
+        assert {obj.name: obj.x for obj in editor.scene.objects} == x

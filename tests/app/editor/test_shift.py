@@ -30,8 +30,8 @@ def state() -> EditorState:
 
 
 def shown(state: EditorState) -> np.ndarray:
-    thing = state.scene.objects[0]
-    return thing.model.blend.weights(thing.x)
+    obj = state.scene.objects[0]
+    return obj.model.blend.weights(obj.x)
 
 
 def test_key_3_from_rgb_goes_to_opened_directly(state):

@@ -108,7 +108,7 @@ def test_a_scene_file_is_a_world_with_a_floor():
     document, editor = open_xr(DEMO, Options())
     world = editor.world
     assert document.floor_y == -0.7 and document.background_or(DARK) == DARK
-    named = {thing.name for thing in document.scene.objects}
+    named = {obj.name for obj in document.scene.objects}
     assert named == set(world.objects) >= {"cube", "ball", "ring", "plate"}
     eye = document.view((640, 360)).world_from_eye
     np.testing.assert_allclose(eye.position, (0.05, 0.5, 0.95))
@@ -119,8 +119,8 @@ def test_a_scene_file_is_a_world_with_a_floor():
 def test_a_package_alone_is_seen_and_not_touched():
     document, editor = open_xr(ROOT / "assets" / "workshop.shift", Options())
     world = editor.world
-    (thing,) = world.drawn().objects
-    assert (thing.name, document.floor_y) == ("workshop", None)
+    (obj,) = world.drawn().objects
+    assert (obj.name, document.floor_y) == ("workshop", None)
     world.advance(0.05)
-    assert world.drawn().objects[0].world_from_object == thing.world_from_object
+    assert world.drawn().objects[0].world_from_object == obj.world_from_object
     assert world.nearest(np.zeros(3), 10.0) is None

@@ -41,8 +41,8 @@ def test_a_hidden_object_is_not_the_first_whose_slider_is_shown():
 
 def test_a_ring_ends_where_it_begins():
     states = (State("normal", 0.0), State("fire", 0.5))
-    thing = some_things().world.objects["leg"]
-    ring = replace(thing, item=item("leg", states=states, ring=True))
+    obj = some_things().world.objects["leg"]
+    ring = replace(obj, item=item("leg", states=states, ring=True))
     assert [(stop.name, stop.x) for stop in named_stops(ring.item, ring.drawn.model)] == [
         ("normal", 0.0), ("fire", 0.5), ("normal", 1.0)
     ]  # fmt: skip
@@ -71,8 +71,8 @@ def test_a_palette_is_another_look_of_what_the_headset_draws():
     state.editor.choose_palette("viridis")
     state.world.control("leg", 0.6)
     state.touch.advance(0.05)
-    (thing,) = state.editor.scene.objects
-    assert thing.x == 0.6 and thing.model.stops[2].palette == "viridis"
+    (obj,) = state.editor.scene.objects
+    assert obj.x == 0.6 and obj.model.stops[2].palette == "viridis"
 
 
 @pytest.mark.parametrize(

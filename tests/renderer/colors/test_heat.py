@@ -81,9 +81,9 @@ def test_of_several_thermal_stops_each_has_its_own_palette():
 
 def test_a_part_with_a_control_of_its_own_has_heat_of_its_own():
     part = Painted(np.float32([1, 0.5, 0] * 20), 0.5)
-    thing = scene_of(model(), selectors=(part,))
+    obj = scene_of(model(), selectors=(part,))
     x = model().blend.between(0.0, 0.5, part.weight)
-    found = false_colors(thing, [x])
+    found = false_colors(obj, [x])
     assert found.way == BESIDE
     np.testing.assert_allclose(found.shades[0].heats[0].weights, part.weight)
     np.testing.assert_allclose(found.shades[0].rest, np.tile([1, 0, 0, 0], (60, 1))[:, :4] * (

@@ -43,9 +43,9 @@ def seen(
     """For each view: counts, records (N, 8) uint32, keys (N,) after one projection of all views."""
     counts = [o.model.splat_count for o in scene.objects]
     with Arena(gpu, counts) as arena:
-        for i, thing in enumerate(scene.objects):
-            object_from_world = np.linalg.inv(thing.world_from_object.matrix())
-            splats = evaluate(thing.model, thing.x, (object_from_world @ [*EYE, 1])[:3])
+        for i, obj in enumerate(scene.objects):
+            object_from_world = np.linalg.inv(obj.world_from_object.matrix())
+            splats = evaluate(obj.model, obj.x, (object_from_world @ [*EYE, 1])[:3])
             arena.write_geometry(i, splats.means, splats.scales, splats.wxyz, splats.opacity)
             arena.write_color(i, splats.color)
         nowhere = np.full((4, 4), np.nan)

@@ -206,8 +206,8 @@ def fragments(scene: Scene, view: View, settings: RenderSettings) -> np.ndarray:
     """(H, W) how many splats have alpha >= min_alpha there, in float64."""
     y, x = np.mgrid[: view.size[1], : view.size[0]] + 0.5
     number = np.zeros(y.shape)
-    for thing in scene.objects:
-        t = gate_object(thing, view, settings, np.zeros(3))
+    for obj in scene.objects:
+        t = gate_object(obj, view, settings, np.zeros(3))
         for i in np.flatnonzero(t.reason == 0):
             dx, dy = x - t.mean_px[i, 0], y - t.mean_px[i, 1]
             (a, b), (_, c) = np.linalg.inv(t.covariance[i])

@@ -168,7 +168,7 @@ def test_quads_draw_the_oracles_picture(ctx, mlps):
         made = renderer.drawing.allocations
         for step in range(1, 4):
             ball = replace(scene.objects[0].selectors[0], radius=0.5 + 0.05 * step)
-            things = (replace(scene.objects[0], selectors=(ball,)), *scene.objects[1:])
-            renderer.update(Scene(things))
+            objects = (replace(scene.objects[0], selectors=(ball,)), *scene.objects[1:])
+            renderer.update(Scene(objects))
             renderer.draw([VIEW])
         assert renderer.drawing.allocations == made, "a selector that moves allocates nothing"

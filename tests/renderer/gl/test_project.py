@@ -81,8 +81,8 @@ def test_records_are_the_float64_projection(gpu, n, tangents):
     pose = Pose(np.array([0.3, -0.2, 0.5]), np.array([0.8, 0.36, 0.0, 0.48]))
     eye = np.linalg.inv(pose.matrix()) @ [*view.world_from_eye.position, 1]
     got = projected(gpu, evaluate(model, 1.0, eye[:3]), view, pose=pose.matrix())
-    thing = SceneObject("thing", model, pose, x=1.0)
-    truth = gate_object(thing, view, RenderSettings(), view.world_from_eye.position)
+    obj = SceneObject("thing", model, pose, x=1.0)
+    truth = gate_object(obj, view, RenderSettings(), view.world_from_eye.position)
     rows = np.flatnonzero(truth.reason == 0)
     np.testing.assert_array_equal(got["index"], rows)
     depth, mean_px, covariance = truth.depth, truth.mean_px, truth.covariance

@@ -46,17 +46,17 @@ def draw(
     unit: float = 1.0,
 ) -> np.ndarray:
     """(H, W, 4) of one view by the GL passes."""
-    models = [thing.model for thing in scene.objects]
+    models = [obj.model for obj in scene.objects]
     with (
         Arena(gpu, [m.splat_count for m in models]) as arena,
         Decoder(gpu, arena, models) as decoder,
         Splatter(gpu, target, unit) as splatter,
     ):
-        poses = [thing.world_from_object.matrix() for thing in scene.objects]
-        for i, (thing, pose) in enumerate(zip(scene.objects, poses, strict=True)):
+        poses = [obj.world_from_object.matrix() for obj in scene.objects]
+        for i, (obj, pose) in enumerate(zip(scene.objects, poses, strict=True)):
             eye = np.linalg.inv(pose) @ [*view.world_from_eye.position, 1]
-            decoder.geometry(i, thing.x)
-            decoder.color(i, thing.x, eye[:3])
+            decoder.geometry(i, obj.x)
+            decoder.color(i, obj.x, eye[:3])
         arena.set_poses(poses)
         Projector(gpu).project(arena, [view], settings)
         Sorter(gpu, sort).sort(arena, settings.key_bits)

@@ -111,7 +111,7 @@ def test_reasons_of_the_debug_pictures_are_the_oracle_s(renderer, name, limits):
     renderer.update(scene)
     renderer.draw([view])
     points = renderer.drawing.splat_points()
-    flags = tuple(thing.model.antialiased for thing in scene.objects)
+    flags = tuple(obj.model.antialiased for obj in scene.objects)
     reason, _, _ = classify(points, object_poses(scene), view, settings, flags)
     off = np.count_nonzero(reason != reference_reasons(scene, view, settings))
     assert off <= (2 if name == "flat ones" else 0)

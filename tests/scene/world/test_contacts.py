@@ -56,8 +56,8 @@ def test_in_a_ring_and_in_a_hand_the_engines_count_stays():
 @pytest.mark.parametrize("hulls", [1, 8, 16])
 def test_in_a_tower_each_pair_bears_what_stands_on_it(hulls):
     physics = Physics(floor_y=0)
-    things = cup(hulls) if hulls > 1 else [box(0.06, 0.06, 0.06)]
-    tower = [physics.add_body(things, at(0, 0.06 + 0.1202 * i, 0), 0.4) for i in range(3)]
+    objects = cup(hulls) if hulls > 1 else [box(0.06, 0.06, 0.06)]
+    tower = [physics.add_body(objects, at(0, 0.06 + 0.1202 * i, 0), 0.4) for i in range(3)]
     run(physics, 0.3)
     told: dict[tuple[int, int], list[float]] = {}
     for _ in range(20):

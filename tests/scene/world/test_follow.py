@@ -17,7 +17,7 @@ pytest.importorskip("rapier3d")
 def edited(world: World, *items, background=None) -> World:
     """The world after its file has these items."""
     file = SceneFile(folder=None, items=items, background=background, floor_y=0.0)
-    names = [thing.name for thing in file.all_items]
+    names = [obj.name for obj in file.all_items]
     follow(world, file, dict.fromkeys(names, model()), dict.fromkeys(names, BOX))
     return world
 
@@ -41,7 +41,7 @@ def test_what_was_not_edited_stays_where_it_fell():
     assert (drawn.x, drawn.visible, world.objects["b"].body) == (0.5, False, body)
     assert list(place(world, "b")) == list(lies)
     before = world.snapshot()
-    edited(world, *(thing.item for thing in world.objects.values()))
+    edited(world, *(obj.item for obj in world.objects.values()))
     assert world.snapshot().objects == before.objects
 
 
@@ -52,10 +52,10 @@ def test_objects_come_go_and_change_their_order():
     world.grab("right")
     edited(world, c, b)
     assert list(world.objects) == ["c", "b"] and world.held("right") is None
-    assert [thing.label for thing in world.drawn().objects] == [1, 2]
+    assert [obj.label for obj in world.drawn().objects] == [1, 2]
     table = item("background", static=True, position=(0, -1, 0))
     edited(world, a, b, c, background=table)  # an undo
-    assert [(thing.name, thing.label) for thing in world.drawn().objects] == [
+    assert [(obj.name, obj.label) for obj in world.drawn().objects] == [
         ("background", 0), ("a", 1), ("b", 2), ("c", 3)
     ]  # fmt: skip
     world.step()
@@ -71,7 +71,7 @@ def test_a_new_name_keeps_body_pose_and_hand():
     edited(world, replace(a, name="cup"), world.objects["b"].item)
     assert list(world.objects) == ["cup", "b"] and world.held("right") == "cup"
     assert world.objects["cup"].body == body and list(place(world, "cup")) == list(lies)
-    assert [thing.name for thing in world.drawn().objects] == ["cup", "b"]
+    assert [obj.name for obj in world.drawn().objects] == ["cup", "b"]
     assert world.aim(lies + np.array([0, 1, 0]), (0, -1, 0)).object == "cup"
 
 

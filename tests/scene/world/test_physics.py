@@ -257,7 +257,7 @@ def test_what_lay_on_a_removed_thing_falls():
     physics.remove(shelf)
     run(physics, 0.5)
     assert physics.pose(body).position[1] < -0.5
-    with pytest.raises(ValueError, match="no thing 1"):
+    with pytest.raises(ValueError, match="no object 1"):
         physics.pose(shelf)
 
 

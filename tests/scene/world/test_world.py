@@ -27,7 +27,7 @@ pytest.importorskip("rapier3d")
 def thought(*items, **file) -> World:
     """A world of points that fall."""
     scene = SceneFile(folder=Path(), items=items, **file)
-    names = [thing.name for thing in scene.all_items]
+    names = [obj.name for obj in scene.all_items]
     return World(scene, dict.fromkeys(names, model()), dict.fromkeys(names, BOX), Points())
 
 
@@ -244,15 +244,15 @@ def test_objects_come_go_are_placed_and_hidden():
     world.add(item("b", position=(1, 1, 0)), model(), BOX)
     with pytest.raises(ValueError, match="there is an object 'b'"):
         world.add(item("b"), model(), BOX)
-    assert [thing.label for thing in world.drawn().objects] == [1, 2]
+    assert [obj.label for obj in world.drawn().objects] == [1, 2]
     world.move_object("b", at(2, 3, 4))
     world.show("b", False)
-    thing = world.drawn().objects[1]
-    assert list(thing.world_from_object.position) == [2, 3, 4] and not thing.visible
+    obj = world.drawn().objects[1]
+    assert list(obj.world_from_object.position) == [2, 3, 4] and not obj.visible
     assert world.aim((2, 9, 4), (0, -1, 0)).object == "b"  # hidden, but there
     world.remove("b")
     assert world.aim((2, 9, 4), (0, -1, 0)).object == FLOOR_NAME
-    assert [thing.name for thing in world.drawn().objects] == ["a"]
+    assert [obj.name for obj in world.drawn().objects] == ["a"]
     for deed in (world.remove, world.object_named, lambda name: world.control(name, 0.5)):
         with pytest.raises(ValueError, match="there is no object 'b'; there are a"):
             deed("b")

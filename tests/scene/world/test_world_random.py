@@ -117,10 +117,10 @@ def check(world: World, items: dict) -> None:
         held = world.held(hand)
         assert (held is None) == (hand not in world.holds)
         assert held is None or (world.objects[held].moves and hand in world.hands)
-    for thing in world.objects.values():
-        assert np.isfinite(thing.pose.position).all() and 0 <= thing.reaction_state.x <= 1
+    for obj in world.objects.values():
+        assert np.isfinite(obj.pose.position).all() and 0 <= obj.reaction_state.x <= 1
     drawn = world.drawn()
-    assert [thing.name for thing in drawn.objects] == list(items)
+    assert [obj.name for obj in drawn.objects] == list(items)
     assert world.drawn() is drawn
 
 

@@ -34,10 +34,10 @@ def viewer_of(window, found: OpenedFiles, folder: Path) -> Viewer:
 
 
 def names(viewer) -> list[str]:
-    return [thing.name for thing in viewer.state.scene.objects]
+    return [obj.name for obj in viewer.state.scene.objects]
 
 
-def thing(viewer, name: str):
+def obj(viewer, name: str):
     return viewer.state.scene.objects[names(viewer).index(name)]
 
 

@@ -75,7 +75,7 @@ def check_counts(told: dict, want: dict, name: str) -> None:
 
 def decoded_all(scene: Scene) -> Scene:
     """Nothing hidden: what never showed was never decoded, and counts as absent."""
-    return Scene(tuple(replace(thing, visible=True) for thing in scene.objects))
+    return Scene(tuple(replace(obj, visible=True) for obj in scene.objects))
 
 
 def check_frame(renderer: Renderer, name: str, limits: str, least_db: float) -> None:

@@ -31,8 +31,8 @@ def dealt(cloud: SplatLayers, count: int) -> list[SplatLayers]:
 def in_objects(clouds: list[SplatLayers], poses: list[Pose] | None = None) -> Scene:
     still = Pose(np.zeros(3), UPRIGHT)
     placed = zip(clouds, poses or [still] * len(clouds), strict=True)
-    things = [SceneObject(f"object {i}", c, p, label=i + 1) for i, (c, p) in enumerate(placed)]
-    return Scene(tuple(things))
+    objects = [SceneObject(f"object {i}", c, p, label=i + 1) for i, (c, p) in enumerate(placed)]
+    return Scene(tuple(objects))
 
 
 def exact_cloud(count: int, seed: int = 0) -> SplatLayers:

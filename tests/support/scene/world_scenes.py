@@ -118,7 +118,7 @@ def at(*place: float, wxyz=UP) -> Pose:
 def real(*items, floor_y: float | None = 0.0, **file) -> World:
     """A world of boxes 10 cm wide with the engine in it."""
     scene = SceneFile(folder=Path(), items=items, floor_y=floor_y, **file)
-    names = [thing.name for thing in scene.all_items]
+    names = [obj.name for obj in scene.all_items]
     return World(scene, dict.fromkeys(names, model()), dict.fromkeys(names, BOX))
 
 

@@ -22,8 +22,8 @@ FORMAT_TIPS = {
 
 def draw_export(exporting: Exporting, state: EditorState, ui_scale: float) -> None:
     """Format, what, SH degree, the button, or how far it is."""
-    things = state.scene.objects
-    if not things:
+    objects = state.scene.objects
+    if not objects:
         imgui.text_disabled("There is nothing to export.")
         return
     imgui.push_item_width(-1)

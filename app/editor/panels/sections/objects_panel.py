@@ -100,24 +100,24 @@ def _row(objects: ObjectEdits, index: int, ui_scale: float) -> None:
     state = objects.state
     if index >= len(state.scene.objects):
         return
-    thing = state.scene.objects[index]
+    obj = state.scene.objects[index]
     imgui.push_id(index)
-    changed, seen = imgui.checkbox("##seen", thing.visible)
-    tip("Seen or hidden; a hidden thing is touched as before.", ui_scale)
+    changed, seen = imgui.checkbox("##seen", obj.visible)
+    tip("Seen or hidden; a hidden object is touched as before.", ui_scale)
     if changed:
         word = "show" if seen else "hide"
-        objects.edit(edits.hide, thing.name, not seen, what=f"{word} {thing.name}")
+        objects.edit(edits.hide, obj.name, not seen, what=f"{word} {obj.name}")
     imgui.same_line()
-    chosen = thing.name == state.chosen
-    ink = theme.ACCENT if chosen else theme.TEXT if thing.visible else theme.MUTED
+    chosen = obj.name == state.chosen
+    ink = theme.ACCENT if chosen else theme.TEXT if obj.visible else theme.MUTED
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*ink, 1))
     width = imgui.get_content_region_avail().x - 56 * ui_scale
-    if imgui.selectable(f"{thing.name}###name", chosen, 0, Vec(width, 0))[0]:
-        state.chosen = "" if chosen else thing.name
+    if imgui.selectable(f"{obj.name}###name", chosen, 0, Vec(width, 0))[0]:
+        state.chosen = "" if chosen else obj.name
     imgui.pop_style_color()
-    tip(f"{thing.name}: {number(thing.model.splat_count)} splats", ui_scale)
+    tip(f"{obj.name}: {number(obj.model.splat_count)} splats", ui_scale)
     imgui.same_line()
-    right_aligned(f"x {thing.slider_x:.2f}")
+    right_aligned(f"x {obj.slider_x:.2f}")
     imgui.pop_id()
 
 
@@ -134,7 +134,7 @@ def _chosen(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
             objects.state.handles = "" if lit else mode
         if lit:
             imgui.pop_style_color()
-        tip("Handles on the thing in the picture. Key M.", ui_scale)
+        tip("Handles on the object in the picture. Key M.", ui_scale)
         if mode == MOVE:
             imgui.same_line()
     _place(objects, ui_scale)
@@ -183,7 +183,7 @@ def _body(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     names = ["cannot be touched", "touched: its splats", f"touched: {mesh}"][: len(kinds)]
     now = item.collider or NONE
     chosen = choice("collider", now, kinds, names)
-    tip("What hands and other things meet: nothing, or pieces made from its splats.", ui_scale)
+    tip("What hands and other objects touch: nothing, or pieces made from its splats.", ui_scale)
     if chosen != now:
         collider = None if chosen == NONE else chosen
         objects.change(item, f"body of {item.name}", collider=collider)

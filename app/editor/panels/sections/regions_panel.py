@@ -94,14 +94,14 @@ def _row(state: EditorState, number: int, ui_scale: float) -> None:
 def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
     """Every control of the region that is being edited."""
     regions, number = state.regions, state.regions.chosen
-    things = state.scene.objects
+    objects = state.scene.objects
     changed, name = imgui.input_text("##name", region.name)
     tip("Its name.", ui_scale)
     if changed:
         regions.edit(number, name=name[:LONGEST_NAME])
-    if len(things) > 1 and region.kind != "painted":
-        names = [f"of {thing.name}" for thing in things]
-        index = choice("object", region.index, range(len(things)), names)
+    if len(objects) > 1 and region.kind != "painted":
+        names = [f"of {obj.name}" for obj in objects]
+        index = choice("object", region.index, range(len(objects)), names)
         tip("The object whose part it is.", ui_scale)
         regions.edit(number, index=index)
     if region.is_placed:
@@ -111,7 +111,7 @@ def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
     border = slider("border", region.border, 0.0, far, "border: %.3f m", "border: sharp")
     tip("Over this far x goes over from inside to outside; at 0 shapes may tear.", ui_scale)
     regions.edit(number, border=border)
-    stops, blend = state.stops(region.index), things[region.index].model.blend
+    stops, blend = state.stops(region.index), objects[region.index].model.blend
     moved = track(stops, (blend.slider_x(region.x),), state.grip, 46 * ui_scale)
     if moved.knob is not None:
         regions.edit(number, x=moved.x)

@@ -61,7 +61,7 @@ def _stop_buttons(state: EditorState, index: int, ui_scale: float) -> None:
 
 
 def pace_button(state: EditorState, index: int, width: float, words: str, ui_scale: float) -> None:
-    """The seconds from stop to stop; a click opens all that playing can be told."""
+    """The seconds from stop to stop; a click opens all settings of playing."""
     seconds = f"{state.sweeps[index].leg_s:.3g} s"
     fits = imgui.calc_text_size(f"{seconds} {words}").x < width
     label = f"{seconds} {words}" if words and fits else seconds

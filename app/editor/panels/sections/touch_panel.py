@@ -22,7 +22,7 @@ def draw_touch(touch: TouchState, ui_scale: float, colliders: bool = True) -> No
     world = touch.living
     play = "Play" if world.paused else "Pause"
     tips = {
-        f"{play}###play": "Key T. While things move, drag one to carry it.",
+        f"{play}###play": "Key T. While objects move, drag one to carry it.",
         "Step": "One step of 1/90 s. Shift+T.",
         "Put back": "Everything where it was before it was touched. Key R.",
     }
@@ -43,16 +43,16 @@ def draw_touch(touch: TouchState, ui_scale: float, colliders: bool = True) -> No
 
 def pad_object(touch: TouchState) -> str | None:
     """Whose pad is shown: of those that have one the chosen object, else the first."""
-    names = [n for n, thing in touch.living.objects.items() if thing.item.two_axes is not None]
+    names = [n for n, obj in touch.living.objects.items() if obj.item.two_axes is not None]
     chosen = touch.chosen
     return chosen if chosen in names else names[0] if names else None
 
 
 def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> None:
     """A square to drag in: to the sides balance -1 to 1, upwards power 0 to 1."""
-    thing = touch.living.objects[name]
+    obj = touch.living.objects[name]
     balance, power = touch.pads[name] = pad_of(
-        axes, thing.machine.blend.slider_x(thing.reaction_state.x), touch.pads.get(name, (0.0, 1.0))
+        axes, obj.machine.blend.slider_x(obj.reaction_state.x), touch.pads.get(name, (0.0, 1.0))
     )
     imgui.text_disabled(f"{name}: balance {balance:+.2f}, power {power:.2f}")
     corner = imgui.get_cursor_screen_pos()
@@ -66,14 +66,14 @@ def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> No
         balance = min(max((mouse.x - middle) / half, -1.0), 1.0)
         power = min(max((low - mouse.y) / reach, 0.0), 1.0)
         touch.pads[name] = balance, power
-        touch.control(name, axes.x(balance, power, thing.machine.blend))
+        touch.control(name, axes.x(balance, power, obj.machine.blend))
     tip("To the sides: which of two; upwards: how much of it.", ui_scale)
     draw = imgui.get_window_draw_list()
     end, line = Vec(corner.x + width, corner.y + height), theme.color(theme.TRACK, 0.8)
     draw.add_rect_filled(corner, end, theme.color(theme.RAISED), 4 * ui_scale)
     draw.add_line(Vec(middle, low - reach), Vec(middle, low), line, ui_scale)
     draw.add_line(Vec(middle - half, low), Vec(middle + half, low), line, ui_scale)
-    for side, word in zip((-1, 1), side_names(thing, axes), strict=True):
+    for side, word in zip((-1, 1), side_names(obj, axes), strict=True):
         size = imgui.calc_text_size(word)
         left = corner.x + inset / 2 if side < 0 else end.x - inset / 2 - size.x
         draw.add_text(Vec(left, low - size.y - inset / 2), theme.color(theme.MUTED), word)
@@ -83,9 +83,9 @@ def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> No
     draw.add_circle_filled(knob, 3 * ui_scale, theme.color(theme.SURFACE))
 
 
-def side_names(thing: RigidObject, axes: TwoAxes) -> tuple[str, str]:
+def side_names(obj: RigidObject, axes: TwoAxes) -> tuple[str, str]:
     """What is at both sides: a state or a stop that lies there, "" where none does."""
-    stops = named_stops(thing.item, thing.drawn.model)
+    stops = named_stops(obj.item, obj.drawn.model)
     below, above = (next((s.name for s in stops if s.x == x), "") for x in (axes.below, axes.above))
     return below, above
 

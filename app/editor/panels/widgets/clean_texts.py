@@ -52,7 +52,7 @@ def cleaning(function, make):
 
 
 def listed(function):
-    """The function, which tells whoever lists items where its item lies."""
+    """The function; afterwards the panel knows where its item lies."""
 
     @functools.wraps(function, assigned=("__doc__", "__name__"))
     def call(label, *arguments, **named):

@@ -61,7 +61,7 @@ def right_aligned(text: str) -> None:
 
 def tip(text: str, ui_scale: float) -> None:
     """Explains the item before it when the mouse rests there, also when it is disabled; a ray
-    never rests, and has no keys to be told of.
+    never rests, and has no keys to be named.
     """
     rests = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
     if not (theme.has_keys() and imgui.is_item_hovered(rests)):

@@ -46,7 +46,7 @@ def has_keys() -> bool:
 def apply(ui_scale: float, pixels_per_unit: float, keys: bool = True) -> None:
     """Styles the current ImGui context; fonts are rastered at the density of the framebuffer.
 
-    Between frames alone, and whoever draws needs the texture of the fonts anew.  Without `keys`
+    Between frames alone, and the drawing needs the texture of the fonts anew.  Without `keys`
     a ray or a finger points at it: all that can be hit is larger.
     """
     io = imgui.get_io()

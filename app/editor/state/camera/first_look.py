@@ -13,7 +13,7 @@ from shapeshift.scene.scene import Scene
 
 @dataclass(frozen=True)
 class FirstLook:
-    """What was found beside a scene that tells from where to look."""
+    """What was found next to a scene file that says from where to look."""
 
     home: View | None = None  # on a floor
     front: float | None = None  # the side that was photographed, radians about +Y from +Z

@@ -59,7 +59,8 @@ class Steps:
     def step(self, by: int, now: View) -> bool:
         """To the next (1) or the one before (-1), from the picture `now`; False without cameras.
 
-        Whoever had left a camera comes back to it first when going back, else goes on.
+        After a free movement, a step back returns to the camera that was left; a step on goes to
+        the next one.
         """
         if not self.count:
             return False

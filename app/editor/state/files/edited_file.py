@@ -124,14 +124,14 @@ def edited_from_file(path: Path, file: SceneFile, sources: Sequence[Source]) -> 
 def edited_from_scene(scene: Scene, sources: Sequence[Source]) -> EditedFile:
     """What was opened without a scene file, as one that is not saved yet."""
     items, by_key = [], {}
-    for number, thing in enumerate(scene.objects):
-        source = sources[number] if number < len(sources) else Source(Path(thing.name), thing.model)
+    for number, obj in enumerate(scene.objects):
+        source = sources[number] if number < len(sources) else Source(Path(obj.name), obj.model)
         item = replace(
             item_of(source),
-            name=thing.name,
-            position=three(thing.world_from_object.position),
-            wxyz=four(thing.world_from_object.wxyz),
-            x=thing.x,
+            name=obj.name,
+            position=three(obj.world_from_object.position),
+            wxyz=four(obj.world_from_object.wxyz),
+            x=obj.x,
         )
         items.append(item)
         by_key[key_of(item)] = source

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
-EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index
+EVERYTHING, REGIONS = -1, -2  # what is exported, other than one object by its index
 
 
 class Exporting:
@@ -50,7 +50,7 @@ class Exporting:
         values, labels = [EVERYTHING], ["everything"]
         if len(state.scene.objects) > 1:
             values += range(len(state.scene.objects))
-            labels += [f"{i + 1}  {thing.name}" for i, thing in enumerate(state.scene.objects)]
+            labels += [f"{i + 1}  {obj.name}" for i, obj in enumerate(state.scene.objects)]
         if any(region.enabled for region in state.regions.items):
             values.append(REGIONS)
             labels.append("inside the regions")
@@ -58,17 +58,17 @@ class Exporting:
 
     def parts(self) -> list[Part]:
         """The objects as they are shown now, or what lies in their regions."""
-        things = self._state.shown(self._viewpoint.view()).objects
+        objects = self._state.shown(self._viewpoint.view()).objects
         if self.what == EVERYTHING:
-            return [Part(thing) for thing in things if thing.visible]
+            return [Part(obj) for obj in objects if obj.visible]
         if self.what == REGIONS:
-            return [Part(thing, thing.selectors) for thing in things if thing.selectors]
-        return [Part(things[self.what])]
+            return [Part(obj, obj.selectors) for obj in objects if obj.selectors]
+        return [Part(objects[self.what])]
 
     def start(self) -> None:
         """Begins to write; what is moved meanwhile does not show in the file."""
         parts, state = self.parts(), self._state
-        seen = any(follows_eye(part.thing.model) for part in parts)
+        seen = any(follows_eye(part.obj.model) for part in parts)
         eye = three(self._viewpoint.view().world_from_eye.position) if seen else None
         look = ExportLook(self.sh_degree, self.palette, eye, three(state.origin))
         try:
@@ -101,9 +101,9 @@ class Exporting:
 def claim_name(folder: Path, parts: list[Part], ending: str) -> Path:
     """An empty file named after the scene and x; never one that is there."""
     make_folder(folder)
-    thing = parts[0].thing
+    obj = parts[0].obj
     more = f" and {len(parts) - 1} more" * (len(parts) > 1)
-    name = f"{file_name(thing.name)}{more}-x{thing.slider_x:.2f}"
+    name = f"{file_name(obj.name)}{more}-x{obj.slider_x:.2f}"
     count = 1
     while True:
         path = folder / f"{name}{f'-{count}' * (count > 1)}{ending}"

@@ -54,7 +54,7 @@ def repair_notes(found: OpenedFiles) -> str:
 
 
 def first_look(found: OpenedFiles) -> FirstLook:
-    """What lies beside the first scene and tells from where to look: a floor, cameras of a side."""
+    """What lies next to the first scene and says from where to look: a floor, cameras of a side."""
     if not found.sources:
         return FirstLook()
     model, home, front = found.sources[0].model, None, None

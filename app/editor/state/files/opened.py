@@ -46,7 +46,7 @@ class OpenedFiles:
 
     sources: tuple[Source, ...] = ()  # of a scene file: its objects, the background first
     file: SceneFile | None = None  # the scene file that was among them
-    path: Path | None = None  # of that
+    path: Path | None = None  # of the scene file
     cameras: CameraList | None = None
     floor: CameraList | None = None  # where to stand, of splatapult's NAME_vr.json
     notes: tuple[str, ...] = ()
@@ -121,7 +121,7 @@ def read_scene(
 def read_beside(path: Path, reading: CameraReading) -> tuple[list[CameraList], list[str]]:
     """Cameras nobody asked for: at most one list, and a note where they cannot be read.
 
-    Their own notes are told once somebody steps to them.
+    Their own notes are shown once somebody steps to them.
     """
     try:
         cameras = read_camera_list(path, reading)

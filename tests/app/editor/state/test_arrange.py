@@ -67,7 +67,7 @@ def cube() -> Collider:
 
 
 def names(state: EditorState) -> list[str]:
-    return [thing.name for thing in state.scene.objects]
+    return [obj.name for obj in state.scene.objects]
 
 
 def same_as_file(state: EditorState) -> None:
@@ -75,10 +75,10 @@ def same_as_file(state: EditorState) -> None:
     items = state.edited.file.all_items
     assert names(state) == [item.name for item in items]
     assert len(state.filed) == len(state.sweeps) == len(state.sources) == len(items)
-    for thing, item, source in zip(state.scene.objects, items, state.sources, strict=True):
-        assert (thing.x, thing.visible, thing.selectors) == (item.x, item.visible, item.selectors)
-        assert tuple(thing.world_from_object.position) == item.position
-        assert source.model is thing.model is state.edited.model(item)
+    for obj, item, source in zip(state.scene.objects, items, state.sources, strict=True):
+        assert (obj.x, obj.visible, obj.selectors) == (item.x, item.visible, item.selectors)
+        assert tuple(obj.world_from_object.position) == item.position
+        assert source.model is obj.model is state.edited.model(item)
 
 
 def edit(state: EditorState, change, *values) -> None:
@@ -163,7 +163,7 @@ def test_regions_go_with_their_objects(state):
     edit(state, edits.remove, "cube")
     assert [region.index for region in state.regions.items] == [2]
     view = state.first_view((64, 64))
-    assert [len(thing.selectors) for thing in state.shown(view).objects] == [0, 0, 1, 0]
+    assert [len(obj.selectors) for obj in state.shown(view).objects] == [0, 0, 1, 0]
     file = edits.change(state.edited.file, "ring", selectors=(inside,))
     arrange.edit(state, file, "a selector")
     assert len(state.shown(view).objects[2].selectors) == 2  # the file's and the region's
@@ -177,15 +177,15 @@ def test_a_hand_on_the_slider_is_a_look_that_is_saved_but_not_undone(plain):
     arrange.steer(plain, 0, 0.7)
     arrange.all_go_to_stop(plain, 1)
     plain.advance(1.0)
-    assert [thing.x for thing in plain.scene.objects] == [1.0, 1.0]
+    assert [obj.x for obj in plain.scene.objects] == [1.0, 1.0]
     assert arrange.undo(plain) == "hide"
     same_as_file(plain)
-    assert [thing.x for thing in plain.scene.objects] == [1.0, 1.0]
-    assert all(thing.visible for thing in plain.scene.objects) and arrange.undo(plain) == ""
+    assert [obj.x for obj in plain.scene.objects] == [1.0, 1.0]
+    assert all(obj.visible for obj in plain.scene.objects) and arrange.undo(plain) == ""
     arrange.steer(plain, 1, 0.2)
     assert arrange.redo(plain) == "hide"  # a look between them takes nothing away
     same_as_file(plain)
-    assert [(thing.x, thing.visible) for thing in plain.scene.objects] == [
+    assert [(obj.x, obj.visible) for obj in plain.scene.objects] == [
         (1.0, True),
         (0.2, False),
     ]
@@ -375,10 +375,10 @@ def same_in_world(state: EditorState) -> None:
     """The world has the same objects in the same order, places, values and bodies."""
     items = state.edited.file.all_items
     assert list(state.world.objects) == [item.name for item in items]
-    for item, thing in zip(items, state.world.objects.values(), strict=True):
-        assert thing.item is item and thing.reaction_state.x == item.x
-        assert (thing.body is not None) == (item.collider is not None)
-        assert thing.pose.position == pytest.approx(item.position, abs=1e-5)
+    for item, obj in zip(items, state.world.objects.values(), strict=True):
+        assert obj.item is item and obj.reaction_state.x == item.x
+        assert (obj.body is not None) == (item.collider is not None)
+        assert obj.pose.position == pytest.approx(item.position, abs=1e-5)
 
 
 def test_an_edit_that_cannot_be_leaves_all_as_it_was(state):

@@ -37,7 +37,7 @@ def edited(*items: SceneItem) -> EditedFile:
     return EditedFile(History.of(file), saved=file, sources=sources)
 
 
-def thing(name: str, x: float = 0.0, collider: str | None = HULLS) -> SceneItem:
+def obj(name: str, x: float = 0.0, collider: str | None = HULLS) -> SceneItem:
     return SceneItem(name=name, model="a.ply", x=x, collider=collider)
 
 
@@ -70,17 +70,17 @@ def until_there(bodies: Bodies, of: EditedFile) -> None:
 
 def test_one_collider_serves_all_that_are_alike(made):
     bodies = Bodies()
-    of = edited(thing("a"), thing("b"), thing("c", x=1.0), thing("d", collider=None))
+    of = edited(obj("a"), obj("b"), obj("c", x=1.0), obj("d", collider=None))
     until_there(bodies, of)
     assert made == [("a", 0.0), ("c", 1.0)]  # another x is another shape
-    things = bodies.world.objects
-    assert list(things) == ["a", "b", "c", "d"] and bodies.world.paused
-    assert [things[name].body is not None for name in things] == [True, True, True, False]
+    objects = bodies.world.objects
+    assert list(objects) == ["a", "b", "c", "d"] and bodies.world.paused
+    assert [objects[name].body is not None for name in objects] == [True, True, True, False]
 
 
 def test_a_background_s_is_another_than_an_object_s(made):
-    bodies, of = Bodies(), edited(thing("a"))
-    background = thing("background", collider=HULLS)
+    bodies, of = Bodies(), edited(obj("a"))
+    background = obj("background", collider=HULLS)
     file = replace(of.file, background=replace(background, static=True))
     of.history = History.of(file)
     until_there(bodies, of)
@@ -88,7 +88,7 @@ def test_a_background_s_is_another_than_an_object_s(made):
 
 
 def test_a_slider_does_not_make_it_anew(made):
-    bodies, of = Bodies(), edited(thing("a"))
+    bodies, of = Bodies(), edited(obj("a"))
     until_there(bodies, of)
     for x in (0.1, 0.2, 0.3):
         of.history = of.history.record(edits.set_x(of.file, "a", x), "x")
@@ -98,11 +98,11 @@ def test_a_slider_does_not_make_it_anew(made):
 
 
 def test_what_cannot_be_made_is_said_once_and_the_rest_can_be_touched(made):
-    bodies, of = Bodies(), edited(thing("bad", x=0.5), thing("a"))
+    bodies, of = Bodies(), edited(obj("bad", x=0.5), obj("a"))
     until_there(bodies, of)
     assert "bad" in bodies.problem and "cannot be touched" in bodies.problem
-    things = bodies.world.objects
-    assert things["bad"].body is None and things["a"].body is not None
+    objects = bodies.world.objects
+    assert objects["bad"].body is None and objects["a"].body is not None
     bodies.problem = ""
     for _ in range(5):
         bodies.poll(of)
@@ -110,7 +110,7 @@ def test_what_cannot_be_made_is_said_once_and_the_rest_can_be_touched(made):
 
 
 def test_where_nothing_can_be_touched_there_is_no_world(made):
-    bodies, of = Bodies(), edited(thing("a", collider=None))
+    bodies, of = Bodies(), edited(obj("a", collider=None))
     until_there(bodies, of)
     assert bodies.world is None and made == []
 
@@ -120,7 +120,7 @@ def test_without_physics_a_scene_can_be_seen_and_edited(made, monkeypatch):
         raise BadFile("the physics needs rapier3d; pip install rapier3d.")
 
     monkeypatch.setattr(physics.Physics, "__init__", absent)
-    bodies, of = Bodies(), edited(thing("a"))
+    bodies, of = Bodies(), edited(obj("a"))
     until_there(bodies, of)
     assert "rapier3d" in bodies.problem and bodies.world is None
     bodies.problem = ""
@@ -143,7 +143,7 @@ def test_another_scene_ends_what_is_being_made(monkeypatch):
             ended.set()
 
     monkeypatch.setattr(collider_files, "one_collider", one_collider)
-    of = edited(thing("a"))
+    of = edited(obj("a"))
     with Bodies() as bodies:
         assert bodies.poll(of) and begun.wait(10)
         end = time.monotonic() + 10

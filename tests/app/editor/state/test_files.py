@@ -242,8 +242,7 @@ def test_scenes_far_from_zero_stay_where_they_are_to_each_other(tmp_path):
     sources = read_files([one, other], read, CameraReading(), silent).sources
     scene = scene_of(sources)
     places = [
-        thing.model.means.astype(np.float64) + thing.world_from_object.position
-        for thing in scene.objects
+        obj.model.means.astype(np.float64) + obj.world_from_object.position for obj in scene.objects
     ]
     np.testing.assert_allclose(np.median(places[1] - places[0], axis=0), (3, 1, 0), atol=0.25)
 

@@ -28,7 +28,7 @@ class FakeRenderer:
         self.most, self.drawn = most, []
 
     def update(self, scene) -> None:
-        count = sum(thing.model.splat_count for thing in scene.objects)
+        count = sum(obj.model.splat_count for obj in scene.objects)
         if count > self.most:
             raise BadFile(f"{count} splats are more than {self.most}.")
         self.drawn.append(count)
@@ -50,7 +50,7 @@ class FakeViewer:
         self.dial.scene_changed()
 
     def counts(self) -> list[int]:
-        return [thing.model.splat_count for thing in self.state.scene.objects]
+        return [obj.model.splat_count for obj in self.state.scene.objects]
 
     def open(self, *paths: Path) -> None:
         """As dropping files on the window does."""

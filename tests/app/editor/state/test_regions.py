@@ -28,28 +28,28 @@ ASIDE = Pose(np.array([0.5, 0, 0]), np.array([np.sqrt(0.5), 0, np.sqrt(0.5), 0])
 
 
 @pytest.fixture
-def thing() -> SceneObject:
+def obj() -> SceneObject:
     return SceneObject("thing", make_random_model(300), x=0.0)
 
 
 # Editing
 
 
-def test_a_new_region_is_chosen_named_and_shows_the_stop_that_is_farthest(thing):
+def test_a_new_region_is_chosen_named_and_shows_the_stop_that_is_farthest(obj):
     regions = Regions(radius=2.0)
     for kind in KINDS:
-        region = regions.add(kind, 0, thing, np.array([1.0, 2, 3]))
+        region = regions.add(kind, 0, obj, np.array([1.0, 2, 3]))
         assert regions.current is region and region.name == f"{kind} 1" and region.x == 1.0
         assert regions.placing == region.is_placed == (kind in ("box", "sphere", "half-space"))
-    assert regions.add("box", 0, thing, np.zeros(3)).name == "box 2"
+    assert regions.add("box", 0, obj, np.zeros(3)).name == "box 2"
     regions.remove(0)
-    assert regions.add("box", 0, thing, np.zeros(3)).name == "box 1"
+    assert regions.add("box", 0, obj, np.zeros(3)).name == "box 1"
     assert [r.name for r in regions.items].count("box 1") == 1
 
 
-def test_version_counts_changes_and_nothing_else(thing):
+def test_version_counts_changes_and_nothing_else(obj):
     regions = Regions()
-    regions.add("box", 0, thing, np.zeros(3))
+    regions.add("box", 0, obj, np.zeros(3))
     before = regions.version
     regions.edit(0, x=regions.current.x, half=regions.current.half.copy())
     regions.choose(-1)
@@ -58,37 +58,37 @@ def test_version_counts_changes_and_nothing_else(thing):
     assert regions.version == before + 1 and regions.items[0].x == 0.25
 
 
-def test_removing_keeps_a_valid_choice(thing):
+def test_removing_keeps_a_valid_choice(obj):
     regions = Regions()
     for _ in range(3):
-        regions.add("sphere", 0, thing, np.zeros(3))
+        regions.add("sphere", 0, obj, np.zeros(3))
     regions.choose(2)
     for left in (2, 1, 0):
         regions.remove(regions.chosen)
         assert len(regions.items) == left and regions.chosen == left - 1
     assert regions.current is None
-    regions.add("lens", 0, thing, np.zeros(3))
+    regions.add("lens", 0, obj, np.zeros(3))
     regions.clear()
     assert regions.items == () and regions.current is None
 
 
-def test_placing_is_in_the_frame_of_the_object_that_was_met(thing):
-    other = SceneObject("other", thing.model, ASIDE)
+def test_placing_is_in_the_frame_of_the_object_that_was_met(obj):
+    other = SceneObject("other", obj.model, ASIDE)
     regions = Regions()
-    regions.add("sphere", 0, thing, np.zeros(3))
+    regions.add("sphere", 0, obj, np.zeros(3))
     point = np.array([0.3, 0.2, -0.1])
-    regions.place(point, 1, (thing, other))
+    regions.place(point, 1, (obj, other))
     region = regions.current
     assert region.index == 1
     world = ASIDE.matrix() @ np.append(region.centre, 1)
     np.testing.assert_allclose(world[:3], point, atol=1e-12)
 
 
-def test_the_lens_is_one_switch(thing):
+def test_the_lens_is_one_switch(obj):
     regions = Regions()
-    assert regions.toggle_lens(thing) and len(regions.items) == 1
-    assert not regions.toggle_lens(thing) and not regions.items[0].enabled
-    assert regions.toggle_lens(thing) and len(regions.items) == 1
+    assert regions.toggle_lens(obj) and len(regions.items) == 1
+    assert not regions.toggle_lens(obj) and not regions.items[0].enabled
+    assert regions.toggle_lens(obj) and len(regions.items) == 1
 
 
 # The brush
@@ -102,31 +102,31 @@ def in_pixels(points: np.ndarray, view: View = VIEW) -> np.ndarray:
 
 
 @pytest.mark.parametrize("pose", [Pose(np.zeros(3), np.array([1.0, 0, 0, 0])), ASIDE])
-def test_the_brush_takes_what_is_within_its_circle(thing, pose):
-    thing = SceneObject("thing", thing.model, pose)
-    places = thing.model.anchors.astype(float)
+def test_the_brush_takes_what_is_within_its_circle(obj, pose):
+    obj = SceneObject("thing", obj.model, pose)
+    places = obj.model.anchors.astype(float)
     world = places @ pose.matrix()[:3, :3].T + pose.matrix()[:3, 3]
     cursor, radius = (210.0, 140.0), 40.0
     inside = np.flatnonzero(np.linalg.norm(in_pixels(world) - cursor, axis=1) <= radius)
-    under = brushed(VIEW, places, thing, cursor, radius)
+    under = brushed(VIEW, places, obj, cursor, radius)
     assert len(inside) > len(under) > 0 and np.isin(under, inside).all()
     depth = 4 - world[:, 2]
     assert depth[under].max() <= np.delete(depth, under)[np.isin(
         np.delete(np.arange(len(depth)), under), inside)].min()  # fmt: skip
 
 
-def test_the_brush_paints_the_near_side_alone(thing):
+def test_the_brush_paints_the_near_side_alone(obj):
     near, far = np.array([[0, 0, 1.0]] * 3), np.array([[0, 0, -1.0]] * 3)
-    under = brushed(VIEW, np.r_[near, far], thing, (200.0, 150.0), 20.0)
+    under = brushed(VIEW, np.r_[near, far], obj, (200.0, 150.0), 20.0)
     assert set(under) == {0, 1, 2}
     behind = np.array([[0, 0, 9.0], [0, 0, 4.0], [np.nan, 0, 0]])
-    assert len(brushed(VIEW, behind, thing, (200.0, 150.0), 20.0)) == 0
+    assert len(brushed(VIEW, behind, obj, (200.0, 150.0), 20.0)) == 0
 
 
-def test_painting_and_erasing(thing):
+def test_painting_and_erasing(obj):
     regions = Regions()
-    regions.add("painted", 0, thing, np.zeros(3))
-    args = (VIEW, (200.0, 150.0), 60.0, thing)
+    regions.add("painted", 0, obj, np.zeros(3))
+    args = (VIEW, (200.0, 150.0), 60.0, obj)
     count = regions.paint(*args, False)
     assert count == regions.current.painted.sum() > 0
     version = regions.version
@@ -180,9 +180,9 @@ SELECTORS = (
 
 
 @pytest.mark.parametrize("selector", SELECTORS, ids=lambda s: type(s).__name__)
-def test_a_region_is_the_selector_it_came_from(selector, thing):
+def test_a_region_is_the_selector_it_came_from(selector, obj):
     again = selector_of(region_of(selector, "name", 0), VIEW)
-    places = thing.model.anchors
+    places = obj.model.anchors
     if isinstance(selector, Lens):
         assert again.half_angle == pytest.approx(selector.half_angle)
         np.testing.assert_allclose(again.weights(places), selector.weights(places))
@@ -196,7 +196,7 @@ def test_a_half_space_takes_the_side_that_its_arrow_points_to():
     np.testing.assert_array_equal(weights, [1, 0])
 
 
-def test_regions_of_a_command_are_named_and_none_is_being_edited(thing):
+def test_regions_of_a_command_are_named_and_none_is_being_edited(obj):
     regions = Regions()
     regions.add_selectors(SELECTORS[:2] + SELECTORS[:1], 0)
     assert [r.name for r in regions.items] == ["box 1", "sphere 1", "box 2"]
@@ -209,8 +209,8 @@ def test_regions_of_a_command_are_named_and_none_is_being_edited(thing):
 # The state
 
 
-def test_the_stage_makes_a_scene_anew_only_when_something_changed(thing):
-    state = EditorState(lambda path: thing.model)
+def test_the_stage_makes_a_scene_anew_only_when_something_changed(obj):
+    state = EditorState(lambda path: obj.model)
     state.open([Path("a"), Path("b")])
     other = dataclasses.replace(VIEW, world_from_eye=look_at(np.array([3.0, 0, 4]), np.zeros(3)))
     assert state.shown(VIEW) is state.scene  # without regions there is nothing to add

@@ -98,7 +98,7 @@ def test_of_a_rings_two_ends_the_name_means_the_first():
 # Two values of x at once
 
 
-def thing(name: str, x: float, stops=STOPS) -> SceneObject:
+def obj(name: str, x: float, stops=STOPS) -> SceneObject:
     one = np.zeros((1, 3), np.float32)
     model = SplatLayers(
         one, one + 1, np.array([[1, 0, 0, 0]], np.float32), np.ones(1, np.float32),
@@ -111,16 +111,16 @@ def test_the_other_side_is_thermal_where_there_is_such_a_stop():
     thermal = (STOPS[0], Stop("Heat", 0.5, "thermal"), STOPS[2])
     for stops, x, wanted in ((thermal, 0.0, 0.5), (thermal, 0.5, 0.0), (STOPS, 0.2, 1.0)):
         state = SplitState()
-        state.toggle(thing("a", x, stops))
+        state.toggle(obj("a", x, stops))
         assert state.on and abs(state.x - wanted) <= (wanted == 0.0)  # of equals either end
-    state.toggle(thing("a", 0.2))
+    state.toggle(obj("a", 0.2))
     assert not state.on
 
 
 def test_one_object_alone_is_another_right_of_the_line():
-    scene, state = Scene((thing("a", 0.0), thing("b", 0.0))), SplitState(True, "b", 0.75)
+    scene, state = Scene((obj("a", 0.0), obj("b", 0.0))), SplitState(True, "b", 0.75)
     right = state.right(scene)
-    assert [thing.x for thing in right.objects] == [0.0, 0.75]
+    assert [obj.x for obj in right.objects] == [0.0, 0.75]
     assert right.objects[0] is scene.objects[0]
     assert SplitState(True, "gone", 0.75).right(scene) is scene
     assert name_of(0.5, STOPS) == "Thermal" and name_of(0.274, STOPS) == "x 0.27"

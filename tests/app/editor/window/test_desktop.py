@@ -266,7 +266,7 @@ def test_a_dropped_good_file_is_shown(viewer, tmp_path):
         path.write_bytes(b"scene")
     viewer.handle_event(Drop(paths))
     until_opened(viewer)
-    assert [thing.name for thing in viewer.state.scene.objects] == ["one", "two"]
+    assert [obj.name for obj in viewer.state.scene.objects] == ["one", "two"]
     assert not viewer.state.problem and not viewer.state.messages.note
 
 

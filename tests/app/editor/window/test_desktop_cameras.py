@@ -43,7 +43,7 @@ def dropped(viewer, tmp_path):
 
 def test_dropped_cameras_are_stood_at_and_the_scene_stays(dropped):
     viewer = dropped
-    assert [thing.name for thing in viewer.state.scene.objects] == ["ball"]
+    assert [obj.name for obj in viewer.state.scene.objects] == ["ball"]
     first = cameras().views[0]
     np.testing.assert_allclose(
         viewer.viewpoint.view().world_from_eye.matrix(), first.world_from_eye.matrix(), atol=1e-9

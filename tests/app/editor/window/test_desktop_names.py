@@ -58,8 +58,8 @@ def test_a_scene_of_such_names_is_shown(viewer):
     stops = tuple(Stop(name, i / 4, "thermal", "ironbow", (0.0, 1.0), name)
                   for i, name in enumerate(NAMES))  # fmt: skip
     model = replace(ball(100), stops=stops)
-    thing = viewer.state.scene.objects[0]
-    viewer.state.scene = Scene((replace(thing, name=NAMES[0], model=model, x=0.5),))
+    obj = viewer.state.scene.objects[0]
+    viewer.state.scene = Scene((replace(obj, name=NAMES[0], model=model, x=0.5),))
     viewer.state.say(NAMES[1])
     viewer.state.problem = NAMES[3]
     run_frames(viewer, 4)

@@ -24,8 +24,8 @@ from tests.support.desktop.objects_stand import (
     drag,
     key,
     names,
+    obj,
     place_of,
-    thing,
     until_added,
     viewer_is_over,
 )
@@ -75,7 +75,7 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     held = tip if viewer_is_over(viewer, tip) else None
     assert held, "no handle is where the x axis goes"
     drag(viewer, tip, np.array(tip) + 2 * (np.array(tip) - middle))
-    moved = thing(viewer, "ball").world_from_object
+    moved = obj(viewer, "ball").world_from_object
     assert moved.position[0] > 0.05 and moved.position[1:] == pytest.approx(start[1:], abs=1e-6)
     np.testing.assert_array_equal(moved.wxyz, (1, 0, 0, 0))
     np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), camera)
@@ -86,12 +86,10 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     assert there == pytest.approx(moved.position, abs=1e-6)
     assert len(state.edited.history.steps) == 2 and viewer.objects.unsaved
     key(viewer, glfw.KEY_Z, CTRL)
-    assert tuple(thing(viewer, "ball").world_from_object.position) == tuple(start)
+    assert tuple(obj(viewer, "ball").world_from_object.position) == tuple(start)
     assert not viewer.objects.unsaved
     key(viewer, glfw.KEY_Y, CTRL)
-    assert thing(viewer, "ball").world_from_object.position == pytest.approx(
-        moved.position, abs=1e-9
-    )
+    assert obj(viewer, "ball").world_from_object.position == pytest.approx(moved.position, abs=1e-9)
     key(viewer, glfw.KEY_M)
     key(viewer, glfw.KEY_M)
     assert viewer.state.handles == ""
@@ -105,7 +103,7 @@ def test_handles_turn_it_in_its_place(viewer):
     x, y = place_of(viewer, (-0.22, 0.051, 0.05))
     low = next(y + r for r in range(20, 200, 2) if viewer_is_over(viewer, (x, y + r)))
     drag(viewer, (x, low), (x + 60, low))
-    pose = thing(viewer, "cube").world_from_object
+    pose = obj(viewer, "cube").world_from_object
     assert abs(pose.wxyz[0]) < 0.999 and np.linalg.norm(pose.wxyz) == pytest.approx(1)
     assert pose.position == pytest.approx((-0.22, 0.051, 0.05), abs=0.01)  # about its middle
     assert state.edited.file.items[0].wxyz == pytest.approx(pose.wxyz, abs=1e-8)
@@ -117,8 +115,8 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     click(viewer, (0.0, 0.061, -0.12))
     key(viewer, glfw.KEY_D, CTRL)
     assert names(viewer) == [*NAMES[:3], "ball 2", *NAMES[3:]] and viewer.state.chosen == "ball 2"
-    copy = thing(viewer, "ball 2")
-    assert copy.model is thing(viewer, "ball").model
+    copy = obj(viewer, "ball 2")
+    assert copy.model is obj(viewer, "ball").model
     assert copy.world_from_object.position[0] > 0.05  # beside it, not in it
     assert "ball 2" in viewer.state.world.objects
     assert objects.edits.edit(edits.rename, "ball 2", "globe", what="rename")
@@ -183,14 +181,14 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
     steer(state, index, 0.25)
     for _ in range(40):
         run_frames(viewer, 1, seconds=0.02)
-    fallen = thing(viewer, "ball")
+    fallen = obj(viewer, "ball")
     assert 0.0 < fallen.world_from_object.position[1] < 0.45 and fallen.x == 0.25
     assert not state.edited.changed and not objects.unsaved
     state.world.paused = True
     run_frames(viewer, 2)
     state.chosen = "ball"
     objects.edits.duplicate()
-    copy = thing(viewer, "ball 2")
+    copy = obj(viewer, "ball 2")
     assert copy.world_from_object.position[1:] == pytest.approx(
         fallen.world_from_object.position[1:], abs=1e-5
     )
@@ -201,7 +199,7 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
     assert item.x == 0.25
     assert item.position == pytest.approx(fallen.world_from_object.position, abs=1e-5)
     key(viewer, glfw.KEY_Z, CTRL)
-    assert tuple(thing(viewer, "ball").world_from_object.position) == (0, 0.061, -0.12)
+    assert tuple(obj(viewer, "ball").world_from_object.position) == (0, 0.061, -0.12)
 
 
 def test_a_body_is_given_taken_and_weighed(viewer):
@@ -250,7 +248,7 @@ def test_a_long_list_and_every_part_of_the_panel_is_drawn(viewer):
     assert len(names(viewer)) == 14 and len(viewer.state.sliders) == 1
     viewer.state.chosen = "background"
     run_frames(viewer, 2)
-    viewer.state.move(1, thing(viewer, "plate").world_from_object)
+    viewer.state.move(1, obj(viewer, "plate").world_from_object)
     run_frames(viewer, 2)
     viewer.objects.edits.keep_standing()
     assert viewer.state.edited.file.items[0].position == (0.28, 0.005, 0.1)

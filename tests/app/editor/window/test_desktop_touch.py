@@ -199,9 +199,9 @@ def test_keys_play_step_and_put_back(viewer):
     assert world.objects["cube"].reaction_state.x == 0.5
     press_key(viewer, glfw.KEY_R)
     np.testing.assert_allclose(place(viewer), [0, 0.1, 0], atol=1e-6)
-    thing = viewer.state.scene.objects[0]
-    assert thing.x == 0.0
-    np.testing.assert_allclose(thing.world_from_object.position, [0, 0.1, 0], atol=1e-6)
+    obj = viewer.state.scene.objects[0]
+    assert obj.x == 0.0
+    np.testing.assert_allclose(obj.world_from_object.position, [0, 0.1, 0], atol=1e-6)
 
 
 @pytest.mark.parametrize("paused", [False, True])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.desktop.desktop_stand import run_frames
-from tests.support.desktop.objects_stand import SHIFT, button, key, mouse, place_of, thing
+from tests.support.desktop.objects_stand import SHIFT, button, key, mouse, obj, place_of
 
 absent = [name for name in ("rapier3d", "coacd") if find_spec(name) is None]
 pytestmark = pytest.mark.skipif(bool(absent), reason=f"not installed: {', '.join(absent)}")
@@ -20,7 +20,7 @@ def viewer(playing_viewer):
 
 
 def place(viewer, name: str) -> np.ndarray:
-    return thing(viewer, name).world_from_object.position
+    return obj(viewer, name).world_from_object.position
 
 
 def glide(viewer, points: list, steps: int = 12) -> None:
@@ -33,7 +33,7 @@ def glide(viewer, points: list, steps: int = 12) -> None:
 def test_a_person_plays_with_the_bundled_scene(viewer):
     world = viewer.state.world
     start = {name: place(viewer, name).copy() for name in ("cube", "ball", "ring")}
-    assert not world.paused and "Drag a thing" in viewer.state.messages.note
+    assert not world.paused and "Drag an object" in viewer.state.messages.note
     run_frames(viewer, 10)
 
     rim = place(viewer, "ring") + np.array([0.06, 0.015, 0.0])
@@ -44,18 +44,18 @@ def test_a_person_plays_with_the_bundled_scene(viewer):
     glide(viewer, [place_of(viewer, rim), up])
     assert place(viewer, "ring")[1] > start["ring"][1] + 0.05
     run_frames(viewer, 25)
-    assert thing(viewer, "ring").x == 1.0  # hot: it was taken
+    assert obj(viewer, "ring").x == 1.0  # hot: it was taken
     glide(viewer, [up, over])
     run_frames(viewer, 10)  # a hand that rests throws nothing
     button(viewer, False)
     run_frames(viewer, 60)
-    assert thing(viewer, "ring").x == 0.0  # cold: it came to the plate
+    assert obj(viewer, "ring").x == 0.0  # cold: it came to the plate
     assert 0.19 < place(viewer, "ring")[0] < 0.37 and world.held("mouse") is None
 
     mouse(viewer, *place_of(viewer, place(viewer, "ball")))
     key(viewer, glfw.KEY_X)
     run_frames(viewer, 25)
-    assert thing(viewer, "ball").x == 1.0  # confetti
+    assert obj(viewer, "ball").x == 1.0  # confetti
     assert viewer.touch.reactions[0] == "ball: hit by a ray, now confetti"
 
     at = place_of(viewer, place(viewer, "cube"))
@@ -68,12 +68,12 @@ def test_a_person_plays_with_the_bundled_scene(viewer):
     button(viewer, False)
     run_frames(viewer, 60)
     assert place(viewer, "cube")[1] < lifted - 0.1
-    assert thing(viewer, "cube").x > 0.0  # it struck the table: ice
+    assert obj(viewer, "cube").x > 0.0  # it struck the table: ice
 
     key(viewer, glfw.KEY_R)
     for name, at in start.items():
         np.testing.assert_allclose(place(viewer, name), at, atol=0.01)
-    assert [thing(viewer, name).x for name in ("cube", "ball", "ring")] == [0.0, 0.0, 0.5]
+    assert [obj(viewer, name).x for name in ("cube", "ball", "ring")] == [0.0, 0.0, 0.5]
     assert not viewer.state.edited.unsaved  # play is no edit
 
 
