@@ -131,6 +131,16 @@ class Drawing(ABC):
         """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
 
     @abstractmethod
+    def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
+        """(n, 3) colours of object i in the set that is decoded into, and beside them (n, 4) heat:
+        0 to 2 value times weight or colour, 3 weight; None: there is none.  Copies.
+        """
+
+    @abstractmethod
+    def replace_colors(self, i: int, color: np.ndarray, heat: np.ndarray | None) -> None:
+        """Writes what `read_colors` gives, until object i is decoded again."""
+
+    @abstractmethod
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""
 

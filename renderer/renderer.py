@@ -32,6 +32,7 @@ from shapeshift.renderer.colors.palette import (
     overlay_heat,
     palette_colors,
 )
+from shapeshift.renderer.colors.tint import tinted
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
@@ -120,7 +121,8 @@ class Renderer:
 
     def _choose_false_colors(self, scene: Scene) -> None:
         """Which colours are decoded, and where palettes belong, as the controls ask for."""
-        state = [(d.version, o.visible) for d, o in zip(self._decoded, scene.objects, strict=True)]
+        pairs = zip(self._decoded, scene.objects, strict=True)
+        state = [(d.version, o.visible, o.tint is None) for d, o in pairs]
         if state == self._false_key:
             return
         self._false_key = state
@@ -231,20 +233,24 @@ class Renderer:
             eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
             key = color_key(obj.model, decoded.version, eye)
             stale = colored.is_stale(key, degrees, nearer=follows_eye(obj.model))
-            if follows_eye(obj.model):
+            follows = follows_eye(obj.model)
+            if follows:
                 due, wanted = self._wanted_of_follower(obj, colored, stale, views)
-                if not due:
-                    continue
-                colored.key, colored.anchors = key, wanted
-                self.drawing.decode_geometry(i, decoded.x, eye, wanted)
-                self._geometry_runs += 1
+                if due:
+                    colored.key, colored.anchors = key, wanted
             else:
                 wanted = self._wanted_anchors(i, obj, decoded, colored, stale, views)
-                if not colored.mark_colored(key, wanted, stale):
-                    continue  # all that is seen has its colours
-            at_once = self._false_colors.way == SPLATS
-            self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
-            self._color_runs += 1
+                due = colored.mark_colored(key, wanted, stale)  # else all seen have their colours
+            if not due and obj.tint is colored.tint:
+                continue
+            with tinted(self.drawing, i, obj, colored):
+                if due and follows:
+                    self.drawing.decode_geometry(i, decoded.x, eye, wanted)
+                    self._geometry_runs += 1
+                if due:
+                    at_once = self._false_colors.way == SPLATS
+                    self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
+                    self._color_runs += 1
 
     def _wanted_anchors(
         self, i: int, obj: SceneObject, decoded: DecodedObject, colored: ColorCache, stale: bool,

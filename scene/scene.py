@@ -13,6 +13,17 @@ from shapeshift.scene.selectors.selector import Selector
 IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
 
+@dataclass(frozen=True, eq=False)  # the same only where it is the very same: arrays are large
+class Tint:
+    """A colour over an object's own, at every x and through every palette: it marks, it is no look.
+
+    Shown is (1 - strength) times the object's own colour, plus strength times this one.
+    """
+
+    color: np.ndarray | tuple[float, float, float]  # (3,) display sRGB, or (A, 3) one an anchor
+    strength: np.ndarray | float  # 0..1, or (A,) one an anchor (of SplatLayers: a splat)
+
+
 @dataclass(frozen=True)
 class SceneObject:
     name: str
@@ -22,6 +33,7 @@ class SceneObject:
     label: int = 0  # 0 = background
     visible: bool = True
     selectors: tuple[Selector, ...] = ()  # parts with an x of their own; a later one lies above
+    tint: Tint | None = None  # no look of its own: which object it is, what of it is chosen
 
     @property
     def slider_x(self) -> float:

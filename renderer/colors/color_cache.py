@@ -10,6 +10,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import Model, ScaffoldModel, SplatLayers
 from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Tint
 
 
 def color_key(model: Model, x: float, eye: np.ndarray) -> tuple:
@@ -34,6 +35,8 @@ class ColorCache:
     anchors: np.ndarray | None = None  # (A,) bool: those that have it; None: all
     reach: np.ndarray | None = None  # (A,) metres around each anchor with all of its splats
     reach_key: tuple | float | None = None  # control value and least alpha of that
+    tint: Tint | None = None  # that lies over them now
+    untinted: tuple = ()  # rows under it, their colours and their heat without it
 
     def is_stale(self, key: tuple, degrees: float, nearer: bool = False) -> bool:
         """Whether x changed, or the eye moved by more than so many degrees around the centre.

@@ -4,8 +4,9 @@ A thermal stop gives values, a palette makes colours of them.  At a pure thermal
 laid over the whole picture, as a thermal camera does it: values are blended before they become
 colours.  Between such a stop and another one both stops' colours are decoded.  What is thermal, the
 heat, is then drawn in addition, splat by splat by its weight, and the palette is laid over the
-heat alone: a white tool is not hot because it is white.  Where several palettes show at once there
-is no one picture of values; each splat's heat is coloured before it is drawn.
+heat alone: a white tool is not hot because it is white; so it is where an object is tinted, whose
+tint is no value.  Where several palettes show at once there is no one picture of values; each
+splat's heat is coloured before it is drawn.
 """
 
 from collections.abc import Callable
@@ -86,7 +87,8 @@ def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
         if obj.visible and obj.model.splat_count
     ]
     names = {heat.palette for shade in shown for heat in shade.heats}
-    if len(names) == 1 and all(shade.pure for shade in shown):
+    tinted = any(obj.visible and obj.tint is not None for obj in scene.objects)
+    if len(names) == 1 and all(shade.pure for shade in shown) and not tinted:
         plain = [
             Shade(x if colors_follow_control(obj.model) else 0.0)
             for obj, x in zip(scene.objects, controls, strict=True)

@@ -183,6 +183,26 @@ class Arena:
         if end > start:
             self.color.write(rows, offset=16 * start)
 
+    def write_heat(self, i: int, heat: np.ndarray) -> None:
+        """Uploads what thermal stops have in the colours of object i, (n, 4), to the set in use."""
+        start, end = self._rows(i, heat, "heats")
+        if end > start:
+            self.heat.write(np.ascontiguousarray(heat, np.float32), offset=16 * start)
+
+    def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
+        """(n, 3) colours of object i in the set in use, and (n, 4) heat; None: there is none."""
+        start, end = self.starts[i], self.starts[i + 1]
+        kept = self._heats.get(self.set)
+        if end == start:
+            return np.zeros((0, 3), np.float32), None
+        rows = [
+            np.frombuffer(buffer.read(16 * (end - start), offset=16 * start), np.float32)
+            for buffer in (self.color, kept)
+            if buffer is not None
+        ]
+        color, *heat = (row.reshape(-1, 4).copy() for row in rows)
+        return color[:, :3], heat[0] if heat else None
+
     def _rows(self, i: int, array: np.ndarray, what: str) -> tuple[int, int]:
         start, end = self.starts[i], self.starts[i + 1]
         if len(array) != end - start:

@@ -217,6 +217,14 @@ class QuadsDrawing(Drawing):
             for i, (start, end) in enumerate(pairwise(self._arena.starts)):
                 self._arena.write_color(i, color[start:end])
 
+    def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
+        return self._arena.read_colors(i)
+
+    def replace_colors(self, i: int, color: np.ndarray, heat: np.ndarray | None) -> None:
+        self._arena.write_color(i, color)
+        if heat is not None:
+            self._arena.write_heat(i, heat)
+
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         return count_overdraw(self._gpu, self._projector, self._arena, view, settings)
 

@@ -314,6 +314,20 @@ class TilesDrawing(Drawing):
         for each in self._colors:
             pack_color(self.device, np.reshape(color, (self.splats, 3)), 0, each)
 
+    def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
+        slot, heat = self._slots[i], self._heats[self._set]
+        rows = slice(slot.start, slot.start + slot.count)
+        if not slot.count:
+            return np.zeros((0, 3), np.float32), None
+        read = self.device.download
+        return read(self._color[rows])[:, :3].copy(), None if heat is None else read(heat[rows])
+
+    def replace_colors(self, i: int, color: np.ndarray, heat: np.ndarray | None) -> None:
+        start, kept = self._slots[i].start, self._heats[self._set]
+        pack_color(self.device, color, start, self._color)
+        if heat is not None and kept is not None and len(heat):
+            kept[start : start + len(heat)].set(np.ascontiguousarray(heat, np.float32))
+
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         if not self.splats:
             return np.zeros(view.size[::-1], np.int32)
