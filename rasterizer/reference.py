@@ -3,7 +3,7 @@
 renderer/reference puts the scene, its gates and its palettes around it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -44,6 +44,33 @@ def screen_covariance(
     return half @ half.transpose(0, 2, 1)
 
 
+def weights(
+    mean_px: np.ndarray,
+    conics: np.ndarray,
+    power_thresholds: np.ndarray,
+    extents: np.ndarray,
+    opacity: np.ndarray,
+    transmittance: np.ndarray,
+) -> Iterator[tuple[int, tuple[slice, slice], np.ndarray]]:
+    """Splat after splat, near to far: which one, its rows and columns, its alpha T (h, w) there.
+
+    transmittance (H, W), ones at first, is what is left behind each.  The rest is as in `blend`.
+    """
+    size = transmittance.shape[::-1]
+    first = np.clip(np.floor(mean_px - extents - 0.5), 0, size).astype(int)
+    after = np.clip(np.ceil(mean_px + extents + 0.5), 0, size).astype(int)
+    for i in np.flatnonzero(np.all(after > first, axis=1)):
+        (x0, y0), (x1, y1), (a, b, c) = first[i], after[i], conics[i]
+        dx = np.arange(x0, x1) + 0.5 - mean_px[i, 0]
+        dy = (np.arange(y0, y1) + 0.5 - mean_px[i, 1])[:, None]
+        r = a * dx * dx + 2 * b * dx * dy + c * dy * dy
+        alpha = np.minimum(MAX_ALPHA, opacity[i] * np.exp(-r / 2))
+        there = slice(y0, y1), slice(x0, x1)
+        weight = np.where(r <= power_thresholds[i], alpha, 0) * transmittance[there]
+        transmittance[there] -= weight
+        yield i, there, weight
+
+
 def blend(
     mean_px: np.ndarray,
     conics: np.ndarray,
@@ -61,17 +88,9 @@ def blend(
     """
     width, height = size
     image, transmittance = np.zeros((height, width, color.shape[1])), np.ones((height, width))
-    first = np.clip(np.floor(mean_px - extents - 0.5), 0, size).astype(int)
-    after = np.clip(np.ceil(mean_px + extents + 0.5), 0, size).astype(int)
-    for i in np.flatnonzero(np.all(after > first, axis=1)):
-        (x0, y0), (x1, y1), (a, b, c) = first[i], after[i], conics[i]
-        dx = np.arange(x0, x1) + 0.5 - mean_px[i, 0]
-        dy = (np.arange(y0, y1) + 0.5 - mean_px[i, 1])[:, None]
-        r = a * dx * dx + 2 * b * dx * dy + c * dy * dy
-        alpha = np.minimum(MAX_ALPHA, opacity[i] * np.exp(-r / 2))
-        weight = np.where(r <= power_thresholds[i], alpha, 0) * transmittance[y0:y1, x0:x1]
-        image[y0:y1, x0:x1] += weight[..., None] * color[i]
-        transmittance[y0:y1, x0:x1] -= weight
+    parts = weights(mean_px, conics, power_thresholds, extents, opacity, transmittance)
+    for i, there, weight in parts:
+        image[there] += weight[..., None] * color[i]
     return image, transmittance
 
 
@@ -112,6 +131,23 @@ def rasterize_reference(
     )
     over = image + transmittance[..., None] * np.asarray(background)
     return over.transpose(2, 0, 1), transmittance
+
+
+def evidence_reference(
+    record: np.ndarray, depth: np.ndarray, labels: np.ndarray, count: int
+) -> np.ndarray:
+    """(N, count) pixels: each splat's alpha T summed over the pixels of each label (OWD 3.3).
+
+    labels (H, W); what is not below `count` is summed nowhere.  Without early stop.
+    """
+    order = np.argsort(depth, kind="stable")
+    drawn = order[record[order, 9] > 0]
+    shown = record[drawn]
+    shape = (shown[:, :2], shown[:, 2:5], shown[:, 11], shown[:, 9:11], shown[:, 5])
+    out = np.zeros((len(record), 256))
+    for i, there, weight in weights(*shape, np.ones(labels.shape)):
+        out[drawn[i]] = np.bincount(labels[there].ravel(), weight.ravel(), minlength=256)
+    return out[:, :count]
 
 
 def render_reference(splats: Splats, camera: Camera, background=(0.0, 0.0, 0.0)) -> tuple:

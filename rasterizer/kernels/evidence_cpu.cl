@@ -1,0 +1,105 @@
+// evidence, CPU form: how much each splat shows of each label of a picture, in tiles, blocks and
+// batches as raster_cpu.cl draws: the very alpha T that it blends (OWD, section 3.3).
+//   E[splat, label] = sum of alpha T over the pixels of that label
+// One work-item a tile.  Sums are whole numbers of 1 / steps pixels, since integers add up to the
+// same in any order of tiles; a tile's share is rounded once.
+// Reads:   tile_start (tiles + 1), intersections, record (N, 12), labels (H, W): SILENT and what is
+//          not below `columns` says nothing; first: of the labels of each tile, counted from its
+//          least, this pass sums LABELS from there on; each: splats a row of the table, in a row.
+// Writes:  table (rows, columns), added to.
+// Units:   pixels, row 0 on top; table in 1 / steps pixels.
+#include "common/vector.cl"
+#include "common/raster.cl"
+#include "common/raster_blocks.cl"
+#define SILENT 255
+#define LABELS 16    // of a tile that a pass sums
+#define NO LABELS    // the column of pixels that have none of them: summed, never written
+#define SEVERAL -1   // labels, in a block or in the tile
+
+__kernel void evidence(int width, int height, int tiles_x, __global const int* tile_start,
+                       __global const int* intersections, __global const float* record,
+                       __global const uchar* labels, int first, int each, int columns, float steps,
+                       __global uint* table) {
+  const int tile = get_global_id(0);
+  const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+  const int w = min(TILE, width - x0), h = min(TILE, height - y0);
+  // Which labels the tile has, and of this pass's ones (at most 16, mostly one to three) the place
+  // in `sums` of each: what has to be cleared and written for every splat stays short.
+  uchar place[256];
+  for (int l = 0; l < 256; l++) place[l] = 0;
+  for (int y = 0; y < h; y++)
+    for (int x = 0; x < w; x++) place[labels[(size_t)(y0 + y) * width + x0 + x]] = 1;
+  int label_of[LABELS], present = 0;
+  for (int l = 0, number = 0; l < 256; l++) {
+    const bool there = place[l] && l < columns && l != SILENT;
+    const bool mine = there && number >= first && number < first + LABELS;
+    place[l] = mine ? present : NO;
+    if (mine) label_of[present++] = l;
+    number += there;
+  }
+  if (!present) return;
+  // Transmittance of all 256 pixels, and the place of each pixel's label.
+  float8 T[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
+  uchar of[BLOCKS * LANES];
+  int same[BLOCKS];  // the place that all pixels of a block have, or SEVERAL
+  int whole = NO;    // the same of the tile
+  for (int k = 0; k < BLOCKS; k++) {
+    block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);
+    block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
+    T[k] = inside(k, x0, y0, width, height);
+    for (int lane = 0; lane < LANES; lane++) {
+      // Pixels outside the image have no T; they count as their neighbours on the border.
+      const int x = min(k / DOWN * BLOCK_W + lane % BLOCK_W, w - 1);
+      const int y = min(k % DOWN * BLOCK_H + lane / BLOCK_W, h - 1);
+      const int at = place[labels[(size_t)(y0 + y) * width + x0 + x]];
+      of[k * LANES + lane] = at;
+      same[k] = lane == 0 || same[k] == at ? at : SEVERAL;
+    }
+    whole = k == 0 || whole == same[k] ? same[k] : SEVERAL;
+  }
+  Batch batch;
+  uint open = 0xffffffffu;
+  int p = tile_start[tile];
+  const int end = tile_start[tile + 1];
+  while (p < end && open) {
+    const int n = fetch(p, end, x0, y0, intersections, record, &batch);
+    for (int j = 0; j < n; j++) {
+      // alpha T as in rasterize of raster_cpu.cl, which says why.
+      const float* s = batch.splats + RECORD * j;
+      const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
+      const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
+      const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[POWER_THRESHOLD];
+      float sums[LABELS + 1];
+      for (int m = 0; m < present; m++) sums[m] = 0;
+      float8 all = 0;  // where the tile has one label: nothing is told apart
+      for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
+        const int k = lowest(left);
+        const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
+        const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);
+        alpha = select((float8)(0), alpha, power >= least);
+        const float8 weight = alpha * T[k];
+        T[k] -= weight;
+        if (whole != SEVERAL) {
+          all += weight;
+        } else if (same[k] != SEVERAL) {
+          // A block of one label costs one sum over its lanes.
+          sums[same[k]] += sum8(weight);
+        } else {
+          float lanes[LANES];
+          vstore8(weight, 0, lanes);
+          for (int lane = 0; lane < LANES; lane++) sums[of[k * LANES + lane]] += lanes[lane];
+        }
+      }
+      if (whole != SEVERAL) sums[whole] = sum8(all);
+      // Tiles meet in rows of the table: atomics, of integers, which any order leaves equal.
+      __global uint* row = table + (size_t)columns * (intersections[p + j] / each);
+      for (int m = 0; m < present; m++) {
+        const uint amount = (uint)rint(sums[m] * steps);
+        if (amount) atomic_add(row + label_of[m], amount);
+      }
+    }
+    p += n;
+    open = still_open(open, T);
+  }
+}
