@@ -9,10 +9,12 @@ import numpy as np
 
 from shapeshift.api.arguments import DEFAULT_SIZE, X
 from shapeshift.api.edit import changed, describe, regions_of, stops_of
+from shapeshift.api.objects import SceneObjects
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import Finding, Model, Stop
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
+from shapeshift.scene.document import edits
 from shapeshift.scene.scene import Scene as DrawnScene
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.selectors.selector import Selector
@@ -37,12 +39,14 @@ class OpenedScene:
     # ---- what is in it
 
     @property
-    def objects(self) -> tuple[SceneObject, ...]:
-        """Each with name, model, world_from_object (Pose, metres), x, label, visible, selectors.
+    def objects(self) -> SceneObjects[Self]:
+        """A tuple of objects, each with name, model, world_from_object (Pose, metres), x, label,
+        visible and selectors; by its name one that gives scenes in which it is elsewhere.
 
-        [obj.name for obj in ss.load("room.scene.json").objects]
+            [obj.name for obj in ss.load("room.scene.json").objects]
+            scene.objects["mug"].move(by=(0, 0.2, 0)).render()
         """
-        return self._subject.scene.objects
+        return SceneObjects.of(self, self._subject.scene.objects)
 
     @property
     def stops(self) -> tuple[Stop, ...]:
@@ -201,6 +205,19 @@ class OpenedScene:
             room.with_object("cup", position=(0.0, 1.2, 0.0), x="fire")
         """
         return self._with(changed(self._subject, self.object(name), position, wxyz, x, visible))
+
+    def without(self, *names: str) -> Self:
+        """The scene without these objects.  Raises UsageError for a name that none has.
+
+        emptied = scene.without("mug", "can")
+        """
+        gone = {self.object(name).name for name in names}
+        file = self._subject.file
+        if file is not None:  # as a simulation takes it
+            for name in gone:
+                file = edits.remove(file, name)
+        left = tuple(obj for obj in self.objects if obj.name not in gone)
+        return self._with(Document(DrawnScene(left), file))
 
     def with_regions(self, *regions: "str | Selector", name: str | None = None) -> Self:
         """The scene with parts that have an x of their own; none: without any.

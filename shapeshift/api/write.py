@@ -72,7 +72,7 @@ def export(
         return save(scene, out, overwrite)
     writer_of(out)  # before any work
     check_output(out, [scene.path] if scene.path and scene.path.exists() else [], overwrite, "")
-    objects = scene.at(x).objects
+    objects = tuple(scene.at(x).objects)
     if object is not None:
         objects = (scene.at(x).object(object),)
     view = scene.subject.view((640, 360))

@@ -92,7 +92,7 @@ def public_of_the_face() -> list:
     return out
 
 
-@pytest.mark.parametrize(("name", "thing"), public_of_the_face())
+@pytest.mark.parametrize(("name", "obj"), public_of_the_face())
 def test_every_public_thing_says_what_it_does_and_shows_it(name, obj):
     text = inspect.getdoc(obj)
     assert text and len(text) > 40, name
@@ -152,6 +152,44 @@ def test_objects_are_placed_hidden_and_found(demo):
         _ = room.model
     with pytest.raises(ValueError, match="quaternion of length 1"):
         room.with_object("cube", wxyz=(1, 1, 0, 0))
+
+
+def test_an_object_by_its_name_gives_scenes_in_which_it_is_elsewhere():
+    room = ss.load(ss.TOUCH)
+    cube = room.objects["cube"]
+    assert cube.drawn is room.object("cube") and cube.name == "cube" and "cube" in repr(cube)
+    before = cube.pose.position
+    moved = cube.move(by=(0, 0.5, 0)).objects["cube"]
+    np.testing.assert_array_equal(moved.pose.position, before + np.array([0, 0.5, 0]))
+    assert tuple(cube.move((1, 2, 3), (0, 1, 0, 0)).objects["cube"].pose.wxyz) == (0, 1, 0, 0)
+    assert cube.at("fire").objects["cube"].x == 0.5 and cube.x == 0.0
+    assert not cube.show(False).objects["cube"].visible and cube.visible
+    np.testing.assert_array_equal(room.object("cube").world_from_object.position, before)
+    with pytest.raises(ValueError, match="a position or by, not both"):
+        cube.move((0, 0, 0), by=(1, 0, 0))
+    with pytest.raises(ss.UsageError, match="there is no object 'cup'; there are background, cube"):
+        _ = room.objects["cup"]
+
+
+def test_objects_are_a_tuple_still():
+    objects = ss.load(ss.TOUCH).objects
+    assert isinstance(objects, tuple) and objects[0].name == "background"
+    assert objects[-1] is list(objects)[-1] and objects[:2] == tuple(objects)[:2]
+
+
+def test_a_scene_without_an_object_has_neither_it_nor_its_body():
+    room = ss.load(ss.TOUCH)
+    names = [obj.name for obj in room.objects]
+    left = room.without("cube")
+    assert [obj.name for obj in left.objects] == [name for name in names if name != "cube"]
+    assert "cube" not in [item.name for item in left.subject.file.all_items]
+    assert [obj.name for obj in room.objects] == names and room.without().objects == room.objects
+    everything = room.without(*names)
+    assert not everything.objects and everything.subject.file.background is None
+    (step, *_) = ss.simulate(left, seconds=0.05)
+    assert "cube" not in [obj.name for obj in step.scene.objects]
+    with pytest.raises(ss.UsageError, match="there is no object 'cup'"):
+        room.without("cube", "cup")
 
 
 # ---- pictures
