@@ -92,7 +92,7 @@ def public_of_the_face() -> list:
     return out
 
 
-@pytest.mark.parametrize(("name", "thing"), public_of_the_face())
+@pytest.mark.parametrize(("name", "obj"), public_of_the_face())
 def test_every_public_thing_says_what_it_does_and_shows_it(name, obj):
     text = inspect.getdoc(obj)
     assert text and len(text) > 40, name
