@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Options = TypeVar("Options", bound="DataclassInstance")
-LIKE = 0.6  # of difflib's ratio: as alike a word is taken for a slip of the hand
+LIKE = 0.7  # of difflib's ratio, of words without dashes: as alike a word is taken for a slip
+#           of the hand; one changed or two swapped letters of four have 0.75
 SWITCHED = {"True": True, "False": False}  # a switch may be followed by either
 NUMBER = re.compile(r"-[\d.]")  # how a value begins that is no option
 
@@ -45,7 +46,7 @@ class Opt:
     metavar: str = ""  # how help calls its value; "": by the type
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FieldsOf:
     """An annotation: the options of this field, a dict, are fields of another dataclass.
 
@@ -55,6 +56,8 @@ class FieldsOf:
     of: type
     usual: tuple[str, ...] = ()  # fields, in the order of help
     expert: tuple[str, ...] = ()
+    # Options that left the program, without their dashes -> what does their work now, in words.
+    left: Mapping[str, str] | None = None
 
 
 POSITIONAL, EXPERT = Opt(positional=True), Opt(expert=True)
@@ -121,7 +124,7 @@ def parse(kind: type[Options], words: Sequence[str], prog: str) -> Options:
     """
     arguments = arguments_of(kind)
     known = {name: each for each in arguments for name in _spellings(each)}
-    values, loose = _values_of(words, known, prog)
+    values, loose = _values_of(words, known, left_options_of(kind), prog)
     values |= _place([each for each in arguments if each.opt.positional], loose, prog)
     missing = [a for a in arguments if a.required and a.field.name not in values]
     _refuse_missing(missing, values, shlex.join([*prog.split(), *loose]))
@@ -168,19 +171,32 @@ def _arguments_in(settings: FieldsOf, into: str) -> list[Argument]:
 
 def nearest(word: str, known: Sequence[str]) -> str:
     """The known word that somebody meant who typed this one; "" where none is like it."""
-    folded = {name.casefold(): name for name in known}
-    found = difflib.get_close_matches(word.casefold(), folded, 1, LIKE)
-    found += [name for name in folded if len(word) > 2 and name.startswith(word.casefold())]
+    folded = {name.casefold().lstrip("-"): name for name in known}  # dashes make all alike
+    word = word.casefold().lstrip("-")
+    found = difflib.get_close_matches(word, folded, 1, LIKE)
+    found += [name for name in folded if len(word) > 2 and name.startswith(word)]
     return folded[found[0]] if found else ""
+
+
+def left_options_of(kind: type) -> dict[str, str]:
+    """Options that a command had once -> what does their work now, in words."""
+    left: dict[str, str] = {}
+    for hint in typing.get_type_hints(kind, include_extras=True).values():
+        for note in typing.get_args(hint)[1:] if typing.get_origin(hint) is Annotated else ():
+            left |= (note.left or {}) if isinstance(note, FieldsOf) else {}
+    return left
 
 
 _EXPECTED = {int: "a whole number", float: "a number", Path: "a path"}
 
 
 def _values_of(
-    words: Sequence[str], known: Mapping[str, Argument], prog: str
+    words: Sequence[str], known: Mapping[str, Argument], left: Mapping[str, str], prog: str
 ) -> tuple[dict[str, Any], list[str]]:
-    """Values by field of the options among the words, and the words that are none."""
+    """Values by field of the options among the words, and the words that are none.
+
+    known: by all spellings; left: see FieldsOf.  Raises UsageError.
+    """
     rest = list(words)
     values: dict[str, Any] = {}
     loose: list[str] = []
@@ -194,7 +210,7 @@ def _values_of(
         name, sign, value = word.partition("=")
         name = name.replace("_", "-")
         if name not in known:
-            raise UsageError(_no_such(name, known, prog))
+            raise UsageError(_no_such(name, known, left, prog))
         each = known[name]
         if each.kind is bool:
             said = value if sign else rest.pop(0) if rest and rest[0] in SWITCHED else "True"
@@ -235,8 +251,11 @@ def _is_option(word: str) -> bool:
     return word.startswith("-") and word != "-" and not NUMBER.match(word)
 
 
-def _no_such(name: str, known: Mapping[str, Argument], prog: str) -> str:
-    meant = nearest("--" + name.lstrip("-"), list(known))
+def _no_such(name: str, known: Mapping[str, Argument], left: Mapping[str, str], prog: str) -> str:
+    bare = name.lstrip("-")
+    if now := left.get(bare) or left.get(bare.removeprefix("no-")):
+        return f"{name} left the program: {now}."
+    meant = nearest(name, list(known))
     hint = f"did you mean {meant}?" if meant else f"`{prog} --help` lists them."
     return f"there is no option '{name}'; {hint}"
 

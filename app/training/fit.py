@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from shapeshift.app.command_line import MODALITY, POSITIONAL, FieldsOf
 from shapeshift.app.terminal import open_console, print_json, say
 from shapeshift.app.training.train_options import Asked, MachineOptions
+from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings
 
 if TYPE_CHECKING:
@@ -29,7 +30,9 @@ class Options(MachineOptions):
     """A folder of posed photos, as of train."""
     out: Path
     """The package to write: NAME.shift or a folder."""
-    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS, LEFT)] = field(
+        default_factory=dict
+    )
     tolerance_db: float = 0.1
     """dB that each modality may lose in all against the largest model, its error included."""
     seeds: int = 2

@@ -14,6 +14,7 @@ from shapeshift.app.training.table_rows import MEAN, NAMES, TableRow, VggRow, fi
 from shapeshift.app.training.train_options import OF_SPLATS, Asked, MachineOptions
 from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings
 
 if TYPE_CHECKING:
@@ -41,7 +42,9 @@ class Options(MachineOptions):
     """A folder of posed photos; each modality needs held-out ones."""
     out: Path
     """A folder for the models, table.csv and table.md.  A method that is in it is not run again."""
-    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, ("seed",))] = field(default_factory=dict)
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, ("seed",), LEFT)] = field(
+        default_factory=dict
+    )
     splats: Annotated[Asked, FieldsOf(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
     seconds: float | None = None
     """Budget of every method; its models share it.  Default: none, give this or --iterations."""

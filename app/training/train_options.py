@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf
 from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings, adjusted, resumed
 
 # Fields of TrainSettings that are typed; the others are set by fit, by --calibrate and from Python.
@@ -41,7 +42,9 @@ class Options(MachineOptions):
     """A folder of posed photos: COLMAP, transforms.json or cameras.json (docs/capture.md)."""
     out: Path
     """The package to write: NAME.shift or a folder.  NAME.checkpoint.npz is written beside it."""
-    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS, LEFT)] = field(
+        default_factory=dict
+    )
     splats: Annotated[Asked, FieldsOf(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
     resume: bool = False
     """Continue from the checkpoint with its settings; --iterations or --seconds may be larger."""

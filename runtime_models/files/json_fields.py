@@ -15,6 +15,7 @@ from shapeshift.runtime_models.stop_weights import Control, StopWeights
 MOST_BYTES = 32 << 20  # of JSON: a million painted weights
 LONGEST_TEXT = 1000  # letters of a line
 LONGEST_SHOWN = 60  # letters of a wrong value in a message
+LIKE = 0.7  # of difflib's ratio: as alike a key is taken for a typing error
 LARGEST = 1e12  # of numbers, where a reader does not say
 
 
@@ -287,7 +288,7 @@ class Fields:
         """Refuses keys that were never asked for: they are typing errors.  Raises BadFile."""
         for key in self.data:
             if key not in self.asked:
-                near = get_close_matches(key, self.asked, 1)
+                near = get_close_matches(key, self.asked, 1, LIKE)
                 advice = (
                     f"did you mean '{near[0]}'?  Else leave it out."
                     if near

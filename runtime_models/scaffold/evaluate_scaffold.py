@@ -85,11 +85,12 @@ class ScaffoldEvaluator:
         fixed = {} if model.octree is None else {"level": model.octree.level[:, None]}
         widths = WIDTHS | {"feature": model.features.shape[1]}
         bank = model.networks.get("bank")
-        self._bank = Network("bank", bank, fixed, widths) if bank else None
+        self._bank = ScaffoldNetwork("bank", bank, fixed, widths) if bank else None
         if bank is None:
             fixed = fixed | {"feature": model.features}
         self._heads = {
-            name: Network(name, model.networks[name], fixed, widths) for name in SCAFFOLD_HEADS
+            name: ScaffoldNetwork(name, model.networks[name], fixed, widths)
+            for name in SCAFFOLD_HEADS
         }
         self._means = (model.anchors[:, None] + model.offsets).reshape(-1, 3)
         self._look: EyeInputs | None = None
@@ -218,7 +219,7 @@ def softmax(z: np.ndarray) -> np.ndarray:
     return e / e.sum(axis=1, keepdims=True)
 
 
-class Network:
+class ScaffoldNetwork:
     """One network; the part of its first layer that meets what no eye changes is kept."""
 
     def __init__(

@@ -110,12 +110,15 @@ def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
     None stands for what was not asked.  Raises UsageError.
     """
     from shapeshift.app.command_line import nearest
+    from shapeshift.training.left_options import left_setting
     from shapeshift.training.settings import TrainSettings, adjusted, resumed
 
     asked = {name: value for name, value in asked.items() if value is not None}
     known = [field.name for field in fields(TrainSettings)]
     for name in asked:
         if name not in known:
+            if now := left_setting(name):
+                raise UsageError(f"{name} left the program: {now}.")
             meant = nearest(name, known)
             hint = f"did you mean {meant}?" if meant else f"there are {', '.join(known)}."
             raise UsageError(f"there is no setting '{name}' of a training; {hint}")

@@ -12,6 +12,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.training.calibration.extrinsics import moved_by, offset_view
 from shapeshift.training.calibration.outlier_views import (
     LEAST_DB,
+    drawn,
     find_outlier_views,
     judge,
     recolored,
@@ -63,6 +64,26 @@ def test_wrong_poses_and_another_exposure_are_named(balls, tmp_path):
     for outlier, line in zip(found, report(found), strict=True):
         assert outlier.name in line
         assert outlier.psnr_db < outlier.median_db - LEAST_DB
+
+
+@pytest.mark.parametrize(("background", "shown"), [("random", 0.5), ("black", 0.0), ("white", 1.0)])
+def test_model_and_photo_are_compared_over_one_background(balls, background, shown):
+    """Mid grey where training draws a random one: it favours neither bright nor dark edges.
+
+    A photo without anything in it, of a camera that sees nothing of the scene, is just that.
+    """
+    settings = TrainSettings(iterations=1, max_anchors=20, background=background)
+    trainer = Trainer(open_device("cpu"), balls, settings)
+    photo = trainer.schedule.photos["RGB"][0]
+    eye = photo.view.world_from_eye
+    away = moved_by(np.array([0.0, np.pi, 0, 0, 0, 0]))
+    empty = replace(
+        photo, view=offset_view(photo.view, away), rgba=np.zeros_like(photo.rgba), weight=None
+    )
+    assert -eye.matrix()[:3, 2] @ -empty.view.world_from_eye.matrix()[:3, 2] < -0.99
+    image, wanted = drawn(trainer, empty)
+    assert np.array_equal(image, np.full((64, 64, 3), shown, np.float32))
+    assert np.array_equal(wanted, image)
 
 
 def test_few_photos_and_even_spreads_name_none(balls):
