@@ -43,7 +43,7 @@ from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_control
 from shapeshift.runtime_models.model import ScaffoldModel, SplatLayers
-from shapeshift.runtime_models.stop_weights import Controls, same_controls
+from shapeshift.runtime_models.stop_weights import same_controls
 from shapeshift.scene.control import control_key, control_of
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import View
@@ -99,25 +99,22 @@ class Renderer:
             if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
                 self._rebuild(scene)
             for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
-                if obj.visible and decoded.key != (key := control_key(obj)):
-                    self._decode_geometry(i, decoded, control_of(obj))
-                    decoded.key = key
+                if not obj.visible or decoded.key == (key := control_key(obj)):
+                    continue
+                x, first = control_of(obj), decoded.key is None
+                # The same control still: a selector changed where nothing is.
+                if first or not same_controls(x, decoded.x):
+                    # What follows the eye is decoded with the colours, once the eye is known.
+                    if (first or shape_follows_control(obj.model)) and not follows_eye(obj.model):
+                        self.drawing.decode_geometry(i, x)
+                        self._geometry_runs += 1
+                    decoded.x = x
+                    decoded.version += 1
+                decoded.key = key
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
         self.drawing.set_poses(poses)
         self._scene = scene
-
-    def _decode_geometry(self, i: int, decoded: DecodedObject, x: Controls) -> None:
-        """Geometry of object i at x, unless it lies in the arena already."""
-        if decoded.key is not None and same_controls(x, decoded.x):
-            return  # a selector changed where nothing is
-        shaped = decoded.key is not None and not shape_follows_control(decoded.model)
-        # What follows the eye is decoded with the colours, once the eye is known.
-        if not (shaped or follows_eye(decoded.model)):
-            self.drawing.decode_geometry(i, x)
-            self._geometry_runs += 1
-        decoded.x = x
-        decoded.version += 1
 
     def _choose_false_colors(self, scene: Scene) -> None:
         """Which colours are decoded, and where palettes belong, as the controls ask for."""
