@@ -10,6 +10,7 @@ import numpy as np
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import TILE, Projected
+from shapeshift.rasterizer.raster import MIN_TRANSMITTANCE
 
 KERNELS = Path(__file__).parent / "kernels"
 FORMS = {"cpu": (KERNELS / "evidence_cpu.cl", 1), "gpu": (KERNELS / "evidence_gpu.cl", 256)}
@@ -22,8 +23,16 @@ LARGEST = 2**32 - 1  # of the table's numbers
 class Evidence:
     """(rows, labels) sums over views of alpha T in pixels; any order of tiles leaves them equal."""
 
-    def __init__(self, device: Device, splats: int, labels: int, each: int = 1) -> None:
+    def __init__(
+        self,
+        device: Device,
+        splats: int,
+        labels: int,
+        each: int = 1,
+        min_transmittance: float = MIN_TRANSMITTANCE,
+    ) -> None:
         """labels: 0 to labels - 1 are summed.  each: splats a row, in a row: k of an anchor model.
+        min_transmittance: a pixel with less left shows nothing more, as in drawing.
 
         Raises ValueError, and NoMemory where the table does not fit.
         """
@@ -32,6 +41,7 @@ class Evidence:
         if each < 1 or splats % each:
             raise ValueError(f"{splats} splats are no whole number of rows of {each}")
         self._device, self._each, self._splats = device, each, splats
+        self._stop = float(min_transmittance)
         self._table = device.zeros((splats // each, labels), np.uint32)
         self._sums = np.zeros((splats // each, labels))
         self._steps, self._most = STEPS, 0  # of the table; what no number of it is above
@@ -58,12 +68,12 @@ class Evidence:
         self._make_room(labels.size, grid[0] * grid[1])
         on_device = self._device.upload(labels)
         file, group = FORMS[form or self._device.kind]
-        kernel = self._device.program(file)["evidence"]
+        kernel = self._device.program(file, STOP=self._stop, EACH=self._each)["evidence"]
         for first in range(0, most_in_a_tile(labels), LABELS_A_PASS):
             self._device.launch(
                 kernel, grid[0] * grid[1] * group, group,
                 labels.shape[1], labels.shape[0], grid[0], tiles.starts, tiles.intersections,
-                projected.record, on_device, first, self._each, columns, float(self._steps),
+                projected.record, on_device, first, columns, float(self._steps),
                 self._table,
             )  # fmt: skip
 
@@ -96,7 +106,7 @@ class Evidence:
 
 def most_in_a_tile(labels: np.ndarray) -> int:
     """How many labels the tile with most of them has; SILENT counts, too: it may be one less."""
-    if len(np.unique(labels)) <= LABELS_A_PASS:
+    if np.count_nonzero(np.bincount(labels.ravel())) <= LABELS_A_PASS:
         return LABELS_A_PASS
     height, width = (-(-side // TILE) * TILE for side in labels.shape)
     padded = np.full((height, width), SILENT, np.uint8)

@@ -5,7 +5,7 @@
 // same in any order of tiles; a tile's share is rounded once.
 // Reads:   tile_start (tiles + 1), intersections, record (N, 12), labels (H, W): SILENT and what is
 //          not below `columns` says nothing; first: of the labels of each tile, counted from its
-//          least, this pass sums LABELS from there on; each: splats a row of the table, in a row.
+//          least, this pass sums LABELS from there on; EACH: splats a row of the table, in a row.
 // Writes:  table (rows, columns), added to.
 // Units:   pixels, row 0 on top; table in 1 / steps pixels.
 #include "common/vector.cl"
@@ -16,9 +16,18 @@
 #define NO LABELS    // the column of pixels that have none of them: summed, never written
 #define SEVERAL -1   // labels, in a block or in the tile
 
+// alpha T of a splat in a block, and what it leaves of T: as in rasterize of raster_cpu.cl, which
+// says why.
+#define WEIGH(k)                                                                        \
+  const float8 dx = block_x[k] - mx, dy = block_y[k] - my;                              \
+  const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);                     \
+  float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);                           \
+  const float8 weight = select((float8)(0), alpha, power >= least) * T[k];              \
+  T[k] -= weight;
+
 __kernel void evidence(int width, int height, int tiles_x, __global const int* tile_start,
                        __global const int* intersections, __global const float* record,
-                       __global const uchar* labels, int first, int each, int columns, float steps,
+                       __global const uchar* labels, int first, int columns, float steps,
                        __global uint* table) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
@@ -40,21 +49,23 @@ __kernel void evidence(int width, int height, int tiles_x, __global const int* t
   if (!present) return;
   // Transmittance of all 256 pixels, and the place of each pixel's label.
   float8 T[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
-  uchar of[BLOCKS * LANES];
+  int8 of[BLOCKS];
   int same[BLOCKS];  // the place that all pixels of a block have, or SEVERAL
   int whole = NO;    // the same of the tile
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);
     block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
     T[k] = inside(k, x0, y0, width, height);
+    int lanes[LANES];
     for (int lane = 0; lane < LANES; lane++) {
       // Pixels outside the image have no T; they count as their neighbours on the border.
       const int x = min(k / DOWN * BLOCK_W + lane % BLOCK_W, w - 1);
       const int y = min(k % DOWN * BLOCK_H + lane / BLOCK_W, h - 1);
       const int at = place[labels[(size_t)(y0 + y) * width + x0 + x]];
-      of[k * LANES + lane] = at;
+      lanes[lane] = at;
       same[k] = lane == 0 || same[k] == at ? at : SEVERAL;
     }
+    of[k] = vload8(0, lanes);
     whole = k == 0 || whole == same[k] ? same[k] : SEVERAL;
   }
   Batch batch;
@@ -63,39 +74,42 @@ __kernel void evidence(int width, int height, int tiles_x, __global const int* t
   const int end = tile_start[tile + 1];
   while (p < end && open) {
     const int n = fetch(p, end, x0, y0, intersections, record, &batch);
+    // Rows lie anywhere in the table: ahead of use, so that their misses overlap.
+    for (int j = 0; j < n; j++)
+      PREFETCH(table + (size_t)columns * (intersections[p + j] / EACH));
     for (int j = 0; j < n; j++) {
-      // alpha T as in rasterize of raster_cpu.cl, which says why.
       const float* s = batch.splats + RECORD * j;
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
       const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[POWER_THRESHOLD];
-      float sums[LABELS + 1];
-      for (int m = 0; m < present; m++) sums[m] = 0;
-      float8 all = 0;  // where the tile has one label: nothing is told apart
-      for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
-        const int k = lowest(left);
-        const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
-        const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
-        float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);
-        alpha = select((float8)(0), alpha, power >= least);
-        const float8 weight = alpha * T[k];
-        T[k] -= weight;
-        if (whole != SEVERAL) {
-          all += weight;
-        } else if (same[k] != SEVERAL) {
-          // A block of one label costs one sum over its lanes.
-          sums[same[k]] += sum8(weight);
-        } else {
-          float lanes[LANES];
-          vstore8(weight, 0, lanes);
-          for (int lane = 0; lane < LANES; lane++) sums[of[k * LANES + lane]] += lanes[lane];
-        }
-      }
-      if (whole != SEVERAL) sums[whole] = sum8(all);
+      uint left = open & batch.blocks[j];
+      if (!left) continue;
       // Tiles meet in rows of the table: atomics, of integers, which any order leaves equal.
-      __global uint* row = table + (size_t)columns * (intersections[p + j] / each);
+      __global uint* row = table + (size_t)columns * (intersections[p + j] / EACH);
+      if (whole != SEVERAL) {  // one label: nothing is told apart
+        float8 all = 0;
+        for (; left; left &= left - 1) {
+          const int k = lowest(left);
+          WEIGH(k)
+          all += weight;
+        }
+        const uint amount = (uint)rint(sum8(all) * steps);
+        if (amount) atomic_add(row + label_of[0], amount);
+        continue;
+      }
+      float8 sums[LABELS + 1];
+      for (int m = 0; m < present; m++) sums[m] = 0;
+      for (; left; left &= left - 1) {
+        const int k = lowest(left);
+        WEIGH(k)
+        if (same[k] != SEVERAL)
+          sums[same[k]] += weight;
+        else  // as many masks as the tile has labels: few, and quicker than lane by lane
+          for (int m = 0; m < present; m++)
+            sums[m] += select((float8)(0), weight, of[k] == m);
+      }
       for (int m = 0; m < present; m++) {
-        const uint amount = (uint)rint(sums[m] * steps);
+        const uint amount = (uint)rint(sum8(sums[m]) * steps);
         if (amount) atomic_add(row + label_of[m], amount);
       }
     }

@@ -15,7 +15,7 @@
 __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void evidence(
     int width, int height, int tiles_x, __global const int* tile_start,
     __global const int* intersections, __global const float* record,
-    __global const uchar* labels, int first, int each, int columns, float steps,
+    __global const uchar* labels, int first, int columns, float steps,
     __global uint* table) {
   __local float batch[BATCH * RECORD];
   __local int row_of[BATCH];
@@ -60,7 +60,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void evidence(
     const int n = min(BATCH, end - p);
     for (int k = l; k < n * RECORD; k += PIXELS)
       batch[k] = record[(size_t)RECORD * intersections[p + k / RECORD] + k % RECORD];
-    if (l < n) row_of[l] = intersections[p + l] / each;
+    if (l < n) row_of[l] = intersections[p + l] / EACH;
     for (int k = l; k < n * present; k += PIXELS) sums[k] = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
     // Near to far: the weight alpha T of each splat, as rasterize of raster_gpu.cl blends it.

@@ -23,6 +23,7 @@ from tests.support.renderer.rasterizer_scenes import (
 
 FORMS = ("cpu", "gpu")
 STEP = 1 / STEPS  # pixels
+STOP = 1e-5  # of transmittance, as the backward pass has it
 SIZES = [(37, 26), (16, 16), (17, 33), (15, 1), (1, 1)]
 
 
@@ -32,7 +33,7 @@ def shown(splats: list, camera, form: str):
 
 
 def gathered(view, labels: np.ndarray, count: int, form: str, each: int = 1) -> np.ndarray:
-    found = Evidence(device(), view[0].record.shape[0], count, each)
+    found = Evidence(device(), view[0].record.shape[0], count, each, STOP)
     found.add(*view, labels, form)
     return found.sums()
 
@@ -115,7 +116,7 @@ def test_any_order_of_tiles_gives_the_same_table(form):
     whole = gathered(view, labels, 5, form)
     grid = view[1].grid
     order = np.random.default_rng(1).permutation(grid[0] * grid[1])
-    apart = Evidence(device(), 500, 5)
+    apart = Evidence(device(), 500, 5, min_transmittance=STOP)
     for tile in order:  # one tile speaks, the others are silent
         alone = np.full_like(labels, SILENT)
         y, x = 16 * (tile // grid[0]), 16 * (tile % grid[0])

@@ -50,7 +50,7 @@ def viewer(window, tmp_path):
     models = {item.name: model for item in ITEMS}
     source = Source(Path("a"), model)
     state = EditorState(lambda path: model)
-    edited = EditedFile(History.of(FILE), saved=FILE, sources={("a", "", "", False): source})
+    edited = EditedFile(History.of(FILE), saved=FILE, sources={("a", "", "", False, None): source})
     state.open_sources([source, source], scene_of(FILE, models), None, edited)
     state.bodies._of = {item.name: (made_of(item), BOX) for item in ITEMS}  # nothing is cut up
     with state.bodies:
