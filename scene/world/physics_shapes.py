@@ -10,6 +10,7 @@ from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.thicken import thickened
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import UNIT_SLACK, Pose
+from shapeshift.scene.world.broad_faces import with_firm_faces
 
 FAR = 1e4  # metres from the world's origin: beyond, float32 is coarser than a millimetre
 LEAST_EXTENT = 1e-4  # metres: a hull thinner than a tenth of a millimetre has no inside
@@ -89,7 +90,8 @@ def compound_shape(hulls: Any) -> Any:
                 f"{LEAST_EXTENT * 1e3:g} mm thick is wanted."
             )
         try:
-            parts.append((Isometry3.identity(), SharedShape.convex_hull(points)))
+            shape = SharedShape.convex_hull(with_firm_faces(points))
+            parts.append((Isometry3.identity(), shape))
         except MeshConversionError as why:
             raise ValueError(f"hull {i} cannot be made convex: {why}; thicken it.") from why
     if not parts:
