@@ -83,9 +83,11 @@ def is_accepted(judged: Judged, own: Judged) -> bool:
 def choose(judged: list[Judged], scores: list[float], own: Judged) -> int | None:
     """The candidate that agrees best with the support, if it may be accepted; among those that
     agree alike (to two decimals) the surest.
+
+    Not the next best: where little of the object has been seen, a part of it would be taken.
     """
     order = sorted(range(len(judged)), key=lambda i: (-round(judged[i].f, 2), -scores[i]))
-    return next((i for i in order if is_accepted(judged[i], own)), None)
+    return order[0] if order and is_accepted(judged[order[0]], own) else None
 
 
 @dataclass(frozen=True)

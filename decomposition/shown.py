@@ -58,9 +58,17 @@ class ShownAnchors:
 
     def picture(self, view: View, x: Control, values: np.ndarray) -> np.ndarray:
         """(H, W, 3) of values (A, 3) 0 to 1 of anchors, blended as colours are; over 0."""
-        color = np.zeros((self.count, self.each, 4), np.float32)
-        color[..., :3] = values[:, None]
-        self._color.set(color.reshape(-1, 4))
+        return self._drawn(view, x, np.repeat(values, self.each, axis=0))
+
+    def look(self, view: View, x: Control) -> np.ndarray:
+        """(H, W, 3) display sRGB: the model itself; over black."""
+        eye = view.world_from_eye.position.astype(np.float32)
+        return self._drawn(view, x, self._evaluator.color(x, eye))
+
+    def _drawn(self, view: View, x: Control, values: np.ndarray) -> np.ndarray:
+        color = np.zeros((self.model.splat_count, 4), np.float32)
+        color[:, :3] = values
+        self._color.set(color)
         projected, tiles = self._tiles(view, x)
         return rasterize_rgba(self.device, projected, tiles, view.size)[..., :3].copy()
 

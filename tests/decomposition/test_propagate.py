@@ -93,7 +93,7 @@ def test_the_surest_of_those_that_agree_alike():
     alike = [Judged(0.951, 1, 1, 1), Judged(0.949, 1, 1, 1), Judged(0.90, 1, 1, 1)]
     assert choose(alike, [0.1, 0.9, 0.95], own) == 1
     assert choose(alike, [0.9, 0.1, 0.95], own) == 0
-    assert choose([Judged(0.99, 1, 1, 2), *alike], [1, 0, 0, 0], own) == 1  # the first is too large
+    assert choose([Judged(0.99, 1, 1, 2), *alike], [1, 0, 0, 0], own) is None  # it is too large
     assert choose([Judged(0.5, 1, 1, 1)], [1], own) is None
     assert choose([], [], own) is None
 

@@ -1,0 +1,142 @@
+"""The photos of a capture as masks are made on them: by name, straight, of a bounded size."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from shapeshift.decomposition.masks.label_maps import read_mask
+from shapeshift.decomposition.masks.segmenter import Prompt
+from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs, PhotoPrompt
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.stop import Stop
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.undistort import pinhole_of, undistorted
+from shapeshift.scene.pose import View
+
+MOST_SIDE = 1024  # pixels: what segmenters look at
+
+
+@dataclass(frozen=True)
+class WorkPhoto:
+    """One photo, divided so that its longer side has MOST_SIDE pixels at most."""
+
+    name: str  # below the capture's folder, forward slashes
+    photo: Photo
+    factor: int
+    view: View  # of the divided photo
+    stop: Stop  # of the model, that the photo shows
+
+    def pixels(self) -> np.ndarray:
+        """(H, W, 3) uint8.  Raises BadFile."""
+        rgb = load_photo(self.photo, self.factor).rgb
+        assert rgb.shape[:2] == self.view.size[::-1]
+        return rgb
+
+    def places(self, points: Sequence[tuple[float, float]]) -> np.ndarray:
+        """(n, 2) pixels of the divided photo, of points in the file's pixels."""
+        places = np.array(points, np.float64).reshape(-1, 2)
+        if self.photo.lens is not None and len(places):
+            places = straight_points(self.photo.lens, places)
+        return places / self.factor
+
+    def mask(self, path: Path, label: int | None) -> np.ndarray:
+        """(H, W) bool of the divided photo, from a PNG of the file's shape.  Raises BadFile."""
+        mask = Image.fromarray(read_mask(path, self.photo.file_size, label))
+        if self.photo.lens is not None:
+            size = pinhole_of(self.photo.lens).size
+            mask = undistorted(mask.convert("L"), self.photo.lens, size)
+        width, height = self.view.size
+        whole = mask.convert("L").crop((0, 0, width * self.factor, height * self.factor))
+        small = whole if self.factor == 1 else whole.reduce(self.factor)
+        return np.asarray(small.resize(self.view.size, Image.Resampling.NEAREST)) > 127
+
+
+def straight_points(lens: ColmapCamera, points: np.ndarray) -> np.ndarray:
+    """(n, 2) pixels of the straight camera, of points in a bent photo's pixels."""
+    import pycolmap
+
+    width, height = lens.size
+    camera = pycolmap.Camera(model=lens.model, width=width, height=height, params=lens.params)
+    straight = pinhole_of(lens)
+    return np.asarray(camera.cam_from_img(points)) * straight.focal + straight.centre
+
+
+def work_photos(capture: Capture, stops: Sequence[Stop]) -> list[WorkPhoto]:
+    """The photos in the capture's order, without those of modalities that a model with these
+    stops does not have.  Raises BadFile where none is left.
+    """
+    stop_of = {stop.name: stop for stop in stops}
+    found = []
+    for photo in capture.photos:
+        if photo.modality not in stop_of:
+            continue
+        factor = max(math.ceil(max(photo.view.size) / MOST_SIDE), 1)
+        name = name_of(photo.path, capture.folder)
+        view = photo.view.divided(factor)
+        found.append(WorkPhoto(name, photo, factor, view, stop_of[photo.modality]))
+    if not found:
+        theirs = ", ".join(sorted({photo.modality for photo in capture.photos}))
+        raise BadFile(
+            f"{capture.folder} has photos of {theirs}, the model the stops "
+            f"{', '.join(stop_of)}; give the capture that the model was trained on."
+        )
+    return found
+
+
+def name_of(path: Path, folder: Path) -> str:
+    """Of a photo, as prompts have it: below the folder where it lies there."""
+    try:
+        return path.absolute().relative_to(folder.absolute()).as_posix()
+    except ValueError:
+        return path.as_posix()
+
+
+def find_photo(photos: Sequence[WorkPhoto], asked: str, where: str) -> int:
+    """The index of the photo that a prompt names: its path, or its file name if that is one's
+    alone.  Raises BadFile.
+    """
+    names = [photo.name for photo in photos]
+    if asked in names:
+        return names.index(asked)
+    files = [i for i, name in enumerate(names) if Path(name).name == asked]
+    if len(files) == 1:
+        return files[0]
+    near = get_close_matches(asked, names, 1)
+    if len(files) > 1:
+        advice = f"{len(files)} photos are called so; write {names[files[0]]} or another"
+    else:
+        advice = f"did you mean '{near[0]}'" if near else f"the first one is '{names[0]}'"
+    raise BadFile(f"{where}: '{asked}' is none of the capture's {len(names)} photos; {advice}.")
+
+
+def prompt_of(spec: ObjectSpec, said: PhotoPrompt, photo: WorkPhoto) -> Prompt:
+    """What a person said of the object in a photo, in its divided pixels.  Raises BadFile where
+    that lies outside of it.
+    """
+    width, height = photo.photo.file_size
+    corners = [said.box[:2], said.box[2:]] if said.box else []
+    for x, y in (*corners, *said.inside, *said.outside):
+        if not (0 <= x <= width and 0 <= y <= height):
+            raise BadFile(
+                f"object '{spec.name}': {x:g}, {y:g} lies outside of {photo.name}, which has "
+                f"{width}x{height} pixels."
+            )
+    box = None
+    if said.box:
+        left, top, right, bottom = said.box
+        edge = photo.places([(left, top), (right, top), (left, bottom), (right, bottom)])
+        low, high = edge.min(0), edge.max(0)
+        box = float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return Prompt(box, photo.places(said.inside), photo.places(said.outside), text=spec.text)
+
+
+def given_mask(specs: ObjectSpecs, said: PhotoPrompt, photo: WorkPhoto) -> np.ndarray | None:
+    """The mask that a prompt names, (H, W) bool of the divided photo.  Raises BadFile."""
+    return None if said.mask is None else photo.mask(specs.path(said), said.mask_label)
