@@ -171,7 +171,10 @@ def test_a_second_button_ends_what_the_first_one_held(viewer):
     window.on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
     window.on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.RELEASE, 0)
     run_frames(viewer, 2)
-    assert viewer.state.world.held(HAND) is None and window._pressed is None
+    assert viewer.state.world.held(HAND) is None
+    window.on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, 0)
+    run_frames(viewer, 2)
+    assert viewer.state.world.held(HAND) == "cube", "no button counts as pressed any more"
 
 
 def test_it_lets_go_of_what_is_gone(viewer):
