@@ -8,6 +8,7 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.floor import REST, Floor, Grid, clearness, spacing_of
 from shapeshift.vr.locomotion.play_space import PlaySpace
+from tests.support.renderer.frames import texture_target
 from tests.support.vr.vr_hands import HEAD, eyes, pixel_of
 
 SIZE = (500, 450)
@@ -25,12 +26,8 @@ def floor(ctx):
 
 @pytest.fixture
 def target(ctx):
-    texture = ctx.texture(SIZE, 4)
-    made = ctx.framebuffer([texture])
-    yield made
-    ctx.detect_framebuffer(0).use()
-    made.release()
-    texture.release()
+    with texture_target(ctx, SIZE) as made:
+        yield made
 
 
 def picture(
