@@ -75,9 +75,9 @@ class Renderer:
         self.settings = RenderSettings()
         self._target = target
         self._ctx = ctx
-        self._gpu = Gpu(ctx) if ctx is not None else None
-        self._resolve = Resolve(self._gpu) if self._gpu is not None else None
-        self.drawing = open_drawing(drawing, self._gpu, mlps, sort)
+        self.gpu = Gpu(ctx) if ctx is not None else None
+        self._resolve = Resolve(self.gpu) if self.gpu is not None else None
+        self.drawing = open_drawing(drawing, self.gpu, mlps, sort)
         self._timer = PassTimer(ctx)
         self._scene = Scene(())
         self._decoded: list[DecodedObject] = []
@@ -380,7 +380,7 @@ class Renderer:
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""
         self.drawing.close()
-        for part in (self._resolve, self._gpu):
+        for part in (self._resolve, self.gpu):
             if part is not None:
                 part.release()
 

@@ -12,7 +12,7 @@ from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings
 
 if TYPE_CHECKING:
-    from shapeshift.training.fit.ablation import Decision, Trial
+    from shapeshift.training.fit.ablation import Ablation, Trial
     from shapeshift.training.fit.fit import FitReport
 
 
@@ -143,7 +143,7 @@ def print_report(need: "FitReport") -> None:
         console.print(f"{word}: {describe(found)}")
 
 
-def cells(verdict: "Decision", names: list[str]) -> list[str]:
+def cells(verdict: "Ablation", names: list[str]) -> list[str]:
     """The columns of one row of the report, all but the first."""
     needed = f" ({', '.join(verdict.needed_by)})" if verdict.needed_by and len(names) > 1 else ""
     saved = (f"{verdict.bytes:+,}", f"{verdict.decode_ms:+.2f}", f"{verdict.train_s:+.1f}")

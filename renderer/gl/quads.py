@@ -55,7 +55,7 @@ class QuadsDrawing(Drawing):
         self._most: float | None = None  # brightest colour of these; None: not known yet
         self._last = 0  # row of the counts of the view drawn last
         self.draws_heat = False  # in addition to the colours, from the next frame on
-        self._arena: Arena  # these two from allocate() on
+        self.arena: Arena  # these two from allocate() on
         self._decoder: Decoder
         self._allocated: list[Arena | Decoder] = []
 
@@ -69,9 +69,9 @@ class QuadsDrawing(Drawing):
         self._changed = True
         self._models, self._most = models, None
         counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
-        self._arena = Arena(self._gpu, counts, antialiased)
-        self._decoder = Decoder(self._gpu, self._arena, models, self._mlps)
-        self._allocated = [self._arena, self._decoder]
+        self.arena = Arena(self._gpu, counts, antialiased)
+        self._decoder = Decoder(self._gpu, self.arena, models, self._mlps)
+        self._allocated = [self.arena, self._decoder]
         if any(map(has_heat, models)):
             self._splatter.program_for(heat=True)  # compiled now, not in the first frame with heat
         on_cpu = self._mlps == "gl" and any(follows_eye(model) for model in models)
@@ -88,7 +88,7 @@ class QuadsDrawing(Drawing):
         self._decoder.geometry(i, x, eye_object, seen)
 
     def color_set(self, which: int, count: int) -> None:
-        self._arena.color_set(which, count)
+        self.arena.color_set(which, count)
 
     def decode_color(
         self,
@@ -105,14 +105,14 @@ class QuadsDrawing(Drawing):
 
     def set_poses(self, world_from_objects: list[np.ndarray]) -> None:
         poses = np.reshape(world_from_objects, (-1, 4, 4))
-        if not np.array_equal(poses, self._arena.world_from_object, equal_nan=True):
+        if not np.array_equal(poses, self.arena.world_from_object, equal_nan=True):
             self._changed = True
-            self._arena.set_poses(poses)
+            self.arena.set_poses(poses)
 
     def draw(
         self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
     ) -> None:
-        arena = self._arena
+        arena = self.arena
         target, unit = choose_target(self._gpu, settings.target, self._brightest())
         self._splatter.target, self._splatter.unit = target, unit
         self.backends["drawing"] = f"quads ({target})"
@@ -144,7 +144,7 @@ class QuadsDrawing(Drawing):
 
     def _splat(self, group: list[View], i: int, settings: RenderSettings) -> None:
         """Draws views that were projected together, from image i on; two at once where it pays."""
-        arena, pair, disparity = self._arena, self.stereo_pair, None
+        arena, pair, disparity = self.arena, self.stereo_pair, None
         alike = len(group) == 2 and group[0].size == group[1].size and arena.count
         if pair is not None and alike and not self.draws_heat:
             if settings.low_pass >= LEAST_LOW_PASS:
@@ -161,7 +161,7 @@ class QuadsDrawing(Drawing):
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:
-        arena, sort_policy = self._arena, copy(self._sort_policy)
+        arena, sort_policy = self.arena, copy(self._sort_policy)
         now = (self.sorts, self.order_age, self._changed)
         kept = [(buffer, buffer.read()) for buffer in (arena.order, arena.command)]
         try:
@@ -174,13 +174,11 @@ class QuadsDrawing(Drawing):
 
     def _median_distance(self, eye_from_world: np.ndarray) -> float:
         """Metres from an eye to the median splat, from a sample of those that are there."""
-        mean_opacity, owner, _ = (
-            a[:: -(-self._arena.count // SAMPLE)] for a in self.splat_points()
-        )
-        return median_distance(eye_from_world @ self._arena.world_from_object, mean_opacity, owner)
+        mean_opacity, owner, _ = (a[:: -(-self.arena.count // SAMPLE)] for a in self.splat_points())
+        return median_distance(eye_from_world @ self.arena.world_from_object, mean_opacity, owner)
 
     def counts(self) -> dict[str, int]:
-        return self._projector.counts(self._arena, self._last)
+        return self._projector.counts(self.arena, self._last)
 
     def _brightest(self) -> float:
         """The largest colour of the scene, found out once."""
@@ -204,33 +202,33 @@ class QuadsDrawing(Drawing):
         return self._splatter.texture(i, of=1)
 
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        arena = self._arena
+        arena = self.arena
         owner = np.repeat(np.arange(len(arena.starts) - 1), np.diff(arena.starts))
         rows = [np.frombuffer(b.read(), np.float32) for b in (arena.mean_opacity, arena.covariance)]
         n = arena.count
         return rows[0][: 4 * n].reshape(n, 4), owner, rows[1][: 8 * n].reshape(n, 8)
 
     def write_colors(self, color: np.ndarray) -> None:
-        sets = len(self._arena.colors)
+        sets = len(self.arena.colors)
         for which in reversed(range(sets)):
-            self._arena.color_set(which, sets)
-            for i, (start, end) in enumerate(pairwise(self._arena.starts)):
-                self._arena.write_color(i, color[start:end])
+            self.arena.color_set(which, sets)
+            for i, (start, end) in enumerate(pairwise(self.arena.starts)):
+                self.arena.write_color(i, color[start:end])
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
-        return self._arena.read_colors(i)
+        return self.arena.read_colors(i)
 
     def replace_colors(self, i: int, color: np.ndarray, heat: np.ndarray | None) -> None:
-        self._arena.write_color(i, color)
+        self.arena.write_color(i, color)
         if heat is not None:
-            self._arena.write_heat(i, heat)
+            self.arena.write_heat(i, heat)
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
-        return count_overdraw(self._gpu, self._projector, self._arena, view, settings)
+        return count_overdraw(self._gpu, self._projector, self.arena, view, settings)
 
     def surface(self, view: View, settings: RenderSettings) -> Surface:
         """Depth, normals and coverage from a view; the order and the counts in use stay."""
-        arena = self._arena
+        arena = self.arena
         if not arena.count:
             return Surface.empty(view.size)
         with self.order_set_aside():

@@ -31,7 +31,7 @@ class StereoPairSplatter:
         self._move = gpu.program("resolve.vert", "stereo_pair_crop.frag")
         self._triangles = gpu.ctx.vertex_array(self._program, [])
         self._screen = gpu.ctx.vertex_array(self._move, [])
-        self._targets: moderngl.Framebuffer | None = None
+        self.targets: moderngl.Framebuffer | None = None
 
     def disparity(self, arena: Arena, width: int) -> int | None:
         """By how many pixels the right view, as just projected, has to move to lie on the left;
@@ -80,22 +80,22 @@ class StereoPairSplatter:
         """Two attachments of this height and at least this width; an old one that is wide enough
         stays, since the disparity changes from frame to frame.
         """
-        old = self._targets
+        old = self.targets
         if old is not None and old.width >= size[0] and old.height == size[1]:
             if old.color_attachments[0].dtype == dtype:
                 return old
         made = [self._gpu.ctx.texture(size, 4, dtype=dtype) for _ in range(2)]
         self._gpu.allocations += 2
         self._release_targets()
-        self._targets = self._gpu.ctx.framebuffer(made)
-        return self._targets
+        self.targets = self._gpu.ctx.framebuffer(made)
+        return self.targets
 
     def _release_targets(self) -> None:
-        if self._targets is not None:
-            for texture in self._targets.color_attachments:
+        if self.targets is not None:
+            for texture in self.targets.color_attachments:
                 texture.release()
-            self._targets.release()
-            self._targets = None
+            self.targets.release()
+            self.targets = None
 
     def release(self) -> None:
         self._release_targets()

@@ -202,3 +202,44 @@ def test_no_two_classes_have_one_name():
     assert {path.split("/")[0] for path in shared["Options"]} == {"app"}
     for name in ("Renderer", "Scene"):
         assert sorted(path.startswith("shapeshift/api/") for path in shared[name]) == [False, True]
+
+
+# ---- Tests use what anybody may use.
+
+# What is left has no public way: device arrays of one pass, injected faults and clocks of drivers.
+MOST_REACHES = 27
+NOT_PRIVATE = {
+    "_replace",
+    "_asdict",
+    "_fields",
+    "_make",
+    "_repr_png_",
+    "_exit",
+    "_state",
+    "_getframe",
+}
+
+
+def private_reaches() -> list[str]:
+    """Places of tests that name a private attribute of something that the file did not make."""
+    found = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        nodes = list(ast.walk(ast.parse(path.read_text())))
+        own = {
+            node.attr
+            for node in nodes
+            if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "self"
+        }
+        for node in nodes:
+            name = getattr(node, "attr", "")
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "setattr":
+                last = getattr(node.args[1], "value", "") if len(node.args) > 1 else ""
+                name = last if isinstance(last, str) else ""
+            if name.startswith("_") and not name.endswith("__") and name not in own | NOT_PRIVATE:
+                found.append(f"{path.relative_to(ROOT)}:{node.lineno} {name}")
+    return found
+
+
+def test_tests_reach_into_few_private_attributes():
+    found = private_reaches()
+    assert len(found) <= MOST_REACHES, "\n".join(found)

@@ -9,7 +9,7 @@ import pytest
 from shapeshift.rasterizer.device import NoDevice, open_device
 from shapeshift.renderer.colors.color_cache import reach_of_scaffold
 from shapeshift.renderer.reference.reference import reference_image
-from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view, model_points
 from shapeshift.scene.control import control_of
@@ -204,20 +204,27 @@ def test_held_out_photos_are_compared_from_their_own_eyes(tmp_path):
         assert psnr_db(picture, wanted) > 60
 
 
-def test_framing_and_picking(tmp_path):
+def test_framing_and_picking(tmp_path, monkeypatch):
     model = made(tmp_path, anchors=60)
     assert np.array_equal(anchor_places(model), model.anchors)
     assert len(model_points(model)[0]) == 60
     scene, picker = in_scene(model, TURNED), Picker()
+    decode, given = Evaluator.geometry, []
+    monkeypatch.setattr(
+        Evaluator,
+        "geometry",
+        lambda *a, **named: given.append(decode(*a, **named)) or given[-1],
+    )
     eye = np.array([0.0, 0.2, 3.0])
     hit = picker.under(scene, eye, TURNED.position - eye)
     assert hit is not None
     assert 1 < hit.depth < 4
     object_from_world = np.linalg.inv(TURNED.matrix())
     there = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
-    assert np.array_equal(picker._decoded[0].opacity, evaluate(model, 0.0, there).opacity)
-    first = picker._decoded[0]
+    assert len(given) == 1
     picker.under(scene, eye, np.array([0.1, 0, -1.0]))
-    assert picker._decoded[0] is first
+    assert len(given) == 1
     picker.under(scene, -eye, np.array([0.1, 0, 1.0]))
-    assert picker._decoded[0] is not first
+    assert len(given) == 2
+    monkeypatch.undo()
+    assert np.array_equal(given[0][3], evaluate(model, 0.0, there).opacity)

@@ -17,6 +17,7 @@ from shapeshift.vr.locomotion.teleport import Arc
 from shapeshift.vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
 from shapeshift.vr.panel.carried import Carried, carry
 from shapeshift.vr.touching import Touched
+from tests.support.renderer.frames import texture_target
 from tests.support.vr.vr_hands import HEAD, OPEN, PLANE, a_frame, eyes, hand_at, pixel_of
 
 SIZE = (500, 450)
@@ -36,12 +37,8 @@ def overlay(ctx, request):
 
 @pytest.fixture
 def target(ctx):
-    texture = ctx.texture(SIZE, 4)
-    made = ctx.framebuffer([texture])
-    yield made
-    ctx.detect_framebuffer(0).use()  # not one that is gone
-    made.release()
-    texture.release()
+    with texture_target(ctx, SIZE) as made:
+        yield made
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.floor import REST, Floor, Grid, clearness, spacing_of
 from shapeshift.vr.locomotion.play_space import PlaySpace
+from tests.support.renderer.frames import texture_target
 from tests.support.vr.vr_hands import HEAD, eyes, pixel_of
 
 SIZE = (500, 450)
@@ -25,12 +26,8 @@ def floor(ctx):
 
 @pytest.fixture
 def target(ctx):
-    texture = ctx.texture(SIZE, 4)
-    made = ctx.framebuffer([texture])
-    yield made
-    ctx.detect_framebuffer(0).use()
-    made.release()
-    texture.release()
+    with texture_target(ctx, SIZE) as made:
+        yield made
 
 
 def picture(
@@ -80,7 +77,7 @@ def test_it_is_never_a_void_and_clearer_while_one_moves(floor, target):
     assert (picture(floor, target, grid=replace(CLEAR, clearness=0.0))[..., 0] == 26).all()
 
 
-def test_splats_hide_it_as_much_as_they_cover(floor, target):
+def test_splats_hide_it_as_much_as_they_cover(ctx, floor, target):
     """By an array from the tiles, row 0 on top, and by a texture of the splatter, at the bottom."""
     covered = np.zeros((90, 100), np.float32)
     covered[:45, :50], covered[:45, 50:] = 1.0, 0.5  # the upper half
@@ -92,7 +89,7 @@ def test_splats_hide_it_as_much_as_they_cover(floor, target):
     assert np.abs(half).max() <= 1.01
     rgba = np.zeros((90, 100, 4), np.float32)
     rgba[..., 3] = covered[::-1]
-    texture = floor._ctx.texture((100, 90), 4, rgba.tobytes(), dtype="f4")
+    texture = ctx.texture((100, 90), 4, rgba.tobytes(), dtype="f4")
     texture.repeat_x = texture.repeat_y = False
     np.testing.assert_array_equal(light(picture(floor, target, coverage=texture)), hidden)
     texture.release()

@@ -56,7 +56,7 @@ class DbChange:
 
 
 @dataclass(frozen=True)
-class Decision:
+class Ablation:
     """What taking a part away did."""
 
     part: str
@@ -102,7 +102,7 @@ def changes(before: Trial, after: Trial) -> dict[str, DbChange]:
     return {n: change_of(before.psnr[n], after.psnr[n]) for n in before.psnr}
 
 
-def decide(part: str, full: Trial, before: Trial, after: Trial, tolerance_db: float) -> Decision:
+def decide(part: str, full: Trial, before: Trial, after: Trial, tolerance_db: float) -> Ablation:
     """Whether the part may go: `after` is the model without it, `full` the largest."""
     change, total = changes(before, after), changes(full, after)
     both = {n: (change[n], total[n]) for n in total}
@@ -111,7 +111,7 @@ def decide(part: str, full: Trial, before: Trial, after: Trial, tolerance_db: fl
     )
     likely = all(c.mean >= -tolerance_db for two in both.values() for c in two)
     verdict = DROPPED if not needed_by else UNSURE if likely else KEPT
-    return Decision(
+    return Ablation(
         part, change, total, verdict, needed_by,
         before.bytes - after.bytes, before.decode_ms - after.decode_ms,
         before.train_s - after.train_s,

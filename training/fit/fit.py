@@ -14,7 +14,7 @@ from shapeshift.runtime_models.package.feature_codes import FEATURES
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_package import package_files, zip_files
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.training.fit.ablation import COMPONENTS, DROPPED, Component, Decision, Trial, decide
+from shapeshift.training.fit.ablation import COMPONENTS, DROPPED, Ablation, Component, Trial, decide
 from shapeshift.training.fit.view_metrics import largest_contribution, outline_ious, view_psnr
 from shapeshift.training.photos import BLACK, choose_downscale, load_photos
 from shapeshift.training.settings import TrainSettings
@@ -33,7 +33,7 @@ class FitReport:
     settings: TrainSettings  # that train it
     full: Trial  # the largest
     fitted: Trial
-    decisions: tuple[Decision, ...]
+    decisions: tuple[Ablation, ...]
     outlines: dict[tuple[str, str], float]  # of every two stops of the largest, see view_metrics.py
     photos: dict[str, int]  # held out, by modality
     seeds: int
@@ -70,7 +70,7 @@ class Fit:
         """
         self.device, self.capture, self.report = device, capture, report
         self.tolerance_db, self.seeds = tolerance_db, seeds
-        self.decisions: list[Decision] = []
+        self.decisions: list[Ablation] = []
         self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
         self.held_out = load_photos(capture, "test", factor, settings.masks)
         self.photos = load_photos(capture, "train", factor, settings.masks)

@@ -49,7 +49,7 @@ class Gizmo:
         match event:
             case KeyDown(key=glfw.KEY_M):
                 self.next_mode()
-            case Press(button="left") if self._under_mouse:
+            case Press(button="left") if self.under_mouse:
                 self.holding = True
             case DoubleClick() if self.holding:
                 pass
@@ -77,7 +77,7 @@ class Gizmo:
                 state.say("Click an object, or its name, to choose what to move.")
 
     @property
-    def _under_mouse(self) -> bool:
+    def under_mouse(self) -> bool:
         return self._shown and imguizmo.im_guizmo.is_over()
 
     def draw(self, ui_scale: float) -> None:

@@ -18,6 +18,7 @@ from shapeshift.app.stability_cases.table import CASES, COLUMNS, open_table
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stop_weights import Pace
+from shapeshift.scene.scene import Scene
 from tests.support.program import assert_refused, launch
 from tests.support.renderer.case_context import SIZE, failures, make_case
 from tests.support.splat_scenes import random_layers
@@ -53,6 +54,11 @@ class Spoiled:
     def __init__(self, renderer, spoil) -> None:
         self._renderer, self._spoil, self._frames = renderer, spoil, 0
         self.settings = renderer.settings
+        self.scene = Scene(())
+
+    def update(self, scene):
+        self.scene = scene
+        self._renderer.update(scene)
 
     def draw(self, views):
         self._renderer.settings = self.settings
@@ -91,7 +97,7 @@ def flashing(renderer, image, i):
 
 
 def darker_in_between(renderer, image, i):
-    x = renderer._renderer._scene.objects[0].x
+    x = renderer.scene.objects[0].x
     return image * np.float32(0.4) if 0.3 < x < 0.7 else image
 
 

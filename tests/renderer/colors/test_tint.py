@@ -106,7 +106,7 @@ def test_plain_splats_and_two_objects(renderer):
 def test_it_follows_x_and_the_eye(renderer):
     """What is decoded anew under a tint is tinted, and comes back as it is then."""
     strength = np.linspace(0, 1, 40).astype(np.float32)
-    fresh = Renderer(renderer._ctx, **RENDERERS["tiles"])
+    fresh = Renderer(None, **RENDERERS["tiles"])
     with fresh:
         made = model(40)
         for x in (0.0, 0.2, 0.5, 0.5, 0.7):

@@ -105,7 +105,7 @@ def test_a_view_too_large_for_the_driver_is_refused_and_the_next_drawn(ctx):
     with Renderer(ctx, "quads") as renderer:
         renderer.update(two_objects(100))
         before = draw(renderer, front_view((32, 32)))
-        most = renderer._gpu.max_side
+        most = renderer.gpu.max_side
         with pytest.raises(TooLarge, match=f"{most + 1} x 8 pixels was asked for.* smaller one"):
             draw(renderer, front_view((most + 1, 8)))
         np.testing.assert_array_equal(draw(renderer, front_view((32, 32))), before)

@@ -280,12 +280,12 @@ def test_a_scene_that_does_not_fit_is_refused_and_the_old_one_still_drawn(opened
     renderer, view = opened("quads"), front_view((32, 32))
     small, large = alone(random_layers(100)), alone(random_layers(5000))
     image = drawn(renderer, small, view)
-    limit, renderer._gpu.max_block = renderer._gpu.max_block, 32 * 1000
+    limit, renderer.gpu.max_block = renderer.gpu.max_block, 32 * 1000
     with pytest.raises(BadFile, match="5,000 splats and this driver draws 1,000 at most"):
         renderer.update(large)
     assert renderer.draw([view]).splats == 0, "drawing goes on, with nothing"
     np.testing.assert_array_equal(drawn(renderer, small, view), image)
-    renderer._gpu.max_block = limit
+    renderer.gpu.max_block = limit
 
 
 @pytest.mark.parametrize("drawing", DRAWINGS)

@@ -31,8 +31,10 @@ posix = pytest.mark.skipif(os.name == "nt", reason="rights and links of POSIX")
 
 
 @pytest.fixture(autouse=True)
-def unswept(monkeypatch):
+def swept(monkeypatch) -> set:
+    """Folders that were tidied: once a process, and empty again as in another start of it."""
     monkeypatch.setattr(whole_file, "_swept", set())
+    return whole_file._swept
 
 
 @pytest.fixture
@@ -238,7 +240,7 @@ def start_slow(path: Path) -> subprocess.Popen:
 
 @posix
 @pytest.mark.parametrize("name", ["a.ply", "folder"])
-def test_litter_of_killed_writers_goes_and_nothing_else(tmp_path, monkeypatch, name):
+def test_litter_of_killed_writers_goes_and_nothing_else(tmp_path, swept, name):
     not_ours = ("a.ply.part", ".shapeshift-notes.part", ".shapeshift-0123456789abcdef.part.txt",
                 "x.shapeshift-0123456789abcdef.part", "a.ply.12345678.part")  # fmt: skip
     for other in not_ours:
@@ -249,7 +251,7 @@ def test_litter_of_killed_writers_goes_and_nothing_else(tmp_path, monkeypatch, n
     killed.wait()
     try:
         assert len(parts_in(tmp_path)) == 2
-        monkeypatch.setattr(whole_file, "_swept", set())  # as another start of the program
+        swept.clear()  # as another start of the program
         write_some(tmp_path / "c.ply")
         assert len(parts_in(tmp_path)) == 1, "the part of the writer that lives stays"
         assert {path.name for path in tmp_path.iterdir()} >= {name, "c.ply", *not_ours}
@@ -327,7 +329,7 @@ def test_a_package_in_a_folder_is_there_at_every_moment(tmp_path):
 
 @posix
 @pytest.mark.parametrize("name", ["scene", "scene.shift"])
-def test_packages_survive_kill_at_random_instants(tmp_path, name):
+def test_packages_survive_kill_at_random_instants(tmp_path, swept, name):
     code = (
         "import sys; from tests.support.models import make_random_model\n"
         "from shapeshift.runtime_models.package.write_package import write_package\n"
@@ -347,7 +349,7 @@ def test_packages_survive_kill_at_random_instants(tmp_path, name):
         process.wait()
         process.stdout.close()
         assert len(read_model(tmp_path / name).anchors) in (3, 4)
-    whole_file._swept.clear()  # as in the next start: a folder is swept once a process
+    swept.clear()  # as in the next start
     write_package(make_random_model(3), tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == [name]
 

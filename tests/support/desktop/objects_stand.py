@@ -88,12 +88,13 @@ CTRL, SHIFT = glfw.MOD_CONTROL, glfw.MOD_SHIFT
 
 def viewer_is_over(viewer, place) -> bool:
     mouse(viewer, *place)
-    return viewer.gizmo._under_mouse
+    return viewer.gizmo.under_mouse
 
 
 def until_added(viewer) -> None:
     end = time.monotonic() + 20
-    while viewer.objects.adding._opener.busy and time.monotonic() < end:
+    run_frames(viewer, 1)
+    while viewer.polling and time.monotonic() < end:
         run_frames(viewer, 1)
         time.sleep(0.005)
     run_frames(viewer, 2)

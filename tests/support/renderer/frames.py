@@ -1,5 +1,9 @@
 """One frame of a renderer with settings of its own, as tests of every drawing ask for it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import moderngl
 import numpy as np
 
 from shapeshift.renderer.renderer import Renderer
@@ -21,3 +25,14 @@ def draw_counted(
 def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:
     """A picture a view."""
     return draw_counted(renderer, scene, views, **settings)[0]
+
+
+@contextmanager
+def texture_target(ctx: moderngl.Context, size: tuple[int, int]) -> Iterator[moderngl.Framebuffer]:
+    """A framebuffer of one RGBA texture; afterwards the context does not keep one that is gone."""
+    texture = ctx.texture(size, 4)
+    made = ctx.framebuffer([texture])
+    yield made
+    ctx.detect_framebuffer(0).use()
+    made.release()
+    texture.release()

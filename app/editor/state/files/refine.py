@@ -13,6 +13,7 @@ from shapeshift.runtime_models.read_scene import describe
 from shapeshift.runtime_models.splats.sog.read_streamed import is_streamed, levels
 
 POLL_S = 0.05  # how often a waiting reader looks whether it is still wanted
+THREAD = "finer levels"  # its name
 PATIENCE_S = 5.0  # longest wait at the end for a level that is being read
 
 
@@ -57,7 +58,7 @@ class Refiner:
             return
         self._unwanted = threading.Event()
         given = (shown, self._finer, self._unwanted)
-        self._thread = threading.Thread(target=self._read, args=given, daemon=True)
+        self._thread = threading.Thread(target=self._read, args=given, name=THREAD, daemon=True)
         self._thread.start()
 
     def next_level(self) -> tuple[SplatLayers, SplatLayers] | None:

@@ -161,7 +161,7 @@ def test_it_lets_go(viewer, event):
     run_frames(viewer, 2)
 
 
-def test_a_second_button_ends_what_the_first_one_held(viewer):
+def test_a_second_button_ends_what_the_first_one_held(viewer, monkeypatch):
     window = viewer.window
     window.on_cursor(None, *on_screen(viewer, place(viewer)))
     window.on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, 0)
@@ -171,7 +171,12 @@ def test_a_second_button_ends_what_the_first_one_held(viewer):
     window.on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
     window.on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.RELEASE, 0)
     run_frames(viewer, 2)
-    assert viewer.state.world.held(HAND) is None and window._pressed is None
+    assert viewer.state.world.held(HAND) is None
+    events = []
+    monkeypatch.setattr(viewer, "handle_event", events.append)
+    window.on_cursor(None, 300.0, 200.0)
+    run_frames(viewer, 1)
+    assert not any(isinstance(event, Drag) for event in events), "no button counts as pressed"
 
 
 def test_it_lets_go_of_what_is_gone(viewer):

@@ -143,12 +143,12 @@ def test_a_moving_head_allocates_once_and_a_narrow_driver_draws_twice(ctx, monke
         renderer.update(scene)
         renderer.draw(at(0.6))
         made = renderer.drawing.allocations
-        widest = pair._targets.width
+        widest = pair.targets.width
         for distance in (0.8, 3.0, 9.0, 0.7, 0.6):
             renderer.draw(at(distance))
-        assert renderer.drawing.allocations == made and pair._targets.width == widest > 320
+        assert renderer.drawing.allocations == made and pair.targets.width == widest > 320
         near = [renderer.image(i).copy() for i in range(2)]
-        monkeypatch.setattr(renderer._gpu, "max_side", 320)
+        monkeypatch.setattr(renderer.gpu, "max_side", 320)
         monkeypatch.setattr(pair, "draw", lambda *a: pytest.fail("the grid is too wide"))
         renderer.draw(at(0.6))
         for i in range(2):
@@ -215,7 +215,7 @@ def test_memory_of_a_second_eye_comes_and_goes(ctx):
     with Renderer(ctx, "quads") as renderer:
         scene, pair = COLOURED["both"](), coloured_eyes()
         draw_counted(renderer, scene, pair)
-        arena, made = renderer.drawing._arena, renderer.drawing.allocations
+        arena, made = renderer.drawing.arena, renderer.drawing.allocations
         assert len(arena.colors) == 2
         for _ in range(3):
             draw_counted(renderer, scene, pair)
