@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.edited_file import key_of
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.track import next_stop, stepped
 from shapeshift.runtime_models.model import BadFile
@@ -19,7 +18,7 @@ from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled,
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 
-LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
+LOOKS = {"model", "mode", "up", "flip", "part"}  # fields that ask for another model
 MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less counts as unmoved
 COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 
@@ -114,7 +113,7 @@ def fresh_row(
     state: EditorState, item: SceneItem, label: int
 ) -> tuple[SceneObject, object, Sweep, Source]:
     """What the state holds of an object that was not there."""
-    source = state.edited.sources[key_of(item)]
+    source = state.edited.source(item)
     obj = object_of(item, state.in_palette(source.model), label)
     sweep = Sweep.over(source.model.blend)
     sweep.resume_at(item.x)

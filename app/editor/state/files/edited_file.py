@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.parts.piece import Piece
 from shapeshift.app.editor.state.regions import Regions
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.model import Model, Stop
@@ -29,6 +30,9 @@ class EditedFile:
     saved_regions: tuple = ()  # the regions then
     stamp: tuple = ()  # of the file when it was read or written here: changed by others since?
     sources: dict[ModelKey, Source] = field(default_factory=dict)
+    pieces: dict[str, Piece] = field(default_factory=dict)  # by what stands for their models
+    # Files of pieces that were written here: scene file and what is in them -> path and stamp
+    packages: dict[tuple[Path, tuple], tuple[Path, tuple]] = field(default_factory=dict)
     _compared: tuple | None = None  # two files, and how they differ
 
     @property
@@ -53,8 +57,13 @@ class EditedFile:
             known = self._compared = (self.file, self.saved, compared(self.saved, self.file))
         return known[2]
 
+    def source(self, item: SceneItem) -> Source:
+        """Where an object's model comes from: a file, or a piece that was cut in the window."""
+        piece = self.pieces.get(item.model)
+        return self.sources[key_of(item)] if piece is None else piece.source
+
     def model(self, item: SceneItem) -> Model:
-        return self.sources[key_of(item)].model
+        return self.source(item).model
 
     def models_by_name(self) -> dict[str, Model]:
         return {item.name: self.model(item) for item in self.file.all_items}

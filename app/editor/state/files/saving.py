@@ -5,6 +5,7 @@ from pathlib import Path
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import beside, stamp_of, with_regions
+from shapeshift.app.editor.state.parts.write_pieces import with_written_pieces
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.paths import is_bundled, plain
 from shapeshift.scene.document.scene_file import ENDING, FAR_M, SceneFile
@@ -97,11 +98,12 @@ class Saving:
         state = self._state
         edited = state.edited
         try:
-            file = filed(edited.file, state, path)
+            pieces = with_written_pieces(edited, checked(edited.file), path.absolute())
+            file = filed(pieces, state, path)
             path.parent.mkdir(parents=True, exist_ok=True)
             write_scene_file(file, path)
         except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else str(error)
+            reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
             state.problem = f"{path.name} cannot be saved: {reason}."
             return False
         self.name = ""
@@ -158,11 +160,8 @@ def unsaved(state: EditorState) -> bool:
     return state.edited.unsaved or state.regions.kept != state.edited.saved_regions
 
 
-def filed(file: SceneFile, state: EditorState, path: Path) -> SceneFile:
-    """What is written: with the regions, and with paths from the folder that it goes to.
-
-    ValueError for what could not be read again.
-    """
+def checked(file: SceneFile) -> SceneFile:
+    """The file; ValueError for what could not be read again."""
     for item in file.all_items:
         if not all(abs(metres) <= FAR_M for metres in item.position):
             raise ValueError(
@@ -170,6 +169,11 @@ def filed(file: SceneFile, state: EditorState, path: Path) -> SceneFile:
             )
         if "\\" in item.model:
             raise ValueError(f"a path with a backslash ({item.model}) is no path everywhere")
+    return file
+
+
+def filed(file: SceneFile, state: EditorState, path: Path) -> SceneFile:
+    """What is written: with the regions, and with paths from the folder that it goes to."""
     view = state.first_view((640, 360))
     selectors = [state.regions.selectors(index, view) for index in range(len(file.all_items))]
     return beside(with_regions(file, selectors), path.parent)
