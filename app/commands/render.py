@@ -60,6 +60,9 @@ class Options(ReadingOptions):
     """Regions with an X of their own (a stop's name or a number) and a soft border in metres:
     sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border] half:x,y,z:nx,ny,nz:X[:border]
     lens:degrees:X[:border].  A later one lies over an earlier one.  Default: none."""
+    show: Annotated[str, Opt(metavar="VIEW")] = "full"
+    """Of a scene with objects: full, overlay (each object tinted), background (without objects),
+    isolated (objects alone) or isolated:NAME (one of them)."""
     fov_y: Annotated[float, EXPERT] = 0.0
     """Degrees from top to bottom, for a camera file that says nothing about the lens; 0: not
     known."""
@@ -107,6 +110,7 @@ def run(options: Options) -> int:
     settings, budget = choose_settings(options), read_budget(options.target_ms, options.floor_db)
     check_one_of(options, budget)
     check_output(options)
+    check_show(options)
     # What needs no scene comes before it: large ones take a while to open.
     cameras = choose_cameras(options, size)
     count = len(cameras.views) if cameras else None
@@ -115,6 +119,7 @@ def run(options: Options) -> int:
     subjects = [document_at(document, each) for each in controls]
     labels = [label_of(each, s.x) for each, s in zip(controls, subjects, strict=True)]
     rows, paths = choose_paths(options, labels, count)
+    shown = [show(subject.scene, options.show) for subject in subjects]
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
         background = options.background or document.background
@@ -126,7 +131,7 @@ def run(options: Options) -> int:
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
             if options.stereo_colors != "auto":
                 renderer.settings = replace(renderer.settings, stereo_colors=options.stereo_colors)
-        scenes = [with_selectors(subjects[c].scene, selectors[i]) for c, i in rows]
+        scenes = [with_selectors(shown[c], selectors[i]) for c, i in rows]
         work = (renderer, scenes, [views[i] for _, i in rows], paths, options.stereo)
         if options.output == "picture":
             draw_all(*work)
@@ -203,6 +208,30 @@ def check_output(options: Options) -> None:
             raise UsageError(f"--output {options.output} goes without {option}; leave one out.")
     if options.depth_unit is not None and not 1e-9 <= options.depth_unit <= 1e6:
         raise UsageError(f"--depth-unit is {options.depth_unit}, expected metres above 0.")
+
+
+def check_show(options: Options) -> None:
+    """Before the scene is read.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.renderer.show_modes import read_show_mode
+
+    try:
+        mode, _ = read_show_mode(options.show)
+    except ValueError as error:
+        raise UsageError(f"--show: {error}.") from None
+    if options.select and mode in ("background", "isolated"):
+        raise UsageError(f"--show {mode} goes without --select; leave one of the two out.")
+
+
+def show(scene, mode: str):
+    """The scene as --show asks for it.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.renderer.show_modes import show_objects
+
+    try:
+        return show_objects(scene, mode)
+    except ValueError as error:
+        raise UsageError(f"--show: {error}.") from None
 
 
 def unit_of(options: Options, document: "Document", views: list) -> float:

@@ -219,6 +219,21 @@ class OpenedScene:
         left = tuple(obj for obj in self.objects if obj.name not in gone)
         return self._with(Document(DrawnScene(left), file))
 
+    def showing(self, show: str) -> Self:
+        """The scene without its background, or without its objects: as `show` of `render`.
+
+        Raises UsageError.
+
+            scene.showing("isolated:mug").splats(0.0)
+        """
+        from shapeshift.renderer.show_modes import show_objects
+
+        try:
+            shown = show_objects(self._subject.scene, show)
+        except ValueError as error:
+            raise UsageError(f"show: {error}.") from None
+        return self._with(replace(self._subject, scene=shown))
+
     def with_regions(self, *regions: "str | Selector", name: str | None = None) -> Self:
         """The scene with parts that have an x of their own; none: without any.
 

@@ -106,6 +106,7 @@ class Scene(OpenedScene):
         select: Sequence["str | Selector"] = (),
         eye_distance: float = 0.0,
         output: Output = "picture",
+        show: str = "full",
         settings: "RenderSettings | None" = None,
         drawing: "Drawing" = "auto",
         context: "Context" = "auto",
@@ -116,14 +117,17 @@ class Scene(OpenedScene):
         displayed; None is what the scene was trained on, else black.  select: as of `with_regions`.
         eye_distance: metres; above 0 the picture holds two eyes, side by side.  output: `depth`
         gives (H, W) metres along the view and `normal` (H, W, 3) directions in eye axes, NaN where
-        nothing is; `coverage` (H, W) how much of the background is hidden.  settings: what may be
-        left out (RenderSettings; its background counts, too).
+        nothing is; `coverage` (H, W) how much of the background is hidden.  show: of a scene with
+        objects `overlay` tints them, `background` leaves them out, `isolated` or `isolated:NAME`
+        draws them alone.  settings: what may be left out (RenderSettings; its background counts,
+        too).
 
         The renderer stays open for the next picture; for loops at full speed take `ss.Renderer`.
         Raises UsageError, BadFile, NoContext, NoDevice.
 
             picture = scene.render(x=0.5, camera="front", size=(640, 360))
             depth_m = scene.render(output="depth")
+            motor = ss.load("room.shift").render(x="Opened", show="isolated:motor")
         """
         scene = self.at(x)
         if select:
@@ -131,6 +135,10 @@ class Scene(OpenedScene):
         view = scene.views(camera, 1, size)[0]
         from shapeshift.api.views import picture_of
 
+        if show != "full":  # in the same view and before the same background as the whole
+            if settings is None and background is None:
+                background = scene.subject.background
+            scene = scene.showing(show)
         return picture_of(scene, view, background, eye_distance, output, settings, drawing, context)
 
     def frames(

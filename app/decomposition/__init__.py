@@ -1,0 +1,1 @@
+"""Commands that make objects of photos; each is loaded when it is asked for."""

@@ -1,0 +1,261 @@
+"""launch.py segment: a scene and label maps of its photos to a scene file of objects.
+
+python3 launch.py segment room.shift capture --masks labels --out room.scene.json
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from shapeshift.app.command_line import EXPERT, POSITIONAL
+from shapeshift.app.opening import ReadingOptions, open_capture, open_model
+from shapeshift.app.paths import full
+from shapeshift.app.program import program
+from shapeshift.app.terminal import open_console, print_json, say
+
+if TYPE_CHECKING:
+    from shapeshift.decomposition.score import LabelScore
+    from shapeshift.decomposition.segment_scene import Segmented
+    from shapeshift.runtime_models.model import AnchorModel, SplatLayers
+
+DECIMALS = 4  # of shares in a report
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Cut a scene into objects by label maps of its photos (0 background, 1 to 254 objects, 255
+    says nothing): writes the labelled scene, and a scene file whose objects can be taken."""
+
+    scene: Annotated[Path, POSITIONAL]
+    """A package, or a file of splats."""
+    capture: Annotated[Path, POSITIONAL]
+    """The folder of posed photos that it was trained on."""
+    masks: Path
+    """A folder of label maps, 8-bit grey PNGs with the photos' names: rgb/012.png for rgb/012.jpg.
+    Not every photo needs one; four that see all sides are enough."""
+    out: Path
+    """The scene file to write, NAME.scene.json; the labelled scene is written beside it."""
+    objects: Path | None = None
+    """objects.json: names, masses and colliders of the labels.  Default: they are called object 1,
+    object 2, ..."""
+    score: Path | None = None
+    """A folder of true label maps, named in the same way: says how well the cut scene shows them.
+    Default: not scored."""
+    report: Path | None = None
+    """A folder for pictures of what was found.  Default: none are drawn."""
+    downscale: Annotated[int | None, EXPERT] = None
+    """Divide the photos' sides by this number.  Default: as in the training, if the scene knows it,
+    else such that neither exceeds 1024 pixels."""
+    json: bool = False
+    """JSON on standard output instead of a table."""
+    overwrite: bool = False
+    """Replace what an earlier run wrote; never what is read."""
+
+
+def run(options: Options) -> int:
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.progress import progress_bar, working
+    from shapeshift.app.training.evaluate import trained_downscale
+    from shapeshift.decomposition.masks.specs import read_specs
+    from shapeshift.decomposition.segment_scene import (
+        named_objects,
+        read_pictures,
+        scene_of_parts,
+        scores_of,
+        segment,
+    )
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.scene.document.write_scene_file import write_scene_file
+    from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
+
+    if options.downscale is not None and not 1 <= options.downscale <= 64:
+        raise UsageError(f"--downscale is {options.downscale}, expected 1 to 64.")
+    refuse_outputs(options)
+    known = read_specs(options.objects).objects if options.objects else ()
+    model = open_labelled(options)
+    capture = with_extrinsics(
+        open_capture(options.capture, options.memory), rig_of(model.provenance)
+    )
+    factor = options.downscale or trained_downscale(model.provenance)
+    with working("reading label maps"):
+        pictures = read_pictures(options.masks, capture, model, factor)
+        true = read_pictures(options.score, capture, model, factor) if options.score else []
+    specs = named_objects(pictures, known)
+    device = open_device()
+    with progress_bar() as bar:
+        task = bar.add_task("evidence of photos", total=len(pictures))
+        found = segment(
+            device, model, pictures, specs, len(capture.photos),
+            lambda done, count: bar.update(task, completed=done),
+        )  # fmt: skip
+    if not any(part.rows for part in found.parts):
+        raise UsageError("no object got any part of the scene; look at the label maps.")
+    path = model_path(options, model)
+    write_model(found.model, path)
+    write_scene_file(scene_of_parts(found, path.name, options.out.parent), options.out)
+    with working("scoring"):
+        scores = scores_of(device, found, true)
+    if options.json:
+        print_json(facts_of(found, scores, options))
+    else:
+        print_tables(found, scores)
+    tell_gaps(found)
+    if options.report is not None:
+        from shapeshift.app.decomposition.segment_report import write_report
+
+        write_report(device, found, options.report, options.overwrite)
+        say(f"pictures in {full(options.report)}")
+    say(
+        f"{full(options.out)} and {path.name} beside it; next: {program()} view {full(options.out)}"
+    )
+    return 0
+
+
+def refuse_outputs(options: Options) -> None:
+    """Before any work.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.document.scene_file import ENDING, is_scene_file
+
+    if is_scene_file(options.scene):
+        raise UsageError(f"{options.scene} is a scene file; name the one model that is to be cut.")
+    if not options.out.name.lower().endswith(ENDING) or options.out.name.lower() == ENDING:
+        raise UsageError(f"--out is {options.out.name}; name a file that ends in {ENDING}.")
+    stem = options.out.name[: -len(ENDING)]
+    written = [options.out, *(options.out.with_name(stem + end) for end in (".shift", ".ply"))]
+    read = {options.scene.resolve(), options.capture.resolve()}
+    for path in written:
+        if path.resolve() in read:
+            raise UsageError(f"{path} is read in this run; choose another --out.")
+        if path.exists() and not options.overwrite:
+            raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
+    folder = options.report
+    if folder is not None and folder.exists() and not folder.is_dir():
+        raise UsageError(f"--report is {folder}, which is a file; name a folder.")
+    if folder is not None and folder.is_dir() and any(folder.iterdir()) and not options.overwrite:
+        raise UsageError(f"{folder} holds files; choose another --report or add --overwrite.")
+
+
+def open_labelled(options: Options) -> "AnchorModel | SplatLayers":
+    """The model, of a kind that can have labels.  Raises BadFile, UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.model import AnchorModel, SplatLayers
+
+    model = open_model(options.scene, options)
+    if not isinstance(model, AnchorModel | SplatLayers):
+        raise UsageError(
+            f"{options.scene} is a Scaffold-GS model, whose splats depend on the eye; export it as "
+            ".ply first, and segment that."
+        )
+    if isinstance(model, SplatLayers) and len(model.stops) > 1:
+        raise UsageError(
+            f"{options.scene} has {len(model.stops)} layers of plain splats; a labelled scene is a "
+            "package, or splats of one file: segment one layer."
+        )
+    return model
+
+
+def model_path(options: Options, model: "AnchorModel | SplatLayers") -> Path:
+    """The labelled scene, beside the scene file."""
+    from shapeshift.runtime_models.model import AnchorModel
+    from shapeshift.scene.document.scene_file import ENDING
+
+    ending = ".shift" if isinstance(model, AnchorModel) else ".ply"
+    return options.out.with_name(options.out.name[: -len(ENDING)] + ending)
+
+
+def write_model(model: "AnchorModel | SplatLayers", path: Path) -> None:
+    """A package with the features as they were filed, or a PLY with a column of labels."""
+    import numpy as np
+
+    from shapeshift.runtime_models.model import AnchorModel
+    from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(model, AnchorModel):
+        features = model.features
+        halves = np.array_equal(features.astype(np.float16), features)
+        write_package(model, path, "float16" if halves else "float32")
+        return
+    arrays = (model.means, model.scales, model.wxyz, model.opacity, model.sh)
+    write_ply(
+        PlainSplats(*arrays, model.origin, model.antialiased, model.labels, model.extra), path
+    )
+
+
+def facts_of(found: "Segmented", scores: "Sequence[LabelScore]", options: Options) -> dict:
+    """The tables as JSON has them."""
+    from math import isfinite
+
+    from shapeshift.decomposition.score import mean_score
+
+    rows = {
+        part.spec.name: {
+            "label": part.spec.label,
+            "photos": part.photos,
+            "rows": part.rows,
+            "pixels": round(part.pixels, 1),
+            "share": round(part.share, DECIMALS),
+        }
+        for part in found.parts
+    }
+    for score in scores:
+        figures = {"iou": score.iou, "boundary_iou": score.boundary_iou, "accuracy": score.accuracy}
+        rows[score.object.name] |= {
+            name: round(value, DECIMALS) if isfinite(value) else None
+            for name, value in figures.items()
+        }
+    facts: dict = {"scene": full(options.out), "photos": len(found.pictures), "objects": rows}
+    if scores:
+        facts["miou"] = round(mean_score(scores), DECIMALS)
+    return facts
+
+
+def print_tables(found: "Segmented", scores: "Sequence[LabelScore]") -> None:
+    from rich.table import Table
+
+    from shapeshift.decomposition.score import mean_score
+    from shapeshift.runtime_models.model import AnchorModel
+
+    rows = "anchors" if isinstance(found.model, AnchorModel) else "splats"
+    table = Table("label", "object", "photos", rows, "pixels", "share")
+    for part in found.parts:
+        table.add_row(
+            str(part.spec.label), part.spec.name, f"{part.photos:,}", f"{part.rows:,}",
+            f"{part.pixels:,.0f}", f"{part.share:.1%}" if part.rows else "",
+        )  # fmt: skip
+    console = open_console(stderr=False)
+    console.print(table)
+    if not scores:
+        return
+    table = Table("object", "IoU %", "boundary IoU %", "accuracy %", "photos")
+    for score in scores:
+        figures = (score.iou, score.boundary_iou, score.accuracy)
+        table.add_row(score.object.name, *map(percent, figures), f"{score.views}")
+    means = [mean_score(scores, name) for name in ("iou", "boundary_iou", "accuracy")]
+    table.add_row("mean", *map(percent, means), "", style="bold")
+    console.print(table)
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.1f}" if share == share else ""
+
+
+def tell_gaps(found: "Segmented") -> None:
+    """What a person should know of it."""
+    if found.silent:
+        said = "photo has no label map and says" if found.silent == 1 else (
+            "photos have no label maps and say"
+        )  # fmt: skip
+        say(f"{found.silent} {said} nothing.")
+    empty = [part.spec.name for part in found.parts if not part.rows]
+    if empty:
+        why = "no label map shows it" if len(empty) == 1 else "no label map shows them"
+        unseen = [part.spec.name for part in found.parts if not part.photos]
+        if unseen != empty:
+            why = "most of what it covers belongs to others" if len(empty) == 1 else (
+                "no label map shows them, or most of what they cover belongs to others"
+            )  # fmt: skip
+        say(f"Left out, for {why}: {', '.join(empty)}.")
