@@ -151,14 +151,20 @@ def fill_unseen(
 
 
 def partition(
-    model: AnchorModel | SplatLayers, sums: np.ndarray, objects: tuple[ObjectLabel, ...]
+    model: AnchorModel | SplatLayers,
+    sums: np.ndarray,
+    objects: tuple[ObjectLabel, ...],
+    numbers: np.ndarray | None = None,
 ) -> AnchorModel | SplatLayers:
-    """The model with a label for every row, by the evidence (rows, labels) of its pictures.
+    """The model with a label for every row, by the evidence (rows, columns) of its pictures.
 
-    objects: names of labels 1 and up; plain splats have a place for the labels alone.
+    numbers: (columns,) the label of each, 0 first; by default they are counted.  objects: names of
+    the labels above 0; plain splats have a place for the labels alone.
     """
     places = model.anchors if isinstance(model, AnchorModel) else model.means
     labels = fill_unseen(places, label_rows(sums), sums.sum(axis=1) > LEAST_PIXELS)
+    if numbers is not None:
+        labels = numbers.astype(np.int32)[labels]
     if isinstance(model, AnchorModel):
         return replace(model, labels=labels.astype(np.uint8), objects=objects)
     return replace(model, labels=labels)

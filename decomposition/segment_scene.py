@@ -1,7 +1,7 @@
 """From label maps of photos to a labelled model and a scene file whose objects are its parts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -113,20 +113,25 @@ def segment(
 ) -> Segmented:
     """The model with labels, and what each object got.  Raises BadFile."""
     objects = tuple(ObjectLabel(spec.label, spec.name) for spec in specs)
-    count = max(spec.label for spec in specs) + 1
-    sums = gather_evidence(device, model, pictures, count, progress)
+    # A column a label that there is, however large its number: the table is as wide as that.
+    numbers = np.array([BACKGROUND_LABEL, *sorted(spec.label for spec in specs)])
+    column_of = np.full(256, SILENT, np.uint8)
+    column_of[numbers] = np.arange(len(numbers))
+    columns = [replace(picture, labels=column_of[picture.labels]) for picture in pictures]
+    sums = gather_evidence(device, model, columns, len(numbers), progress)
     if not (sums.sum(axis=1) > LEAST_PIXELS).any():
         raise BadFile(
             "none of the photos shows anything of the scene; name the capture that it was trained "
             "on."
         )
-    cut = partition(model, sums, objects)
+    cut = partition(model, sums, objects, numbers)
     assert cut.labels is not None
     parts = []
     for spec in specs:
         mine = cut.labels == spec.label
         pixels = float(sums[mine].sum())
-        share = float(sums[mine, spec.label].sum() / pixels) if pixels else 0.0
+        column = int(column_of[spec.label])
+        share = float(sums[mine, column].sum() / pixels) if pixels else 0.0
         seen = sum(bool((picture.labels == spec.label).any()) for picture in pictures)
         parts.append(SegmentedPart(spec, seen, int(mine.sum()), pixels, share))
     return Segmented(cut, tuple(parts), tuple(pictures), photos - len(pictures))
@@ -137,8 +142,8 @@ def scores_of(
 ) -> tuple[LabelScore, ...]:
     """How well the labelled model shows the true label maps, an object at a time."""
     objects = [ObjectLabel(part.spec.label, part.spec.name) for part in found.parts]
-    pictures, count = LabelPictures(device, found.model), max(o.label for o in objects) + 1
-    pairs = ((pictures.label_map(t.view, t.x, count), t.labels) for t in true)
+    pictures = LabelPictures(device, found.model)
+    pairs = ((pictures.label_map(t.view, t.x), t.labels) for t in true)
     return tuple(score_maps(pairs, objects))
 
 

@@ -43,7 +43,7 @@ class Evidence:
         self._device, self._each, self._splats = device, each, splats
         self._stop = float(min_transmittance)
         self._table = device.zeros((splats // each, labels), np.uint32)
-        self._sums = np.zeros((splats // each, labels))
+        self._sums: np.ndarray | None = None  # what the table had before it was emptied
         self._steps, self._most = STEPS, 0  # of the table; what no number of it is above
 
     def add(
@@ -95,13 +95,14 @@ class Evidence:
         self._steps, self._most = steps, self._most + most(steps)
 
     def _empty(self) -> None:
-        self._sums += self._device.download(self._table) / self._steps
+        self._sums = self.sums()
         self._table.fill(0)
         self._most = 0
 
     def sums(self) -> np.ndarray:
         """(rows, labels) float64 pixels, of all views so far."""
-        return self._sums + self._device.download(self._table) / self._steps
+        now = self._device.download(self._table) / self._steps
+        return now if self._sums is None else now + self._sums
 
 
 def most_in_a_tile(labels: np.ndarray) -> int:

@@ -31,7 +31,6 @@ def write_report(device: Device, found: Segmented, folder: Path, overwrite: bool
     make_folder(folder)
     views = spread(found.pictures, VIEWS)
     parts = [part for part in found.parts if part.rows]
-    count = max(part.spec.label for part in found.parts) + 1
     pictures = LabelPictures(device, found.model)
     with open_renderer("auto", "auto") as (renderer, _):
         background = default_background(found.model, (0.0, 0.0, 0.0))
@@ -45,7 +44,7 @@ def write_report(device: Device, found: Segmented, folder: Path, overwrite: bool
 
         rows = []
         for each in tracked(views, "pictures"):
-            shown = pictures.label_map(each.view, each.x, count)
+            shown = pictures.label_map(each.view, each.x)
             rows.append([drawn(each, each.x, "full"), colored(each.labels), colored(shown)])
         save_png(sheet(rows), folder / "labels.png")
         stops = [stop.x for stop in found.model.stops]

@@ -95,7 +95,7 @@ def test_balls_get_their_labels_back_splat_by_splat(device, antialiased):
     model, true = balls()
     model = replace(model, antialiased=antialiased)
     pictures = LabelPictures(device, model, true)
-    views = [LabelledView(view, 0.0, pictures.label_map(view, 0.0, 3)) for view in around(6)]
+    views = [LabelledView(view, 0.0, pictures.label_map(view, 0.0)) for view in around(6)]
     told = []
     sums = gather_evidence(device, model, views, 3, lambda *done: told.append(done))
     assert told == [(i, 6) for i in range(7)]
@@ -113,11 +113,18 @@ def test_balls_get_their_labels_back_splat_by_splat(device, antialiased):
 def test_shares_of_labels_add_up_to_what_is_covered(device):
     model, true = balls()
     view = around(1)[0]
-    apart = LabelPictures(device, model, true).shares(view, 0.0, 3)
-    whole = LabelPictures(device, model, np.zeros_like(true)).shares(view, 0.0, 1)[0]
+    apart = LabelPictures(device, model, true).shares(view, 0.0, range(3))
+    whole = LabelPictures(device, model, np.zeros_like(true)).shares(view, 0.0, [0])[0]
     assert np.abs(apart.sum(0) - whole).max() < 1e-5 and whole.max() > 0.9
-    merged = LabelPictures(device, model, np.minimum(true, 1)).shares(view, 0.0, 5)
+    merged = LabelPictures(device, model, np.minimum(true, 1)).shares(view, 0.0, range(5))
     assert np.abs(merged[1] - apart[1:].sum(0)).max() < 1e-5 and not merged[2:].any()
+
+
+def test_labels_beyond_a_map_are_refused(device):
+    model, true = balls()
+    for labels in (true + 253, true - 1):
+        with pytest.raises(ValueError, match="the largest is 254"):
+            LabelPictures(device, model, labels)
 
 
 def test_evidence_is_gathered_at_each_pictures_own_x(device):
@@ -156,6 +163,6 @@ def test_the_demo_cut_by_six_views_agrees_with_its_tracer(device):
     for x in (0.0, 1.0):
         for cut in (found, by_place):
             pictures = LabelPictures(device, cut)
-            pairs = [(pictures.label_map(v, x, 11), label_map(v, x)) for v in tests]
+            pairs = [(pictures.label_map(v, x), label_map(v, x)) for v in tests]
             score[cut is found, x] = mean_score(score_maps(pairs, NAMES))
         assert score[True, x] > max(0.97 * score[False, x], 0.75)

@@ -98,8 +98,8 @@ def quality_rows(pile: SplatLayers) -> tuple[list[str], np.ndarray]:
     device, true, count = open_device("cpu"), pile.labels, len(THINGS) + 1
     truth = LabelPictures(device, pile)
     poses = cameras(VIEWS + TESTS)
-    views = [LabelledView(v, 0.0, truth.label_map(v, 0.0, count)) for v in poses[:VIEWS]]
-    tests = [(v, truth.label_map(v, 0.0, count)) for v in poses[VIEWS:]]
+    views = [LabelledView(v, 0.0, truth.label_map(v, 0.0)) for v in poses[:VIEWS]]
+    tests = [(v, truth.label_map(v, 0.0)) for v in poses[VIEWS:]]
     rows, evidence = [], None
     for number in (VIEWS, 12, 6):
         sums = gather_evidence(device, pile, views[:number], count)
@@ -109,7 +109,7 @@ def quality_rows(pile: SplatLayers) -> tuple[list[str], np.ndarray]:
                 "unseen to the background": label_rows(sums)}  # fmt: skip
         for name, labels in cuts.items():
             pictures = LabelPictures(device, pile, labels)
-            pairs = [(pictures.label_map(v, 0.0, count), t) for v, t in tests]
+            pairs = [(pictures.label_map(v, 0.0), t) for v, t in tests]
             right = labels == true
             figures = (mean_score(score_maps(pairs, NAMES)), splat_iou(labels, true),
                        right.mean(), right[seen].mean(), seen.mean())  # fmt: skip

@@ -54,7 +54,7 @@ def true_views(count: int, offset: float, x: float) -> list[LabelledView]:
 def quality(device: Device, model: AnchorModel, tests: list[LabelledView]) -> str:
     """The figures of one labelled model."""
     pictures = LabelPictures(device, model)
-    pairs = [(pictures.label_map(t.view, t.x, COUNT), t.labels) for t in tests]
+    pairs = [(pictures.label_map(t.view, t.x), t.labels) for t in tests]
     scores = score_maps(pairs, NAMES)
     worst = min(scores, key=lambda score: score.iou)
     means = [mean_score(scores, name) for name in ("iou", "boundary_iou", "accuracy")]

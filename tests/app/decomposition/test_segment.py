@@ -56,7 +56,7 @@ def given(tmp_path_factory) -> Path:
             kind = "truth" if i == 0 else "masks"
             out = folder / kind / stop.name.lower() / f"{i}.png"
             out.parent.mkdir(parents=True, exist_ok=True)
-            write_label_map(pictures.label_map(view, stop.x, 3), out)
+            write_label_map(pictures.label_map(view, stop.x), out)
     write_capture(Capture(folder / "capture", model.stops, tuple(photos)))
     return folder
 
@@ -127,6 +127,19 @@ def test_objects_json_gives_names_masses_and_colliders(given, tmp_path, capsys):
     assert not (tmp_path / "b.scene.json").exists() and not (tmp_path / "b.shift").exists()
 
 
+def test_labels_may_have_any_numbers(given, tmp_path, capsys):
+    shutil.copytree(given / "masks", tmp_path / "masks")
+    for path in (tmp_path / "masks").rglob("*.png"):
+        labels = np.asarray(Image.open(path))
+        write_label_map(np.choose(labels, np.uint8([0, 254, 7])), path)
+    base = (given / "room.shift", given / "capture", "--masks", tmp_path / "masks")
+    assert cli.main(["segment", *map(str, (*base, "--out", tmp_path / "far.scene.json"))]) == 0
+    assert segment(given, "--out", tmp_path / "near.scene.json") == 0
+    far, near = (read_model(tmp_path / f"{name}.shift") for name in ("far", "near"))
+    assert np.array_equal(far.labels, np.choose(near.labels, np.uint8([0, 254, 7])))
+    assert [each.name for each in far.objects] == ["object 7", "object 254"]
+
+
 def test_plain_splats_are_cut_splat_by_splat(given, tmp_path, capsys):
     model, of = balls()
     count = len(of)
@@ -143,7 +156,7 @@ def test_plain_splats_are_cut_splat_by_splat(given, tmp_path, capsys):
         if photo.modality == "RGB":
             out = tmp_path / "maps" / "rgb" / f"{photo.path.name}.png"  # 0.png.png: also taken
             out.parent.mkdir(parents=True, exist_ok=True)
-            write_label_map(pictures.label_map(photo.view, 0.0, 3), out)
+            write_label_map(pictures.label_map(photo.view, 0.0), out)
     words = (tmp_path / "room.ply", tmp_path / "capture", "--masks", tmp_path / "maps", "--out",
              tmp_path / "cut.scene.json")  # fmt: skip
     assert cli.main(["segment", *map(str, words)]) == 0
