@@ -36,7 +36,7 @@ from shapeshift.runtime_models.model import BadFile
 
 MOST_PHOTOS = 24  # that are asked about: 4 well-spread masks an object equal 48
 MOST_ENCODED = 1 << 30  # bytes of encoded photos that are kept
-Told = Callable[[str, int, int], None]  # what is done now, how many of how many
+Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
 
 
 @dataclass
@@ -102,7 +102,7 @@ class PhotoLabelling:
     specs: ObjectSpecs
     segmenter: Segmenter
     journal: Journal
-    told: Told = lambda what, done, of: None
+    progress: Progress = lambda what, done, of: None
     supports: dict[int, Support] = field(default_factory=dict)
     decisions: dict[int, dict[int, Decision]] = field(default_factory=dict)  # by label, view
 
@@ -115,7 +115,7 @@ class PhotoLabelling:
             here = self.decisions.setdefault(spec.label, {})
             for decision in self.decide(spec, given[spec.label], encoded):
                 here[decision.view] = decision
-                self.told(spec.name, i * len(self.photos) + len(here), total)
+                self.progress(spec.name, i * len(self.photos) + len(here), total)
 
     def given(self, spec: ObjectSpec, encoded: EncodedPhotos) -> dict[int, np.ndarray]:
         """The masks of the photos in which a person says where the object is."""

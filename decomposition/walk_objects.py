@@ -7,7 +7,7 @@ Masks of further photos made in the same way would not help: with them the demo'
 
 import numpy as np
 
-from shapeshift.decomposition.label_photos import Told, best_of
+from shapeshift.decomposition.label_photos import Progress, best_of
 from shapeshift.decomposition.masks.anchor_walk import (
     AnchorGraph,
     make_graph,
@@ -32,7 +32,7 @@ def walk_objects(
     shown: ShownAnchors,
     photos: list[WorkPhoto],
     specs: ObjectSpecs,
-    told: Told = lambda what, done, of: None,
+    progress: Progress = lambda what, done, of: None,
 ) -> tuple[np.ndarray, Masks]:
     """Labels (A,) int32 of a model's anchors, 0 the background, and the masks that they are from.
 
@@ -40,13 +40,13 @@ def walk_objects(
     """
     eyes = np.array([photo.view.world_from_eye.position for photo in photos])
     total = len(specs.objects) + 1
-    told("graph of anchors", 0, total)
+    progress("graph of anchors", 0, total)
     graph = make_graph(nodes_of(shown.model, eyes.mean(axis=0).astype(np.float32)), eyes)
     masks: Masks = {}
     inside: dict[int, np.ndarray] = {}
     seen: dict[int, np.ndarray] = {}
     for done, spec in enumerate(specs.objects, 1):
-        told(spec.name, done, total)
+        progress(spec.name, done, total)
         masks[spec.label] = prompted_masks(shown, photos, specs, spec)
         inside[spec.label], seen[spec.label] = np.zeros(shown.count), np.zeros(shown.count)
         for view, mask in masks[spec.label].items():

@@ -1,4 +1,8 @@
-"""Small cards with a few words in the room: what buttons do, and notices; no one presses them."""
+"""Small cards with a few words in the room: what buttons do, and notices; no one presses them.
+
+Drawn by Pillow with the letters of the debug legends: a card is a picture of its own size, made
+once, and the panel that ImGui draws may be closed while cards hang.  vr/ knows no ImGui.
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache

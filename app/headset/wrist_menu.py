@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from imgui_bundle import imgui
 
+from shapeshift.app.editor.panels.messages_panel import draw_note
 from shapeshift.app.editor.panels.panel import Section, draw_sections
 from shapeshift.app.editor.panels.scale_bar import has_scale
 from shapeshift.app.editor.panels.sections.look_panel import draw_look
@@ -17,6 +18,7 @@ from shapeshift.app.editor.state.arrange import steer_by_hand
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.track import ON_STOP, shown_stop
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
+from shapeshift.app.headset.performance_section import draw_figures
 from shapeshift.app.headset.room_section import (
     Foot,
     RoomActions,
@@ -63,6 +65,7 @@ class WristMenu:
         self._sections = self._make_sections(room)
         self._key: tuple = ()  # what the picture was drawn of
         self._unsettled = 0
+        self._figures_seen = False  # the section of the figures is unfolded
 
     def _make_sections(self, room: RoomActions) -> list[Section]:
         """The headset's own, and those of the desktop's panel that need no keys and no window."""
@@ -80,6 +83,7 @@ class WristMenu:
             Section("Stops", lambda scale: draw_stops(editor, scale)),
             Section("Look", lambda scale: draw_look(editor, scale)),
             Section("Objects", lambda scale: draw_object_list(objects, scale)),
+            Section("Performance", self._draw_figures),
             Section("Help", lambda scale: draw_help()),
         ]
 
@@ -147,7 +151,8 @@ class WristMenu:
             editor.settings.background, tuple(editor.messages.problems),
             tuple(state.touch.reactions),
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
-            self._foot.sure_s > 0,
+            self._foot.sure_s > 0, editor.messages.note,
+            state.figures if self._figures_seen else None,
         )  # fmt: skip
 
     def _fill(self) -> None:
@@ -157,6 +162,7 @@ class WristMenu:
         imgui.set_next_window_size(Vec(*PANEL.size))
         still = flags.no_decoration | flags.no_move | flags.no_saved_settings
         imgui.begin("##panel", None, still | flags.no_scroll_with_mouse)
+        self._figures_seen = False
         draw_head(self._state.editor, UI_SCALE)
         foot = imgui.get_frame_height() + style.item_spacing.y
         imgui.begin_child("sections", Vec(0, -foot))
@@ -164,6 +170,15 @@ class WristMenu:
         imgui.end_child()
         self._foot.draw(self._seconds)
         imgui.end()
+        if note := self._state.editor.messages.note:
+            width, height = PANEL.size
+            imgui.push_style_color(imgui.Col_.window_bg, imgui.ImVec4(*theme.RAISED, 1))
+            draw_note(note, Vec(width / 2, height / 2), 0.94 * width)
+            imgui.pop_style_color()
+
+    def _draw_figures(self, _: float) -> None:
+        self._figures_seen = True
+        draw_figures(self._state.figures)
 
     def _recentre(self) -> None:
         if self._frame is not None:

@@ -15,6 +15,7 @@ from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
 from shapeshift.app.headset.panel_picture import PanelPicture
+from shapeshift.app.headset.performance_section import Figures
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.renderer.renderer import Renderer
@@ -35,6 +36,7 @@ from shapeshift.vr.overlay import Overlay
 from shapeshift.vr.touching import strongest
 
 ANY_SIZE = (640, 360)  # of a view that only says where to stand
+FIGURES_EVERY_S = 1.0  # of the section Performance
 LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on the table
 
 
@@ -88,7 +90,7 @@ class XrApp:
         eye = document.view(ANY_SIZE).world_from_eye
         editor.settings = replace(editor.settings, background=self.background)
         user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
-        touch = TouchState(editor, True)
+        touch = TouchState(editor, True, keys=False)
         self.state = XrState(editor, touch, pacing, user, floor_shown=floor)
         actions = MenuActions(self.recentre, self.leave, self.pulse)
         self.menu = WristMenu(self.state, actions, eyes.panel, panel_hand)
@@ -99,6 +101,7 @@ class XrApp:
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
+        self._figured_s = 0.0  # when the panel's figures were made
         self._drawing_ms = 0.0  # of the splats of both eyes, last
         self._stood = False  # whether the person has been put before the scene
         self.interrupted = False  # by Ctrl-C: no frame is left half done
@@ -155,6 +158,9 @@ class XrApp:
             self.session.submit(self.eyes.textures)
             self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
+            if frame.seen_s - self._figured_s >= FIGURES_EVERY_S:
+                self._figured_s = frame.seen_s
+                self.state.figures = Figures.of(self.session.pace, self.stats)
         else:
             self.mirror.rest()
         session = self.session
@@ -167,6 +173,7 @@ class XrApp:
         """Lets time pass: what plays, edits that the world has to follow, then the world."""
         editor, touch = self.state.editor, self.state.touch
         editor.advance(seconds)
+        editor.messages.ended(time.perf_counter())
         poll_bodies(editor)
         return touch.advance(seconds)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.pacing import Pacing
+from shapeshift.app.headset.performance_section import Figures
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
@@ -75,6 +76,7 @@ class XrState:
     user: XrUser
     play_space: PlaySpace = field(default_factory=PlaySpace)
     floor_shown: bool = True
+    figures: Figures | None = None  # of the last second
 
     @property
     def world(self) -> World:

@@ -31,7 +31,7 @@ def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors
         )
         try:
-            told = listen(child, log.parent / "database.db", progress)
+            reports = listen(child, log.parent / "database.db", progress)
             code = child.wait()
         finally:
             child.kill()
@@ -46,7 +46,7 @@ def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]
             f"the search for poses ended with code {code}, perhaps for want of memory; {log} has "
             "its last words.  Try smaller photos (--side) or fewer (--every)."
         )
-    return told
+    return reports
 
 
 def listen(child: subprocess.Popen, database: Path, progress: Progress) -> list[dict]:

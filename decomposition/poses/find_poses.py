@@ -74,8 +74,8 @@ def find_poses(
     refuse_links(work)
     masks = copy_masks(photos, settings.masks, work) if settings.masks else None
     job = describe(photos, work, settings, masks)
-    told = run_child("find", start_job(work, job), work / "log.txt", progress)
-    if not told or told[-1]["registered"] < 2:
+    reports = run_child("find", start_job(work, job), work / "log.txt", progress)
+    if not reports or reports[-1]["registered"] < 2:
         raise BadFile(
             f"{photos.root}: no two of its {len(photos.photos)} photos could be placed beside each "
             "other; photos must overlap by more than half, be sharp, and show something with "
@@ -96,7 +96,7 @@ def find_poses(
                     if c < FEW_POINTS},
         points=len(best["xyz"]),
         error_px=round(float(best["error_px"]), 3),
-        attempts=[line for line in told if "attempt" in line],
+        attempts=[line for line in reports if "attempt" in line],
         scale=scale,
         up=up,
         paired=sum(name in placed for name in photos.paired.values()),

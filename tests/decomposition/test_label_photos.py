@@ -89,7 +89,7 @@ def test_who_is_interrupted_goes_on_and_ends_alike(photos, specs, tmp_path):
         if len(steps) == 11:
             raise KeyboardInterrupt
 
-    first = labelling(photos, specs, tmp_path / "work", told=stop)
+    first = labelling(photos, specs, tmp_path / "work", progress=stop)
     with pytest.raises(KeyboardInterrupt):
         first.run()
     part = first.labels()  # what is done so far

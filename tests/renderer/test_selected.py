@@ -34,6 +34,7 @@ def test_the_arena_holds_what_the_plain_networks_give_at_every_control_value(ren
     assert np.ndim(x) == 1 and len(np.unique(x)) > 10
     wanted = evaluate(model, x, VIEW.world_from_eye.position)
     mean_opacity = renderer.drawing.splat_points()[0]
+    # Of one pass: nothing later has a colour a splat.
     color = renderer.drawing.device.download(renderer.drawing._color)
     np.testing.assert_allclose(mean_opacity[:, :3], wanted.means, atol=1e-5)
     np.testing.assert_allclose(mean_opacity[:, 3], wanted.opacity, atol=1e-5)

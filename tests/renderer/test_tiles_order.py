@@ -125,6 +125,7 @@ def test_an_order_by_distance_outlives_a_turn_of_the_head(renderer):
 
 
 def orders_of(renderer: Renderer) -> np.ndarray:
+    """What the sort left on the device: of equal keys a picture does not tell the order."""
     drawing = renderer.drawing
     return drawing.device.download(drawing._orders[0]).astype(np.uint32)
 

@@ -40,7 +40,7 @@ GEOMETRY = ("offset", "scale", "rotation", "opacity")
 def test_a_network_that_does_not_see_x_runs_once(fixed, monkeypatch):
     model = without_control(make_random_model(70, k=3), *fixed)
     fresh, kept, ran = Evaluator(model), Evaluator(model, keep=True), []
-    run = Evaluator._run
+    run = Evaluator._run  # what runs is spared; results are the same
     monkeypatch.setattr(Evaluator, "_run", lambda *a: ran.append(a[1]) or run(*a))
     for x in (0.0, 0.4, 0.4, 1.0):
         ours = [array.copy() for array in kept.geometry(x)]

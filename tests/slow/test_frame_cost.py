@@ -47,7 +47,7 @@ def cpu_ms(drawing: str, coefficients: int) -> dict[str, float]:
         for turn in np.arange(FRAMES) * 0.02:
             eye = (3.2 * np.sin(turn), 0.8, 3.2 * np.cos(turn))
             view = View(look_at(eye, (0, 0, 0)), perspective(0.87, SIZE), 0.05, 50, SIZE)
-            renderer._timer = CpuTimer(ctx)
+            renderer._timer = CpuTimer(ctx)  # another clock in place of the wall's
             start = time.process_time()
             renderer.update(scene)
             renderer.draw([view])

@@ -24,11 +24,11 @@ from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.supervision.exposure import fitted_psnr
 
 MOST_LOOKED_AT, LOOKED_AT_PX = 12, 64  # held-out photos, for the colour behind them
-SOME_HAVE = ("vgg", "depth_error", "fitted_db")  # fields of Score that not every photo has
+SOME_HAVE = ("vgg", "depth_error", "fitted_db")  # fields of ModalityScore that not every photo has
 
 
 @dataclass(frozen=True)
-class Score:
+class ModalityScore:
     psnr_db: float
     ssim: float
     photos: int
@@ -131,10 +131,10 @@ def evaluate_model(
     masks: str = "object",
     background: str = "auto",
     distance: Callable[..., float] | None = None,
-) -> dict[str, Score]:
-    """A Score for every modality over its held-out photos.  Raises BadFile where there are none.
+) -> dict[str, ModalityScore]:
+    """Of every modality, over its held-out photos.  Raises BadFile where there are none.
 
-    distance: what Score.vgg is the mean of, a function of (picture, photo, weight).
+    distance: what ModalityScore.vgg is the mean of, a function of (picture, photo, weight).
     """
     factor = downscale or choose_downscale(capture.photos)
     tests = [photo for photo in capture.photos if photo.split == "test"]
@@ -161,7 +161,7 @@ def evaluate_model(
             each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
             psnr_db, ssim_mean = (mean_of(found, key) or 0.0 for key in ("psnr_db", "ssim"))
             some = {key: mean_of(found, key) for key in SOME_HAVE}
-            scores[stop.name] = Score(psnr_db, ssim_mean, len(found), alive, each, **some)
+            scores[stop.name] = ModalityScore(psnr_db, ssim_mean, len(found), alive, each, **some)
     return scores
 
 
@@ -180,7 +180,7 @@ def photo_scores(
     behind: Color,
     distance: Callable[..., float] | None,
 ) -> dict[str, float]:
-    """What Score has the means of, of one photo; without what it has not."""
+    """What ModalityScore has the means of, of one photo; without what it has not."""
     picture, wanted = renderer.picture(photo.view, behind), photo.over(behind)
     found = {
         "psnr_db": float(psnr(picture, wanted, photo.weight)),
@@ -213,7 +213,7 @@ def bytes_on_disk(path: Path) -> int:
     return path.stat().st_size
 
 
-def report(path: Path | None, scores: dict[str, Score], started: float) -> dict:
+def report(path: Path | None, scores: dict[str, ModalityScore], started: float) -> dict:
     """What `eval --json` writes; `started` is time.perf_counter() at the beginning.
 
     path: of the scene, None where it lies nowhere on disk.

@@ -25,12 +25,12 @@ def draw_messages(messages: Messages, free: Box, ui_scale: float) -> list[Box]:
         boxes.append(box)
         y = box[3] + GAP * ui_scale
     if messages.note:
-        _note(messages.note, Vec(middle, y), width)
+        draw_note(messages.note, Vec(middle, y), width)
     return boxes
 
 
-def _note(text: str, at: imgui.ImVec2, width: float) -> None:
-    """`at` is the middle of its upper edge."""
+def draw_note(text: str, at: imgui.ImVec2, width: float) -> None:
+    """Over what lies there, which takes the clicks; `at` is the middle of its upper edge."""
     imgui.set_next_window_pos(at, 0, Vec(0.5, 0))
     flags = imgui.WindowFlags_
     imgui.begin(

@@ -42,9 +42,11 @@ class Flash:
 class TouchState:
     """What the mouse holds, and what has just happened in the scene's world."""
 
-    def __init__(self, state: EditorState, play: bool) -> None:
-        """`play`: every scene opens with its objects in motion, not only the bundled one."""
-        self._state, self.play = state, play
+    def __init__(self, state: EditorState, play: bool, keys: bool = True) -> None:
+        """`play`: every scene opens with its objects in motion, not only the bundled one; `keys`:
+        there is a keyboard, and notes name its keys.
+        """
+        self._state, self.play, self._keys = state, play, keys
         self.hand: MouseHand | None = None  # while it holds something
         self.pads: dict[str, tuple[float, float]] = {}  # name -> balance, power as last put there
         self.reactions: deque[str] = deque(maxlen=REMEMBERED)  # the last reactions, newest first
@@ -91,7 +93,7 @@ class TouchState:
         if self._known is None:
             self._unfold, world.paused = True, not self.opens_playing
             if self.opens_playing:
-                self._state.say(HOW, HOW_S)
+                self._say(HOW, HOW_S)
         self._known = world
 
     @property
@@ -121,7 +123,11 @@ class TouchState:
         if world is None:
             return
         world.paused = not world.paused
-        self._state.say("Objects hold still. T lets them move." if world.paused else HOW)
+        self._say("Objects hold still. T lets them move." if world.paused else HOW)
+
+    def _say(self, text: str, seconds: float | None = None) -> None:
+        if self._keys:
+            self._state.say(text, seconds)
 
     def step(self) -> None:
         """One step by hand; objects hold still after it."""

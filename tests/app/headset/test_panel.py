@@ -221,6 +221,7 @@ def test_sections_of_the_desktop_do_here_what_they_do_there(wearer):
     wearer.scroll()
     wearer.press("leg")
     assert wearer.shown == "leg"
+    wearer.scroll(1.0)
     wearer.press("Objects")
     wearer.unfold("Look")
     wearer.press("debug")

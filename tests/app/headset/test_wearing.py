@@ -209,5 +209,5 @@ def test_the_end_is_asked_for_once_and_frames_go_on_until_it_comes(wear, why):
 def test_the_window_can_be_closed_while_the_headset_rests(wear):
     xr_app, played = wear([])
     played.closing = True
-    xr_app._rest()
+    xr_app._rest()  # what the session calls while no frame is wanted: the double has no such wait
     assert played.left and xr_app.report.ended == "closed at the desk"

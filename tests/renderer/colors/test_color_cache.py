@@ -141,6 +141,7 @@ def test_visible_anchors_hold_every_drawn_splat(renderer):
         renderer.settings = settings
         renderer.update(alone(model, x=0.3, world_from_object=TURNED))
         renderer.draw([view])
+        # What project culls is of one pass: a picture shows less, since splats hide each other.
         depth = drawing.device.download(drawing._projected[0].depth)
         drawn = (depth < 1e30).reshape(500, -1).any(axis=1)
         mean_opacity, _, covariance = drawing.splat_points()

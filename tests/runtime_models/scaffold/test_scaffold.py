@@ -241,7 +241,7 @@ def test_the_evaluator_keeps_one_look(tmp_path):
     evaluator = Evaluator(read_model(write_run(random_raw(), tmp_path / "run")))
     assert follows_eye(evaluator.model)
     one = [a.copy() for a in evaluator.geometry(0.0, eye=EYE)]
-    look = evaluator._scaffold.look(EYE)
+    look = evaluator._scaffold.look(EYE)  # kept to spare time alone: results are the same
     evaluator.color(0.0, EYE)
     assert evaluator._scaffold.look(EYE.copy()) is look
     other = evaluator.geometry(0.0, eye=-EYE)

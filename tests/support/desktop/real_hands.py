@@ -99,5 +99,6 @@ class RealHands:
         end = time.monotonic() + PATIENCE_S
         for _ in range(3):
             run_frames(self.viewer, 1)
+        # Frames that ImGui still needs: to the eye the window may look settled before.
         while self.viewer.window._unsettled > 0 and time.monotonic() < end:
             run_frames(self.viewer, 1)

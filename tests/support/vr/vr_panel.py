@@ -60,7 +60,7 @@ def some_things() -> EditorState:
 def a_state(editor: EditorState | None = None) -> XrState:
     editor = editor or some_things()
     user = XrUser(editor.world, SimpleNamespace(), None)
-    return XrState(editor, TouchState(editor, True), Pacing((0, 0, 0)), user)
+    return XrState(editor, TouchState(editor, True, keys=False), Pacing((0, 0, 0)), user)
 
 
 class Wearer:
@@ -121,10 +121,10 @@ class Wearer:
         for name in sections:
             self.press(name)
 
-    def scroll(self) -> list[Frame]:
-        """Holds the pointing hand's stick back until the end of the sections is in sight."""
+    def scroll(self, push: float = -1.0) -> list[Frame]:
+        """Holds the pointing hand's stick back (1: forth) until the sections' end is in sight."""
         middle = (PANEL.size[0] / 2, PANEL.size[1] * 0.7)
-        frames = [self.point(middle, stick=(0.0, -1.0)) for _ in range(144)]
+        frames = [self.point(middle, stick=(0.0, push)) for _ in range(144)]
         self.wait()
         return frames
 

@@ -103,12 +103,14 @@ def test_at_rest_the_likeness_is_told_once(stand, monkeypatch):
     assert wipe.status().startswith("A to B ") and wipe.status().endswith(" dB")
     assert not viewer.polling  # the loop may sleep
     viewer.state.set_x(0, 0.75)
+    # What B is drawn of; on the screen only pixels of it are left.
     assert wipe._scene_at(viewer.state.scene).objects[0].x == 0.75  # no x was given: A's
 
 
 def test_zeros_that_lie_elsewhere_are_respected(stand):
     viewer, wipe, b = stand
     far = Document.of(replace(b, origin=(100.0, 0.0, 0.0)))
+    # Pixels cannot tell an offset of 100 m from nothing drawn, so the number itself is asked for.
     wipe._side = replace(wipe._side, subject=far)
     offset = wipe._offset(viewer.state.scene)
     np.testing.assert_array_equal(offset, [-100.0, 0.0, 0.0])
