@@ -22,6 +22,7 @@ class Hit:
     point: np.ndarray  # (3,) metres, world
     index: int  # of the object whose splat is met first there
     depth: float  # metres along the ray
+    splat: int = -1  # of the object's model
 
 
 @dataclass
@@ -55,25 +56,27 @@ class Picker:
         """
         ray = np.asarray(direction, np.float64) / np.linalg.norm(direction)
         depths, alphas, owners = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, int)]
+        splats = [np.zeros(0, int)]
         for index, obj in enumerate(scene.objects):
             if not obj.visible:
                 continue
             object_from_world = np.linalg.inv(obj.world_from_object.matrix())
             eye = object_from_world[:3, :3] @ origin + object_from_world[:3, 3]
-            depth, alpha = along(
+            depth, alpha, met = along(
                 self._splats(index, obj, eye), eye, object_from_world[:3, :3] @ ray, spread
             )
             depths.append(depth)
             alphas.append(alpha)
             owners.append(np.full(len(depth), index))
-        depth, alpha, owner = map(np.concatenate, (depths, alphas, owners))
+            splats.append(met)
+        depth, alpha, owner, splat = map(np.concatenate, (depths, alphas, owners, splats))
         order = np.argsort(depth, kind="stable")
         taken = 1 - np.cumprod(1 - alpha[order])  # (P,) of the light, down to each splat
         if not len(taken) or not taken[-1] >= LEAST:
             return None
         first = order[np.searchsorted(taken, taken[-1] / 2)]
         point = np.asarray(origin, np.float64) + depth[first] * ray
-        return Hit(point, int(owner[first]), float(depth[first]))
+        return Hit(point, int(owner[first]), float(depth[first]), int(splat[first]))
 
     def _splats(self, index: int, obj: SceneObject, eye: np.ndarray) -> _Decoded:
         model, x = obj.model, control_of(obj)
@@ -92,8 +95,8 @@ class Picker:
 
 def along(
     splats: _Decoded, eye: np.ndarray, ray: np.ndarray, spread: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Depth in metres and alpha of the splats that a ray meets, in the object's frame.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Depth in metres, alpha and row of the splats that a ray meets, in the object's frame.
 
     A Gaussian is largest along the ray where the ray is nearest to its mean in its own metric;
     its alpha is what it has there.
@@ -110,7 +113,7 @@ def along(
     least = start + depth[:, None] * step  # (P, 3) sigmas from the mean, where that is least
     alpha = splats.opacity[near] * np.exp(-0.5 * np.einsum("pi,pi->p", least, least))
     met = (depth > 0) & (alpha >= MIN_ALPHA)
-    return depth[met], np.minimum(alpha[met], 0.99)
+    return depth[met], np.minimum(alpha[met], 0.99), near[met]
 
 
 def anchor_places(model: Model) -> np.ndarray:

@@ -60,7 +60,8 @@ def grow(
     visits[walls] = -np.inf
     visits[row_of[seeds]] = np.inf
     order = np.argsort(-visits, kind="stable")[: np.count_nonzero(visits > -np.inf)]
-    return Growth(part[order], best_cut(weights, degrees, order, len(np.unique(seeds))))
+    most = len(part) if within is not None else int(MOST * len(part))
+    return Growth(part[order], best_cut(weights, degrees, order, len(np.unique(seeds)), most))
 
 
 def near_nodes(graph: AnchorGraph, seeds: np.ndarray, within: np.ndarray | None) -> np.ndarray:
@@ -73,8 +74,13 @@ def near_nodes(graph: AnchorGraph, seeds: np.ndarray, within: np.ndarray | None)
     return np.union1d(part, seeds)
 
 
-def best_cut(weights: sparse.csr_array, degrees: np.ndarray, order: np.ndarray, least: int) -> int:
-    """How many of the first nodes in `order` (n,) make the set whose border is the weakest."""
+def best_cut(
+    weights: sparse.csr_array, degrees: np.ndarray, order: np.ndarray, least: int, most: int
+) -> int:
+    """How many of the first nodes in `order` (n,) make the set whose border is the weakest.
+
+    At least LEAST or `least` of them, and at most `most`.
+    """
     count = len(order)
     rank = np.full(len(degrees), count)  # what may not be taken comes after all
     rank[order] = np.arange(count)
@@ -87,7 +93,7 @@ def best_cut(weights: sparse.csr_array, degrees: np.ndarray, order: np.ndarray, 
     volume = np.cumsum(degrees[order])
     score = cut / np.maximum(volume, 1e-12) ** BY_VOLUME
     first = min(max(LEAST, least), count)
-    last = max(first, int(MOST * len(degrees)))
+    last = min(max(first, most), count)
     return first + int(np.argmin(score[first - 1 : last])) if count else 0
 
 

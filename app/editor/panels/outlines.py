@@ -7,7 +7,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.regions import Region, Regions
 from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.pose import View
-from shapeshift.scene.scene import Scene
+from shapeshift.scene.scene import Scene, SceneObject
 
 Vec = imgui.ImVec2
 ROUND = 48  # segments of a circle
@@ -102,6 +102,14 @@ def draw_outlines(regions: Regions, scene: Scene, view: View, ui_scale: float) -
         else:
             lines = moved(segments(region, regions.radius), world_from_object)
             _lines(on_screen(view, lines, size), ink, (1.8 if chosen else 1.2) * ui_scale)
+
+
+def draw_segments(
+    lines: np.ndarray, obj: SceneObject, view: View, size: tuple[float, float], ui_scale: float
+) -> None:
+    """Segments (S, 2, 3) of an object's frame, in the accent."""
+    placed = moved(lines, obj.world_from_object.matrix())
+    _lines(on_screen(view, placed, size), theme.color(theme.ACCENT, 0.9), 1.8 * ui_scale)
 
 
 def draw_brush(cursor: tuple[float, float], radius: float, erase: bool, ui_scale: float) -> None:

@@ -13,8 +13,8 @@ from shapeshift.app.editor.state.layout import Layout
 Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.
 ORDER = (
-    "Scale", "Room", "Touch", "Stops", "Look", "Camera", "Objects", "Regions", "Export",
-    "Performance",
+    "Scale", "Room", "Touch", "Stops", "Look", "Camera", "Objects", "Parts", "Regions",
+    "Export", "Performance",
 )  # fmt: skip
 
 

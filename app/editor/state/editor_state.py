@@ -16,6 +16,7 @@ from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.regions import Regions
 from shapeshift.app.editor.state.scene_objects import origin_of, scene_of, stood_as, with_palette
+from shapeshift.app.editor.state.shown_scene import ShownScene
 from shapeshift.app.editor.state.split_state import SplitState
 from shapeshift.app.editor.state.track import Grip
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
@@ -72,7 +73,7 @@ class EditorState:
         self.centre, self.radius = np.zeros(3), 1.0
         self._points = (np.zeros((0, 3)), np.zeros(0))
         self._picker = Picker()
-        self._shown: tuple = (None, None)  # what `shown` was made of, and what it was
+        self.shown_scene = ShownScene()
         self._movable: tuple[Scene | None, list[int]] = (None, [])
         self._legend: tuple[Scene | None, bool] = (None, False)
 
@@ -98,6 +99,7 @@ class EditorState:
         self.split.on, self.split.name = False, ""
         self.edited = edited or edited_from_scene(scene, self.sources)
         self.bodies.forget()
+        self.shown_scene.forget()
         if scene.objects:
             background = default_background(scene.objects[0].model, DARK)
             self.settings = replace(self.settings, background=background)
@@ -175,21 +177,8 @@ class EditorState:
         return fit_points(*self._points, self.centre, axes, perspective(fov_y, size))
 
     def shown(self, view: View) -> Scene:
-        """The scene with its regions as `view` sees them; the same object until one changes."""
-        if not self.regions.items:
-            return self.scene
-        pose = view.world_from_eye
-        eye = (pose.position.tobytes(), pose.wxyz.tobytes()) if self.regions.follow_the_eye else ()
-        made_of = (self.scene, self.regions.version, eye)
-        before, scene = self._shown
-        if before is None or before[0] is not self.scene or before[1:] != made_of[1:]:
-            objects = [
-                replace(obj, selectors=obj.selectors + self.regions.selectors(index, view))
-                for index, obj in enumerate(self.scene.objects)
-            ]
-            scene = Scene(tuple(objects))
-            self._shown = (made_of, scene)
-        return scene
+        """What is drawn, as `view` sees it; the same object until something of it changes."""
+        return self.shown_scene.of(self.scene, self.regions, self.chosen, view)
 
     def pick(self, view: View, direction: np.ndarray, spread: float) -> Hit | None:
         """What a ray from the eye meets, of splats as they are now; `spread` is the hand's."""

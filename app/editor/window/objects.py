@@ -52,6 +52,10 @@ class Objects:
         """Another scene: nothing of the old one is asked or typed."""
         self._opened, self._click, self.edits.typed = True, None, ("", "")
 
+    def unfold(self) -> None:
+        """There is an object more, whose name is to be seen."""
+        self._opened = True
+
     def opens(self) -> bool:
         """True once for a scene of several objects: the section unfolds for it."""
         opened, self._opened = self._opened, False

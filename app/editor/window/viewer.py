@@ -38,6 +38,7 @@ from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
+from shapeshift.app.editor.window.parts import attach_parts
 from shapeshift.app.editor.window.pictures import write_numbered_png, write_png
 from shapeshift.app.editor.window.shell import Shell
 from shapeshift.app.editor.window.shown import FrameRequest, Shown
@@ -92,6 +93,7 @@ class Viewer:
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
+        self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
         self._add_sections()
         self._framed = Framed(self.viewpoint.free_size, self.viewpoint.refit)
         self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))

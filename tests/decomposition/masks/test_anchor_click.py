@@ -74,7 +74,7 @@ def test_the_best_cut_is_that_of_a_plain_count():
         crossing = weights[inside][:, ~inside].sum()
         leaving = (degrees - weights.sum(axis=1))[inside].sum()
         scores.append((crossing + leaving) / degrees[inside].sum() ** 0.6)
-    assert best_cut(sparse.csr_array(weights), degrees, order, 1) == 8 + int(np.argmin(scores))
+    assert best_cut(sparse.csr_array(weights), degrees, order, 1, 9) == 8 + int(np.argmin(scores))
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 9])

@@ -14,12 +14,13 @@ from shapeshift.app.editor.panels.widgets.panel_rows import (
     tip,
 )
 from shapeshift.app.editor.state.arrange import place, stands_elsewhere
-from shapeshift.app.editor.state.editor_state import HANDLES
+from shapeshift.app.editor.state.editor_state import HANDLES, EditorState
 from shapeshift.app.editor.state.files.saving import Saving
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneItem
+from shapeshift.scene.four_views import FOUR_VIEWS, has_objects
 from shapeshift.scene.pose import Pose
 
 Vec = imgui.ImVec2
@@ -28,6 +29,12 @@ MASSES = (0.05, 5.0)  # kilograms, between which the physics holds them
 NONE = "none"  # as a collider
 _, MOVE, TURN = HANDLES
 MODES = {MOVE: "Move", TURN: "Turn"}
+FOUR_VIEW_NAMES = {
+    "full": "everything",
+    "overlay": "objects in colours",
+    "background": "without objects",
+    "isolated": "objects alone",
+}
 DEEDS = {
     "Add": "Another file or folder as an object of this scene.",
     "Copy": "The chosen object once more, beside it. Ctrl+D.",
@@ -78,7 +85,8 @@ def _history(objects: ObjectEdits, saving: Saving, ui_scale: float) -> None:
 
 
 def draw_object_list(objects: ObjectEdits, ui_scale: float) -> None:
-    """A line an object; of a long list those that are in sight."""
+    """Which of the four views, then a line an object; of a long list those that are in sight."""
+    draw_four_views(objects.state, ui_scale)
     count = len(objects.state.scene.objects)
     if count <= MOST_ROWS:
         for index in range(count):
@@ -93,6 +101,18 @@ def draw_object_list(objects: ObjectEdits, ui_scale: float) -> None:
             _row(objects, index, ui_scale)
     clipper.end()
     imgui.end_child()
+
+
+def draw_four_views(state: EditorState, ui_scale: float) -> None:
+    """Full, overlay, background, isolated; nothing where there are no objects to tell apart."""
+    look = state.shown_scene
+    if not has_objects(state.scene):
+        return
+    imgui.push_item_width(-1)
+    names = [f"view: {FOUR_VIEW_NAMES[show]}" for show in FOUR_VIEWS]
+    look.show = choice("four views", look.show, FOUR_VIEWS, names)
+    tip("How objects are looked at; it changes nothing, and is not saved. Key I.", ui_scale)
+    imgui.pop_item_width()
 
 
 def _row(objects: ObjectEdits, index: int, ui_scale: float) -> None:

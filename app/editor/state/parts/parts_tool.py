@@ -1,0 +1,370 @@
+"""The tool "Parts": which anchors of an object are chosen, what a click would add, what to do."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.messages import number
+from shapeshift.app.editor.state.parts.cutting import delete_rows, hide_rows, make_object
+from shapeshift.app.editor.state.parts.finder import Finder, Found, Query, in_box
+from shapeshift.app.editor.state.regions import brushed
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.pick import anchor_places
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import SceneObject, Tint
+
+REPLACE, ADD, REMOVE = "replace", "add", "remove"  # what is done with what was met
+# Colours that neither surfaces nor the palettes of heat have much of, so that they are told apart.
+CHOSEN_INK, HOVER_INK, LESS_INK = (0.1, 1.0, 0.7), (0.65, 1.0, 0.9), (1.0, 0.1, 0.45)
+CHOSEN, HOVER = 0.75, 0.5  # how much of that colour lies over the object's own
+GROWS = 1.2  # more or fewer anchors with every notch of the wheel
+LARGEST = 40.0  # times what a click takes, or less by as much
+HOW = (
+    "Click a thing: it lights up. Shift adds, Alt removes, Ctrl+wheel takes more or less of it; "
+    "drag a box. Enter makes it an object."
+)
+Corners = tuple[float, float, float, float]  # left, top, right, low: pixels of the view
+
+
+class PartsTool:
+    """What is chosen is no edit; what is made of it is one."""
+
+    def __init__(self, state: EditorState, count_changed: Callable[[], None]) -> None:
+        """`count_changed` hears that the scene has more or fewer objects, or others."""
+        self.state, self._count_changed = state, count_changed
+        self.on = False
+        self.takes_all = False  # a box takes everything in it, not the thing in it
+        self.name = ""  # of the object whose anchors are chosen
+        self.chosen = np.zeros(0, bool)  # (A,)
+        self.found: Found | None = None  # what a click would take
+        self.how = REPLACE  # what it would do
+        self.factor = 1.0  # of what a click takes, by the wheel
+        self.crop: np.ndarray | None = None  # (2, 3) metres, object frame: low and high corner
+        self.finder = Finder()
+        self._asked: Query | None = None  # whose answer is to be taken at once
+        self._undone: list[tuple[str, np.ndarray]] = []  # what was chosen before
+        self._lit: tuple = ()  # what the tint was made of
+
+    # ---- on and off
+
+    def toggle(self) -> None:
+        """Opens the tool, or leaves it with nothing chosen."""
+        self.on = not self.on and bool(self.state.scene.objects)
+        self.clear()
+        self.crop = None
+        if self.on:
+            self.state.say(HOW, 8.0)
+        self.light()
+
+    def forget(self) -> None:
+        """Another scene."""
+        self.finder.forget()
+        self.on, self.crop, self.name = False, None, ""
+        self.clear()
+
+    def clear(self) -> None:
+        """Nothing is chosen."""
+        self.chosen, self.found, self._asked = np.zeros(0, bool), None, None
+        self.factor = 1.0
+        self._undone.clear()
+
+    def status(self) -> str:
+        """Words for the status line."""
+        if not self.on:
+            return ""
+        if self.finder.status:
+            return f"{self.finder.status} \u2026"
+        if self.count:
+            return f"{number(self.count)} anchors of {self.name} chosen"
+        return "parts: point at a thing"
+
+    @property
+    def count(self) -> int:
+        """How many anchors are chosen."""
+        return int(np.count_nonzero(self.chosen))
+
+    @property
+    def index(self) -> int | None:
+        """Of the object whose anchors are chosen, while it is what it was."""
+        for index, obj in enumerate(self.state.scene.objects):
+            if obj.name == self.name and len(self.chosen) == len(anchor_places(obj.model)):
+                return index
+        return None
+
+    # ---- what is pointed at
+
+    def point(self, view: View, place: tuple[float, float], how: str) -> None:
+        """The mouse, or a ray, is over a place of the picture: pixels of the view."""
+        self.how = how
+        if self._asked is not None:
+            return  # a click waits for its answer
+        corners = (*place, *place)
+        self.finder.ask(Query(self.state.shown(view), view, corners, self._against(how)))
+
+    def look_away(self) -> None:
+        """Nothing is pointed at any more."""
+        self.found = None
+
+    def click(self, view: View, place: tuple[float, float], how: str) -> None:
+        """Takes what lies there: what is lit up already where that is it, else once it is found."""
+        self.how = how
+        found = self.found
+        if found is not None and found.query.is_click and self._is_at(found.query, view, place):
+            self._take(found)
+        else:
+            self._asked = Query(self.state.shown(view), view, (*place, *place), self._against(how))
+            self.finder.ask(self._asked)
+
+    def _is_at(self, query: Query, view: View, place: tuple[float, float]) -> bool:
+        near = np.hypot(query.corners[0] - place[0], query.corners[1] - place[1]) < 1.5
+        same = np.array_equal(query.view.eye_from_world(), view.eye_from_world())
+        return bool(near) and same and query.view.size == view.size
+
+    def box(self, view: View, corners: Corners, how: str) -> None:
+        """A box was drawn: the thing in it, or everything."""
+        self.how = how
+        left, top, right, low = corners
+        corners = (min(left, right), min(top, low), max(left, right), max(top, low))
+        shown = self.state.shown(view)
+        if not self.takes_all:
+            self._asked = Query(shown, view, corners, self._against(how))
+            self.finder.ask(self._asked)
+            return
+        index = self.index if self.index is not None else self._largest()
+        if index is not None:
+            obj = shown.objects[index]
+            self._choose(obj, in_box(view, anchor_places(obj.model), obj, corners), how)
+
+    def _against(self, how: str) -> tuple[str, np.ndarray] | None:
+        """What is chosen already is no part of what a click adds."""
+        return (self.name, self.chosen) if how == ADD and self.count else None
+
+    def _largest(self) -> int | None:
+        """Of the visible objects the one with the most anchors: boxes and brushes mean it."""
+        objects = self.state.scene.objects
+        counts = [len(anchor_places(obj.model)) if obj.visible else -1 for obj in objects]
+        return int(np.argmax(counts)) if counts and max(counts) > 0 else None
+
+    def brush(
+        self, view: View, cursor: tuple[float, float], radius: float, how: str, starts: bool
+    ) -> None:
+        """Adds or removes the anchors of the nearest surface under a brush, pixels of the view."""
+        index = self.index if self.index is not None else self._largest()
+        if index is None:
+            return
+        obj = self.state.scene.objects[index]
+        rows = np.zeros(len(anchor_places(obj.model)), bool)
+        rows[brushed(view, anchor_places(obj.model), obj, cursor, radius)] = True
+        self._choose(obj, rows, how, starts)
+
+    def grow(self, notches: float) -> None:
+        """More of what is pointed at, or less."""
+        self.factor = float(np.clip(self.factor * GROWS**notches, 1 / LARGEST, LARGEST))
+
+    def poll(self) -> bool:
+        """Once a frame: takes what was found; True while it is looked for."""
+        if not self.on:
+            return False
+        answer = self.finder.take()
+        if answer is not None:
+            query, found = answer
+            self.found = found
+            if query is self._asked:
+                self._asked = None
+                if found is not None:
+                    self._take(found)
+                elif query.is_click and self.how == REPLACE:
+                    self._keep()
+                    self.chosen = np.zeros(0, bool)
+        if self.finder.problem:
+            self.state.problem, self.finder.problem = self.finder.problem, ""
+        self.light()
+        return self.finder.busy
+
+    def _take(self, found: Found) -> None:
+        for obj in self.state.scene.objects:
+            if obj.name == found.name and len(found.owner) == len(anchor_places(obj.model)):
+                self._choose(obj, found.rows(self.factor), self.how)
+        if not found.query.is_click:
+            self.found = None
+        self.factor = 1.0
+
+    def _choose(self, obj: SceneObject, rows: np.ndarray, how: str, starts: bool = True) -> None:
+        """Does with some anchors (A,) bool of an object what was meant."""
+        if starts:
+            self._keep()
+        if obj.name != self.name or len(self.chosen) != len(rows):
+            self.name, self.chosen = obj.name, np.zeros(len(rows), bool)
+        if how == REPLACE:
+            self.chosen = rows.copy()
+        elif how == ADD:
+            self.chosen = self.chosen | rows
+        else:
+            self.chosen = self.chosen & ~rows
+
+    def invert(self) -> None:
+        """Everything else of the object."""
+        index = self.index
+        if index is not None:
+            self._keep()
+            self.chosen = ~self.chosen
+
+    def _keep(self) -> None:
+        self._undone = [*self._undone, (self.name, self.chosen)][-50:]
+
+    def step_back(self) -> bool:
+        """What was chosen before the last click; False where nothing was."""
+        if not (self.on and self._undone):
+            return False
+        self.name, self.chosen = self._undone.pop()
+        return True
+
+    # ---- what is done with it
+
+    def make(self) -> None:
+        """What is chosen becomes an object, which is chosen then."""
+        name = self._do(make_object)
+        if name:
+            self.state.chosen = name
+            self.state.say(f"{name} is an object now. Ctrl+Z puts it back; its name is in Objects.")
+
+    def hide(self) -> None:
+        """What is chosen is no longer seen; it is an object that is hidden."""
+        self._do(hide_rows)
+
+    def delete(self) -> None:
+        """What is chosen is gone, from what is saved, too."""
+        count = self.count
+        if self._do(delete_rows) is not None:
+            self.state.say(f"{number(count)} anchors deleted. Ctrl+Z brings them back.")
+
+    def _do(self, act: Callable[..., str | None]) -> str | None:
+        """An edit of what is chosen; "" where it was done without a name, None where it was not."""
+        index = self.index
+        if index is None or not self.count:
+            self.state.say("Nothing is chosen. Click a thing, or draw a box around it.")
+            return None
+        try:
+            name = act(self.state, index, self.chosen)
+        except BadFile as error:
+            self.state.problem = str(error)
+            return None
+        self.clear()
+        self._count_changed()
+        self.light()
+        return name or ""
+
+    # ---- the crop box
+
+    def begin_crop(self) -> None:
+        """A box about what is chosen, else about the largest object without its few strays."""
+        index = self.index if self.count else self._largest()
+        if index is None:
+            return
+        obj = self.state.scene.objects[index]
+        places = anchor_places(obj.model)
+        if self.count:
+            places = places[self.chosen]
+        self.name = obj.name
+        self.crop = np.percentile(places, (2, 98) if not self.count else (0, 100), axis=0)
+        if len(self.chosen) != len(anchor_places(obj.model)):
+            self.chosen = np.zeros(len(anchor_places(obj.model)), bool)
+
+    def move_crop_side(self, axis: int, side: int, metres: float) -> None:
+        """One of the six sides elsewhere, never beyond the one across."""
+        assert self.crop is not None
+        crop = self.crop.copy()
+        other = crop[1 - side, axis]
+        crop[side, axis] = min(metres, other) if side == 0 else max(metres, other)
+        self.crop = crop
+
+    def outside(self) -> np.ndarray:
+        """(A,) bool: anchors of the object outside the crop box."""
+        assert self.crop is not None and self.index is not None
+        places = anchor_places(self.state.scene.objects[self.index].model)
+        return ~((places >= self.crop[0]) & (places <= self.crop[1])).all(axis=1)
+
+    def apply_crop(self) -> None:
+        """All outside the box goes, in one step."""
+        if self.crop is None or self.index is None:
+            self.crop = None
+            return
+        rows = self.outside()
+        self.crop = None
+        if not rows.any():
+            self.state.say("Nothing lies outside the box.")
+            return
+        self.chosen = rows
+        self._do(lambda state, index, rows: delete_rows(state, index, rows, "crop"))
+
+    # ---- how it is seen
+
+    def light(self) -> None:
+        """The state shows what is chosen, what a click would take, and what a crop would."""
+        shown = self.state.shown_scene
+        found = self.found if self.on else None
+        made_of = (
+            self.on, self.name, self.chosen, found, self.how, self.factor, self._crop_key,
+            self.state.scene,
+        )  # fmt: skip
+        if same(made_of, self._lit):
+            return
+        self._lit = made_of
+        lit = self._tint(found) if self.on else None
+        if not same_look(lit, shown.lit):
+            shown.lit = lit
+
+    @property
+    def _crop_key(self) -> bytes:
+        return b"" if self.crop is None else self.crop.tobytes()
+
+    def _tint(self, found: Found | None) -> tuple[str, Tint] | None:
+        """What lies over which object; one at a time, the one that is pointed at before others."""
+        obj = self._lit_object(found)
+        if obj is None:
+            return None
+        count = len(anchor_places(obj.model))
+        colors, strength = np.tile(np.array(CHOSEN_INK), (count, 1)), np.zeros(count)
+        mine = self.name == obj.name and len(self.chosen) == count
+        if mine:
+            strength[self.chosen] = CHOSEN
+        if found is not None and found.name == obj.name and len(found.owner) == count:
+            rows = found.rows(self.factor)
+            if self.how == REMOVE:  # of what is chosen alone
+                rows = rows & self.chosen if mine else np.zeros(count, bool)
+            colors[rows] = LESS_INK if self.how == REMOVE else HOVER_INK
+            strength[rows] = np.maximum(HOVER, strength[rows])
+        if self.crop is not None and mine:
+            gone = self.outside()
+            colors[gone], strength[gone] = LESS_INK, CHOSEN
+        return obj.name, Tint(colors.astype(np.float32), strength.astype(np.float32))
+
+    def _lit_object(self, found: Found | None) -> SceneObject | None:
+        wanted = found.name if found is not None and self.how != REMOVE else self.name
+        if self.crop is not None:
+            wanted = self.name
+        objects = {obj.name: obj for obj in self.state.scene.objects}
+        if wanted in objects:
+            return objects[wanted]
+        index = self._largest()
+        return None if index is None else self.state.scene.objects[index]
+
+
+def same_look(one: tuple[str, Tint] | None, other: tuple[str, Tint] | None) -> bool:
+    """Whether two tints look alike: then nothing has to be drawn anew."""
+    if one is None or other is None:
+        return one is other
+    (name, tint), (old_name, old) = one, other
+    if name != old_name or not np.array_equal(tint.strength, old.strength):
+        return False
+    rows = np.asarray(tint.strength) > 0
+    return np.array_equal(np.asarray(tint.color)[rows], np.asarray(old.color)[rows])
+
+
+def same(one: tuple, other: tuple) -> bool:
+    """Whether all of two tuples is the very same, or equal where it is no array."""
+    return len(one) == len(other) and all(
+        a is b or (isinstance(a, str | float | bool | bytes) and a == b)
+        for a, b in zip(one, other, strict=True)
+    )

@@ -1,0 +1,81 @@
+"""The scene as it is looked at: with its regions, in one of four views, what is chosen lit up."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.app.editor.state.regions import Regions
+from shapeshift.runtime_models.model import Model
+from shapeshift.runtime_models.parts import BACKGROUND
+from shapeshift.scene.four_views import FOUR_VIEWS, FULL, parts_of, shown_as, with_rows
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene, Tint
+
+
+class ShownScene:
+    """Looks at a scene change nothing of it: none is an edit, and none is saved."""
+
+    def __init__(self) -> None:
+        self.show = FULL  # one of FOUR_VIEWS
+        self.lit: tuple[str, Tint] | None = None  # name of an object, and what lies over it
+        self._made: tuple = ((), Scene(()))  # what the last one was made of, and it
+        self._rows: dict[tuple, tuple[Model, Model]] = {}  # of models opened as a whole
+
+    def next_view(self, step: int) -> str:
+        """The next of the four, or the one before; its name."""
+        number = (FOUR_VIEWS.index(self.show) + step) % len(FOUR_VIEWS)
+        self.show = FOUR_VIEWS[number]
+        return self.show
+
+    def forget(self) -> None:
+        """Another scene."""
+        self.show, self.lit = FULL, None
+        self._made = ((), Scene(()))
+        self._rows.clear()
+
+    def of(self, scene: Scene, regions: Regions, chosen: str, view: View) -> Scene:
+        """What is drawn; the same object until something of it changes.
+
+        chosen: name of the object that is edited, which is isolated alone where it is one.
+        """
+        if not regions.items and self.lit is None and self.show == FULL:
+            return scene
+        pose = view.world_from_eye
+        eye = (pose.position.tobytes(), pose.wxyz.tobytes()) if regions.follow_the_eye else ()
+        name = isolated_name(scene, chosen)
+        made_of = (id(scene), regions.version, eye, self.show, name, id(self.lit))
+        if self._made[0][:-1] != made_of:
+            self._made = ((*made_of, (scene, self.lit)), self._make(scene, regions, name, view))
+        return self._made[1]
+
+    def _make(self, scene: Scene, regions: Regions, name: str, view: View) -> Scene:
+        objects = [
+            replace(obj, selectors=obj.selectors + regions.selectors(index, view))
+            for index, obj in enumerate(scene.objects)
+        ]
+        shown = shown_as(Scene(tuple(objects)), self.show, name, self._rows_of)
+        if self.lit is None:
+            return shown
+        lit, tint = self.lit
+        pairs = zip(shown.objects, objects, strict=True)
+        return Scene(
+            tuple(
+                replace(obj, tint=tint) if obj.name == lit and obj.model is before.model else obj
+                for obj, before in pairs
+            )
+        )
+
+    def _rows_of(self, model: Model, rows: np.ndarray) -> Model:
+        """The very model that was given before: another one would be decoded anew."""
+        key = (id(model), rows.tobytes())
+        if key not in self._rows:
+            self._rows = {k: both for k, both in self._rows.items() if both[0] is model}
+            self._rows[key] = (model, with_rows(model, rows))
+        return self._rows[key][1]
+
+
+def isolated_name(scene: Scene, chosen: str) -> str:
+    """The object to be isolated: the chosen one, unless that is the background; "": all."""
+    objects = [obj for obj in scene.objects if obj.name == chosen]
+    alone = objects and objects[0].label != BACKGROUND and parts_of(objects[0]) is None
+    return chosen if alone else ""
