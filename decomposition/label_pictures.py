@@ -31,7 +31,8 @@ class LabelPictures:
         if len(found) and not 0 <= found.min() <= found.max() <= MOST_LABEL:
             raise ValueError(f"the model has the label {found.max()}, the largest is {MOST_LABEL}")
         self._labels, count = found, model.splat_count
-        self._evaluator, self._x = Evaluator(model), None
+        self._evaluator = Evaluator(model)
+        self._x: tuple[Controls] | None = None
         self._means, self._covariance = device.zeros((count, 4)), device.zeros((count, 8))
         self._object = device.zeros(count, np.int32)
         self._antialiased = (True,) if is_antialiased(model) else ()

@@ -13,7 +13,7 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.evidence import Evidence
 from shapeshift.rasterizer.pack import pack
-from shapeshift.rasterizer.project import Camera
+from shapeshift.rasterizer.project import Camera, Projected
 from shapeshift.rasterizer.project_arena import project_arena
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import (
@@ -53,7 +53,8 @@ class ViewEvidence:
                 "a Scaffold-GS model's splats depend on the eye, so no label stays with them; "
                 "export it as plain splats, or train one with `launch.py train`."
             )
-        self._device, self._model, self._x = device, model, None
+        self._device, self._model = device, model
+        self._x: tuple[Controls] | None = None
         self._evaluator, count = Evaluator(model), model.splat_count
         self._antialiased = (True,) if is_antialiased(model) else ()
         each = model.splats_per_anchor if isinstance(model, AnchorModel) else 1
@@ -61,22 +62,22 @@ class ViewEvidence:
         # Colours show no evidence, and there is one object, which stands where the world does.
         self._means, self._covariance = device.zeros((count, 4)), device.zeros((count, 8))
         self._color, self._object = device.zeros((count, 4)), device.zeros(count, np.int32)
-        self._projected = None
+        self._projected: list[Projected] | None = None
 
     def add(self, picture: LabelledView) -> None:
         """Pictures of one x in a row are quicker: the networks run once.  Raises ValueError."""
-        if self._projected is None or picture.x != self._x:
-            self._x = picture.x
+        if self._x is None or picture.x != self._x[0]:
+            self._x = (picture.x,)
             splats = self._evaluator.geometry(picture.x)
             pack(self._device, splats, 0, self._means, self._covariance)
         view = picture.view
         camera = Camera(*view.pinhole(), view.size, view.near, view.widest_tangents())
-        self._projected = project_arena(
+        projected = self._projected = project_arena(
             self._device, self._means, self._covariance, self._color, self._object,
             np.eye(4)[None], [camera], into=self._projected, antialiased=self._antialiased,
         )  # fmt: skip
-        tiles = bin_tiles(self._device, self._projected[0], view.size)
-        self._evidence.add(self._projected[0], tiles, picture.labels)
+        tiles = bin_tiles(self._device, projected[0], view.size)
+        self._evidence.add(projected[0], tiles, picture.labels)
 
     def sums(self) -> np.ndarray:
         """(rows, labels) float64 pixels."""

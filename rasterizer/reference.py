@@ -59,7 +59,7 @@ def weights(
     size = transmittance.shape[::-1]
     first = np.clip(np.floor(mean_px - extents - 0.5), 0, size).astype(int)
     after = np.clip(np.ceil(mean_px + extents + 0.5), 0, size).astype(int)
-    for i in np.flatnonzero(np.all(after > first, axis=1)):
+    for i in np.flatnonzero(np.all(after > first, axis=1)).tolist():
         (x0, y0), (x1, y1), (a, b, c) = first[i], after[i], conics[i]
         dx = np.arange(x0, x1) + 0.5 - mean_px[i, 0]
         dy = (np.arange(y0, y1) + 0.5 - mean_px[i, 1])[:, None]

@@ -156,9 +156,10 @@ def check_labels(labels: np.ndarray | None, objects: tuple[ObjectLabel, ...], an
     numbers, names = [o.label for o in objects], [o.name for o in objects]
     if any(not 1 <= number <= MOST_LABEL for number in numbers):
         raise ValueError(f"objects have the labels {numbers}, expected 1 to {MOST_LABEL}")
-    for what, values in (("label", numbers), ("name", names)):
-        if twice := [value for value in values if values.count(value) > 1]:
-            raise ValueError(f"two objects have the {what} {twice[0]}")
+    if twice := [number for number in numbers if numbers.count(number) > 1]:
+        raise ValueError(f"two objects have the label {twice[0]}")
+    if alike := [name for name in names if names.count(name) > 1]:
+        raise ValueError(f"two objects have the name {alike[0]}")
     if unnamed := sorted(set(np.unique(labels).tolist()) - {0, *numbers}):
         raise ValueError(f"anchors have the label {unnamed[0]}, which no object has")
 
@@ -203,11 +204,14 @@ class SplatLayers:
 
     def with_rows(self, rows: np.ndarray) -> "SplatLayers":
         """These splats alone, in their order."""
-        names = ("means", "scales", "wxyz", "opacity", "sh", "layer")
-        arrays = {name: np.ascontiguousarray(getattr(self, name)[rows]) for name in names}
         return replace(
             self,
-            **arrays,
+            means=np.ascontiguousarray(self.means[rows]),
+            scales=np.ascontiguousarray(self.scales[rows]),
+            wxyz=np.ascontiguousarray(self.wxyz[rows]),
+            opacity=np.ascontiguousarray(self.opacity[rows]),
+            sh=np.ascontiguousarray(self.sh[rows]),
+            layer=np.ascontiguousarray(self.layer[rows]),
             labels=None if self.labels is None else np.ascontiguousarray(self.labels[rows]),
             extra={name: column[rows] for name, column in self.extra.items()},
         )

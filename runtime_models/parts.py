@@ -76,7 +76,8 @@ def part_of(model: Model, label: int) -> tuple[Model, Place]:
 def labelled_anchors(model: AnchorModel, label: int) -> AnchorModel:
     """The anchors of one label, where they are, with its name alone."""
     objects = tuple(each for each in model.objects if each.label == label)
-    return replace(model.with_anchors(model.labels == label), objects=objects)
+    assert model.labels is not None, "find_label refuses others"
+    return replace(model.with_anchors(np.flatnonzero(model.labels == label)), objects=objects)
 
 
 def middle_of(places: np.ndarray, label: int) -> np.ndarray:

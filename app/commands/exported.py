@@ -135,7 +135,9 @@ def chosen_rows(part: Part) -> np.ndarray | None:
             raise UsageError(f"nothing of {part.obj.name} lies inside; choose another place.")
     if part.label is None:
         return keep
-    of_label = splat_labels(model) == label_of(model, part.label, part.obj.name)
+    wanted, labels = label_of(model, part.label, part.obj.name), splat_labels(model)
+    assert labels is not None, "label_of refuses models without"
+    of_label: np.ndarray = np.equal(labels, wanted)
     return of_label if keep is None else keep & of_label
 
 

@@ -90,6 +90,7 @@ def run(options: Options) -> int:
     from shapeshift.app.charts.budget import read_budget
     from shapeshift.app.charts.budget_chart import ChartSubject, settings_for
     from shapeshift.app.commands.outputs import draw_outputs
+    from shapeshift.app.decomposition.show_views import show_objects
     from shapeshift.app.drawing import (
         MOST_VALUES,
         make_folder,
@@ -119,7 +120,7 @@ def run(options: Options) -> int:
     subjects = [document_at(document, each) for each in controls]
     labels = [label_of(each, s.x) for each, s in zip(controls, subjects, strict=True)]
     rows, paths = choose_paths(options, labels, count)
-    shown = [show(subject.scene, options.show) for subject in subjects]
+    shown = [show_objects(subject.scene, options.show) for subject in subjects]
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
         background = options.background or document.background
@@ -212,26 +213,12 @@ def check_output(options: Options) -> None:
 
 def check_show(options: Options) -> None:
     """Before the scene is read.  Raises UsageError."""
+    from shapeshift.app.decomposition.show_views import read_show
     from shapeshift.app.errors import UsageError
-    from shapeshift.renderer.show_modes import read_show_mode
 
-    try:
-        mode, _ = read_show_mode(options.show)
-    except ValueError as error:
-        raise UsageError(f"--show: {error}.") from None
-    if options.select and mode in ("background", "isolated"):
-        raise UsageError(f"--show {mode} goes without --select; leave one of the two out.")
-
-
-def show(scene, mode: str):
-    """The scene as --show asks for it.  Raises UsageError."""
-    from shapeshift.app.errors import UsageError
-    from shapeshift.renderer.show_modes import show_objects
-
-    try:
-        return show_objects(scene, mode)
-    except ValueError as error:
-        raise UsageError(f"--show: {error}.") from None
+    show, _ = read_show(options.show)
+    if options.select and show in ("background", "isolated"):
+        raise UsageError(f"--show {show} goes without --select; leave one of the two out.")
 
 
 def unit_of(options: Options, document: "Document", views: list) -> float:

@@ -191,7 +191,7 @@ def facts_of(found: "Segmented", scores: "Sequence[LabelScore]", options: Option
 
     from shapeshift.decomposition.score import mean_score
 
-    rows = {
+    rows: dict[str, dict[str, float | None]] = {
         part.spec.name: {
             "label": part.spec.label,
             "photos": part.photos,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.app.decomposition.show_views import show_objects
 from shapeshift.app.drawing import make_folder, open_renderer, save_png
 from shapeshift.app.paths import file_name
 from shapeshift.app.progress import tracked
@@ -14,9 +15,8 @@ from shapeshift.decomposition.masks.label_maps import SILENT
 from shapeshift.decomposition.partition import LabelledView
 from shapeshift.decomposition.segment_scene import Segmented
 from shapeshift.rasterizer.device import Device
-from shapeshift.renderer.debug.debug import object_color
-from shapeshift.renderer.show_modes import SHOW_MODES, show_objects
 from shapeshift.scene.cameras.framing import default_background
+from shapeshift.scene.four_views import FOUR_VIEWS, color_of
 from shapeshift.scene.scene import Scene, SceneObject
 
 VIEWS = 4  # label maps that a sheet shows, from all sides
@@ -48,11 +48,12 @@ def write_report(device: Device, found: Segmented, folder: Path, overwrite: bool
             rows.append([drawn(each, each.x, "full"), colored(each.labels), colored(shown)])
         save_png(sheet(rows), folder / "labels.png")
         stops = [stop.x for stop in found.model.stops]
-        four = [[drawn(views[0], x, mode) for mode in SHOW_MODES] for x in stops]
+        four = [[drawn(views[0], x, mode) for mode in FOUR_VIEWS] for x in stops]
         save_png(sheet(four), folder / "views.png")
         for part in tracked(parts, "objects"):
             label = part.spec.label
-            best = max(found.pictures, key=lambda p, n=label: int((p.labels == n).sum()))
+            shown = [int((picture.labels == label).sum()) for picture in found.pictures]
+            best = found.pictures[int(np.argmax(shown))]
             alone = drawn(best, best.x, f"isolated:{label}")
             save_png(alone, folder / f"{label:03d}_{file_name(part.spec.name)}.png")
 
@@ -69,7 +70,7 @@ def spread(pictures: Sequence[LabelledView], most: int) -> list[LabelledView]:
 
 def colored(labels: np.ndarray) -> np.ndarray:
     """(H, W, 3) float32 of a label map: black the background, grey what says nothing."""
-    table = np.array([object_color(i - 1) for i in range(256)], np.float32)
+    table = np.array([color_of(label) for label in range(256)], np.float32)
     table[0], table[SILENT] = 0, UNKNOWN
     return table[labels]
 

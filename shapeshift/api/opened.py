@@ -226,12 +226,9 @@ class OpenedScene:
 
             scene.showing("isolated:mug").splats(0.0)
         """
-        from shapeshift.renderer.show_modes import show_objects
+        from shapeshift.app.decomposition.show_views import show_objects
 
-        try:
-            shown = show_objects(self._subject.scene, show)
-        except ValueError as error:
-            raise UsageError(f"show: {error}.") from None
+        shown = show_objects(self._subject.scene, show, "show")
         return self._with(replace(self._subject, scene=shown))
 
     def with_regions(self, *regions: "str | Selector", name: str | None = None) -> Self:

@@ -43,7 +43,7 @@ def test_the_command_and_python_draw_the_same(room, tmp_path, show):
 
 def test_what_is_no_view_is_refused_before_and_after_opening(room, tmp_path, capsys):
     for words, told in (
-        (("--show", "all"), "--show: 'all' is no view of objects; expected full, overlay"),
+        (("--show", "all"), "--show: 'all' is no view; expected full, overlay"),
         (("--show", "isolated:cup"), "it has 0, 1 mug"),
         (("--show", "isolated", "--select", "sphere:0,0,0:1:1"), "goes without --select"),
     ):
@@ -51,5 +51,5 @@ def test_what_is_no_view_is_refused_before_and_after_opening(room, tmp_path, cap
         said = capsys.readouterr().err.strip().splitlines()[-1]
         assert said.startswith("shapeshift render: ") and told in said
     assert not list(tmp_path.rglob("*.png"))
-    with pytest.raises(ss.UsageError, match=r"show: .*has no labels of objects"):
+    with pytest.raises(ss.UsageError, match=r"show overlay: .*has no objects beside"):
         ss.load(ss.DEMO).render(show="overlay")

@@ -115,12 +115,14 @@ def forgiving(path: Path) -> object:
 
 def archive_seeds(folder: Path) -> list[Seed]:
     """SOG, streamed SOG, packages, Scaffold-GS and Gaussian Grouping: zips and folders."""
+    from shapeshift.runtime_models.model import ObjectLabel
     from shapeshift.runtime_models.package.write_package import write_package
     from tests.support.splats.sog_scenes import random_sog, write_folder, write_zip
 
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     write_package(model, folder / "package.shift")
-    write_package(model, folder / "package")
+    labels, mug = np.uint8([0, 1, 0, 1, 1, 0]), ObjectLabel(1, "mug")
+    write_package(replace(model, labels=labels, objects=(mug,)), folder / "package")
     write_package(model, folder / "bytes.shift", "uint8")
     seeds = [
         Seed("package zip", {"package.shift": (folder / "package.shift").read_bytes()}, read_model),
