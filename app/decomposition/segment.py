@@ -31,14 +31,20 @@ class Options(ReadingOptions):
     """A package, or a file of splats."""
     capture: Annotated[Path, POSITIONAL]
     """The folder of posed photos that it was trained on."""
-    masks: Path
-    """A folder of label maps, 8-bit grey PNGs with the photos' names: rgb/012.png for rgb/012.jpg.
-    Not every photo needs one; four that see all sides are enough."""
     out: Path
     """The scene file to write, NAME.scene.json; the labelled scene is written beside it."""
+    masks: Path | None = None
+    """A folder of label maps, 8-bit grey PNGs with the photos' names: rgb/012.png for rgb/012.jpg.
+    Not every photo needs one; four that see all sides are enough.  Default: made from the prompts
+    of --objects."""
     objects: Path | None = None
-    """objects.json: names, masses and colliders of the labels.  Default: they are called object 1,
-    object 2, ..."""
+    """objects.json (docs/objects.md): names, masses and colliders of the labels, and prompts, which
+    say where an object is in a photo.  Default: they are called object 1, object 2, ..."""
+    segmenter: Path | None = None
+    """A folder with ONNX files of SAM, MobileSAM, SAM 2 or SAM 3 (docs/objects.md).  Default: none,
+    colours, heat and shape find compact things."""
+    photos: Annotated[int, EXPERT] = 24
+    """How many photos a segmenter is asked about, those of the prompts and others far apart."""
     score: Path | None = None
     """A folder of true label maps, named in the same way: says how well the cut scene shows them.
     Default: not scored."""
@@ -55,47 +61,45 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.progress import progress_bar, working
+    from shapeshift.app.progress import working
     from shapeshift.app.training.evaluate import trained_downscale
     from shapeshift.decomposition.masks.specs import read_specs
-    from shapeshift.decomposition.segment_scene import (
-        named_objects,
-        read_pictures,
-        scene_of_parts,
-        scores_of,
-        segment,
-    )
+    from shapeshift.decomposition.segment_scene import read_pictures, scene_of_parts, scores_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.document.write_scene_file import write_scene_file
     from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
 
     if options.downscale is not None and not 1 <= options.downscale <= 64:
         raise UsageError(f"--downscale is {options.downscale}, expected 1 to 64.")
+    refuse_inputs(options)
     refuse_outputs(options)
-    known = read_specs(options.objects).objects if options.objects else ()
+    specs = read_specs(options.objects) if options.objects else None
+    known = specs.objects if specs else ()
     model = open_labelled(options)
     capture = with_extrinsics(
         open_capture(options.capture, options.memory), rig_of(model.provenance)
     )
     factor = options.downscale or trained_downscale(model.provenance)
-    with working("reading label maps"):
-        pictures = read_pictures(options.masks, capture, model, factor)
-        true = read_pictures(options.score, capture, model, factor) if options.score else []
-    specs = named_objects(pictures, known)
     device = open_device()
-    with progress_bar() as bar:
-        task = bar.add_task("evidence of photos", total=len(pictures))
-        found = segment(
-            device, model, pictures, specs, len(capture.photos),
-            lambda done, count: bar.update(task, completed=done),
+    with working("reading label maps"):
+        true = read_pictures(options.score, capture, model, factor) if options.score else []
+    if options.masks is None:
+        from shapeshift.app.decomposition.segment_prompts import find_by_prompts
+
+        assert specs is not None, "refused before"
+        found = find_by_prompts(
+            device, model, capture, specs, options.segmenter, options.out, options.scene,
+            options.photos,
         )  # fmt: skip
+    else:
+        found = find_by_maps(device, model, capture, known, options.masks, factor)
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
     path = model_path(options, model)
     write_model(found.model, path)
     write_scene_file(scene_of_parts(found, path.name, options.out.parent), options.out)
     with working("scoring"):
-        scores = scores_of(device, found, true)
+        scores = scores_of(device, found, true) if true else ()
     if options.json:
         print_json(facts_of(found, scores, options))
     else:
@@ -110,6 +114,37 @@ def run(options: Options) -> int:
         f"{full(options.out)} and {path.name} beside it; next: {program()} view {full(options.out)}"
     )
     return 0
+
+
+def find_by_maps(device, model, capture, known, folder: Path, factor: int | None) -> "Segmented":
+    """By label maps of any program.  Raises BadFile."""
+    from shapeshift.app.progress import progress_bar, working
+    from shapeshift.decomposition.segment_scene import named_objects, read_pictures, segment
+
+    with working("reading label maps"):
+        pictures = read_pictures(folder, capture, model, factor)
+    specs = named_objects(pictures, known)
+    with progress_bar() as bar:
+        task = bar.add_task("evidence of photos", total=len(pictures))
+        return segment(
+            device, model, pictures, specs, len(capture.photos),
+            lambda done, count: bar.update(task, completed=done),
+        )  # fmt: skip
+
+
+def refuse_inputs(options: Options) -> None:
+    """What cannot be meant, before any work.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+
+    if options.masks is None and options.objects is None:
+        raise UsageError(
+            "give --objects objects.json with a prompt an object, or --masks FOLDER with label "
+            "maps; docs/objects.md says how to make them."
+        )
+    if options.masks is not None and options.segmenter is not None:
+        raise UsageError("--masks has the label maps already; leave out --segmenter.")
+    if not options.photos >= 1:
+        raise UsageError(f"--photos is {options.photos}; give 1 or more.")
 
 
 def refuse_outputs(options: Options) -> None:
@@ -134,6 +169,10 @@ def refuse_outputs(options: Options) -> None:
         raise UsageError(f"--report is {folder}, which is a file; name a folder.")
     if folder is not None and folder.is_dir() and any(folder.iterdir()) and not options.overwrite:
         raise UsageError(f"{folder} holds files; choose another --report or add --overwrite.")
+    if options.segmenter is not None:
+        maps = options.out.with_name(stem + ".masks")
+        if maps.exists() and not (options.overwrite and maps.is_dir()):
+            raise UsageError(f"{maps} exists; choose another --out or add --overwrite.")
 
 
 def open_labelled(options: Options) -> "AnchorModel | SplatLayers":
