@@ -1,18 +1,24 @@
-"""launch.py segment --objects: prompts in a few photos, a segmenter of the user's or none."""
+"""launch.py segment --objects: prompts in a few photos, a segmenter of the user's or none.
 
+Nothing is printed here: `tell` takes sentences, `told` what is done now.
+"""
+
+import hashlib
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from shapeshift.app.paths import full
-from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
-    from shapeshift.decomposition.label_photos import PhotoLabels
+    from shapeshift.decomposition.label_photos import Counts, Told
     from shapeshift.decomposition.masks.specs import ObjectSpecs
     from shapeshift.decomposition.segment_scene import Segmented
+    from shapeshift.decomposition.shown import ShownAnchors
     from shapeshift.rasterizer.device import Device
     from shapeshift.runtime_models.model import AnchorModel, SplatLayers
     from shapeshift.scene.captures.capture import Capture
@@ -20,38 +26,50 @@ if TYPE_CHECKING:
 MASKS, WORK = ".masks", ".masks.unfinished"  # after the scene file's name, without its ending
 
 
+@dataclass(frozen=True)
+class PromptSettings:
+    """How masks are made from prompts."""
+
+    out: Path  # NAME.scene.json; label maps of a segmenter go to NAME.masks beside it
+    segmenter: Path | None  # a folder; None: a walk over pixels and anchors
+    photos: int  # that a segmenter is asked about
+    told: "Told"
+    tell: Callable[[str], None]
+
+
 def find_by_prompts(
     device: "Device",
     model: "AnchorModel | SplatLayers",
     capture: "Capture",
     specs: "ObjectSpecs",
-    folder: Path | None,
-    out: Path,
-    scene: Path,
-    photos: int,
-) -> "Segmented":
-    """The labelled model.  folder: a segmenter's; None: a walk over pixels and anchors.
+    settings: PromptSettings,
+) -> "tuple[Segmented, dict[int, Counts]]":
+    """The labelled model, and what became of each label in the photos: {} without a segmenter.
 
-    out: NAME.scene.json; label maps go to NAME.masks beside it, with a segmenter.  scene: the
-    model's file.  Raises BadFile.
+    Raises BadFile.
     """
     from shapeshift.decomposition.masks.work_photos import work_photos
     from shapeshift.decomposition.shown import ShownAnchors
     from shapeshift.decomposition.walk_objects import segment_by_walk
 
     shown = ShownAnchors(device, model)
-    if folder is None:
-        with told() as progress:
-            found = segment_by_walk(shown, work_photos(capture, model.stops), specs, progress)
-        say(
-            "No --segmenter: objects are found by colours, heat and shape alone, which does for "
-            "compact things; look at them."
-        )
-        return found
-    return find_by_segmenter(shown, capture, specs, folder, out, scene, photos)
+    if settings.segmenter is not None:
+        return find_by_segmenter(shown, capture, specs, settings.segmenter, settings)
+    found = segment_by_walk(shown, work_photos(capture, model.stops), specs, settings.told)
+    settings.tell(
+        "No --segmenter: objects are found by colours, heat and shape alone, which does for "
+        "compact things; look at them."
+    )
+    return found, {}
 
 
-def find_by_segmenter(shown, capture, specs, folder, out, scene, photos) -> "Segmented":
+def find_by_segmenter(
+    shown: "ShownAnchors",
+    capture: "Capture",
+    specs: "ObjectSpecs",
+    folder: Path,
+    settings: PromptSettings,
+) -> "tuple[Segmented, dict[int, Counts]]":
     from shapeshift.decomposition.find_objects import (
         files_about,
         label_by_segmenter,
@@ -63,45 +81,37 @@ def find_by_segmenter(shown, capture, specs, folder, out, scene, photos) -> "Seg
 
     segmenter = open_segmenter(folder)
     if not segmenter.reads_text and any(spec.text for spec in specs.objects):
-        say(f"{segmenter.name} does not read: 'text' is not used.")
-    work = beside(out, WORK)
-    about = {"scene": files_about([scene] if scene.is_file() else list(scene.iterdir())),
+        settings.tell(f"{segmenter.name} does not read: 'text' is not used.")
+    if not segmenter.takes_boxes:
+        settings.tell(f"{segmenter.name} takes no boxes: each counts as a click in its middle.")
+    work, told = beside(settings.out, WORK), settings.told
+    about = {"scene": digest_of(shown.model),
              "segmenter": files_about([p for p in folder.iterdir() if p.is_file()])}  # fmt: skip
     try:
-        with told() as progress:
-            labels = label_by_segmenter(
-                shown, capture, specs, segmenter, work, about, progress, photos
-            )
+        labels = label_by_segmenter(
+            shown, capture, specs, segmenter, work, about, told, settings.photos
+        )
     except KeyboardInterrupt:
-        say(f"{full(work)} keeps the masks so far; the same command goes on there.")
+        settings.tell(f"{full(work)} keeps the masks so far; the same command goes on there.")
         raise
-    write_label_maps(labels, beside(out, MASKS))
-    print_counts(labels, specs)
+    write_label_maps(labels, beside(settings.out, MASKS))
     pictures = [
         LabelledView(photo.view, photo.stop.x, here)
         for photo, here in zip(labels.photos, labels.maps, strict=True)
     ]
-    left = len(capture.photos) - len(pictures)
-    with told() as progress:
-        found = segment(
-            shown.device, shown.model, pictures, specs.objects, left + len(pictures),
-            lambda done, count: progress("evidence of photos", done, count),
-        )  # fmt: skip
+    found = segment(
+        shown.device, shown.model, pictures, specs.objects, len(capture.photos),
+        lambda done, count: told("evidence of photos", done, count),
+    )  # fmt: skip
     shutil.rmtree(work)
-    return found
+    return found, labels.counts
 
 
-def print_counts(labels: "PhotoLabels", specs: "ObjectSpecs") -> None:
-    from rich.table import Table
-
-    from shapeshift.app.terminal import open_console
-
-    table = Table("object", "photos given", "accepted", "rejected", "unknown")
-    for spec in specs.objects:
-        counts = labels.counts[spec.label]
-        cells = (counts.given, counts.accepted, counts.rejected, counts.unknown)
-        table.add_row(spec.name, *map(str, cells))
-    open_console(stderr=True).print(table)
+def digest_of(model: "AnchorModel | SplatLayers") -> str:
+    """Of where its anchors or splats are: another training has others."""
+    places = getattr(model, "anchors", None)
+    places = model.means if places is None else places
+    return hashlib.sha256(np.ascontiguousarray(places).tobytes()).hexdigest()
 
 
 def beside(out: Path, ending: str) -> Path:
@@ -109,17 +119,3 @@ def beside(out: Path, ending: str) -> Path:
     from shapeshift.scene.document.scene_file import ENDING
 
     return out.with_name(out.name[: -len(ENDING)] + ending)
-
-
-@contextmanager
-def told() -> Iterator[Callable[[str, int, int], None]]:
-    """A bar, or a line a minute without a terminal."""
-    from shapeshift.app.progress import progress_bar
-
-    with progress_bar() as bar:
-        task = bar.add_task("photos", total=None)
-
-        def progress(what: str, done: int, of: int) -> None:
-            bar.update(task, description=what, completed=done, total=of)
-
-        yield progress
