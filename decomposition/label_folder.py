@@ -51,16 +51,23 @@ def read_map(path: Path, photo: Photo, factor: int = 1) -> tuple[View, np.ndarra
     Each pixel has the label of the nearest pixel of the file, never a blend; where a straightened
     photo shows nothing it is silent.  Raises BadFile.
     """
+    labels, gone = sampled(read_label_map(path, photo.file_size), photo, factor)
+    if gone is not None:
+        labels[gone] = SILENT
+    return photo.view.divided(factor), labels
+
+
+def sampled(pixels: np.ndarray, photo: Photo, factor: int) -> tuple[np.ndarray, np.ndarray | None]:
+    """Pixels (H, W) of the photo's file at the middles of those of its divided view, straight; and
+    (h, w) bool where a bent photo shows nothing, None of a straight one.
+    """
     view, size = photo.view.divided(factor), photo.file_size
-    labels = read_label_map(path, size)
     x, y = ((np.arange(side) + 0.5) * factor for side in view.size)
     if photo.lens is None:
-        return view, np.ascontiguousarray(labels[np.ix_(y.astype(int), x.astype(int))])
+        return np.ascontiguousarray(pixels[np.ix_(y.astype(int), x.astype(int))]), None
     at = np.nan_to_num(straight_pixels(photo.lens, x, y), nan=-1.0)
     column, row = (np.clip(at[..., k], 0, size[k] - 1).astype(int) for k in (0, 1))
-    out = labels[row, column]
-    out[lost(photo.lens, view.size, factor)] = SILENT
-    return view, np.ascontiguousarray(out)
+    return np.ascontiguousarray(pixels[row, column]), lost(photo.lens, view.size, factor)
 
 
 def stop_of(photo: Photo, stops: tuple[Stop, ...]) -> Stop:

@@ -6,10 +6,17 @@ OWD section 3.2, object by object.  decomposition.walk_objects does it without a
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from shapeshift.decomposition.masks.anchor_walk import (
+    AnchorGraph,
+    make_graph,
+    nodes_of,
+    seeds_of_evidence,
+)
 from shapeshift.decomposition.masks.journal import Journal
 from shapeshift.decomposition.masks.label_maps import SILENT
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt, Segmenter
@@ -182,11 +189,21 @@ class PhotoLabelling:
             yield decision
 
     def believed(self, label: int, view: int) -> np.ndarray:
-        """(H, W) share of each pixel that is believed to be the object's."""
-        photo, belief = self.photos[view], np.maximum(self.supports[label].belief(), 0)
+        """(H, W) share of each pixel that is believed to be the object's: by its support, and by a
+        walk from there to anchors that no mask has shown yet.
+        """
+        photo, support = self.photos[view], self.supports[label]
+        walked = self.graph.walk(seeds_of_evidence(support.inside, support.outside))
+        belief = support.belief()
         values = np.zeros((len(belief), 3))
-        values[:, 0] = belief
+        values[:, 0] = np.where(belief == 0, walked, np.maximum(belief, 0))
         return self.shown.picture(photo.view, photo.stop.x, values)[..., 0]
+
+    @cached_property
+    def graph(self) -> AnchorGraph:
+        """Of the scene's anchors."""
+        eyes = np.array([photo.view.world_from_eye.position for photo in self.photos])
+        return make_graph(nodes_of(self.shown.model, eyes.mean(0).astype(np.float32)), eyes)
 
     def labels(self) -> PhotoLabels:
         """Of the photos in which every object so far is decided."""

@@ -33,6 +33,7 @@ _NAMES_OF = {
     "api.play": ("Step", "cameras", "simulate"),
     "app.paths": ("DEMO", "TOUCH"),
     "app.errors": ("UsageError",),
+    "decomposition.masks.specs": ("ObjectSpec", "PhotoPrompt"),
     "rasterizer.device": ("NoDevice",),
     "renderer.gl.context": ("NoContext",),
     "renderer.settings": ("FrameStats", "RenderSettings"),

@@ -18,6 +18,8 @@ from shapeshift.api.write import export as export
 from shapeshift.app.errors import UsageError as UsageError
 from shapeshift.app.paths import DEMO as DEMO
 from shapeshift.app.paths import TOUCH as TOUCH
+from shapeshift.decomposition.masks.specs import ObjectSpec as ObjectSpec
+from shapeshift.decomposition.masks.specs import PhotoPrompt as PhotoPrompt
 from shapeshift.rasterizer.device import NoDevice as NoDevice
 from shapeshift.renderer.gl.context import NoContext as NoContext
 from shapeshift.renderer.settings import FrameStats as FrameStats

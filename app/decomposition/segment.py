@@ -3,7 +3,8 @@
 python3 launch.py segment room.shift capture --masks labels --out room.scene.json
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,9 +16,14 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import open_console, print_json, say
 
 if TYPE_CHECKING:
+    from shapeshift.decomposition.label_photos import Counts, Told
+    from shapeshift.decomposition.masks.specs import ObjectSpecs
+    from shapeshift.decomposition.partition import LabelledView
     from shapeshift.decomposition.score import LabelScore
     from shapeshift.decomposition.segment_scene import Segmented
-    from shapeshift.runtime_models.model import AnchorModel, SplatLayers
+    from shapeshift.rasterizer.device import Device
+    from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
+    from shapeshift.scene.captures.capture import Capture
 
 DECIMALS = 4  # of shares in a report
 
@@ -31,14 +37,20 @@ class Options(ReadingOptions):
     """A package, or a file of splats."""
     capture: Annotated[Path, POSITIONAL]
     """The folder of posed photos that it was trained on."""
-    masks: Path
-    """A folder of label maps, 8-bit grey PNGs with the photos' names: rgb/012.png for rgb/012.jpg.
-    Not every photo needs one; four that see all sides are enough."""
     out: Path
     """The scene file to write, NAME.scene.json; the labelled scene is written beside it."""
+    masks: Path | None = None
+    """A folder of label maps, 8-bit grey PNGs with the photos' names: rgb/012.png for rgb/012.jpg.
+    Not every photo needs one; four that see all sides are enough.  Default: made from the prompts
+    of --objects."""
     objects: Path | None = None
-    """objects.json: names, masses and colliders of the labels.  Default: they are called object 1,
-    object 2, ..."""
+    """objects.json (docs/objects.md): names, masses and colliders of the labels, and prompts, which
+    say where an object is in a photo.  Default: they are called object 1, object 2, ..."""
+    segmenter: Path | None = None
+    """A folder with ONNX files of SAM, MobileSAM, SAM 2 or SAM 3 (docs/objects.md).  Default: none,
+    colours, heat and shape find compact things."""
+    photos: Annotated[int, EXPERT] = 24
+    """How many photos a segmenter is asked about, those of the prompts and others far apart."""
     score: Path | None = None
     """A folder of true label maps, named in the same way: says how well the cut scene shows them.
     Default: not scored."""
@@ -54,51 +66,26 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.errors import UsageError
-    from shapeshift.app.progress import progress_bar, working
-    from shapeshift.app.training.evaluate import trained_downscale
+    from shapeshift.app.progress import working
     from shapeshift.decomposition.masks.specs import read_specs
-    from shapeshift.decomposition.segment_scene import (
-        named_objects,
-        read_pictures,
-        scene_of_parts,
-        scores_of,
-        segment,
-    )
+    from shapeshift.decomposition.segment_scene import scores_of
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.scene.document.write_scene_file import write_scene_file
-    from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
 
-    if options.downscale is not None and not 1 <= options.downscale <= 64:
-        raise UsageError(f"--downscale is {options.downscale}, expected 1 to 64.")
+    refuse_inputs(options)
     refuse_outputs(options)
-    known = read_specs(options.objects).objects if options.objects else ()
-    model = open_labelled(options)
-    capture = with_extrinsics(
-        open_capture(options.capture, options.memory), rig_of(model.provenance)
-    )
-    factor = options.downscale or trained_downscale(model.provenance)
+    model, device = open_labelled(options), open_device()
+    capture = straight_capture(options, model)
     with working("reading label maps"):
-        pictures = read_pictures(options.masks, capture, model, factor)
-        true = read_pictures(options.score, capture, model, factor) if options.score else []
-    specs = named_objects(pictures, known)
-    device = open_device()
-    with progress_bar() as bar:
-        task = bar.add_task("evidence of photos", total=len(pictures))
-        found = segment(
-            device, model, pictures, specs, len(capture.photos),
-            lambda done, count: bar.update(task, completed=done),
-        )  # fmt: skip
-    if not any(part.rows for part in found.parts):
-        raise UsageError("no object got any part of the scene; look at the label maps.")
-    path = model_path(options, model)
-    write_model(found.model, path)
-    write_scene_file(scene_of_parts(found, path.name, options.out.parent), options.out)
+        true = read_maps(options, options.score, capture, model) if options.score else []
+    specs = read_specs(options.objects) if options.objects else None
+    with bar() as told:
+        found, counts = cut(options, specs, model, capture, device, told, say)
     with working("scoring"):
-        scores = scores_of(device, found, true)
+        scores = scores_of(device, found, true) if true else ()
     if options.json:
-        print_json(facts_of(found, scores, options))
+        print_json(facts_of(found, scores, options, counts))
     else:
+        print_counts(found, counts)
         print_tables(found, scores)
     tell_gaps(found)
     if options.report is not None:
@@ -106,10 +93,94 @@ def run(options: Options) -> int:
 
         write_report(device, found, options.report, options.overwrite)
         say(f"pictures in {full(options.report)}")
+    path = model_path(options, model)
     say(
         f"{full(options.out)} and {path.name} beside it; next: {program()} view {full(options.out)}"
     )
     return 0
+
+
+def cut(
+    options: Options,
+    specs: "ObjectSpecs | None",
+    model: "AnchorModel | SplatLayers",
+    capture: "Capture",
+    device: "Device",
+    told: "Told",
+    tell: Callable[[str], None],
+) -> "tuple[Segmented, dict[int, Counts]]":
+    """Writes the labelled model and the scene file; what was found, and what became of each label
+    in the photos where a segmenter was asked.  Raises BadFile, UsageError.
+    """
+    from shapeshift.app.errors import UsageError
+    from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
+    from shapeshift.scene.document.write_scene_file import write_scene_file
+
+    counts: dict[int, Counts] = {}
+    if options.masks is not None:
+        pictures = read_maps(options, options.masks, capture, model)
+        objects = named_objects(pictures, specs.objects if specs else ())
+        found = segment(
+            device, model, pictures, objects, len(capture.photos),
+            lambda done, count: told("evidence of photos", done, count),
+        )  # fmt: skip
+    else:
+        from shapeshift.app.decomposition.segment_prompts import PromptSettings, find_by_prompts
+
+        assert specs is not None, "refused before"
+        settings = PromptSettings(options.out, options.segmenter, options.photos, told, tell)
+        found, counts = find_by_prompts(device, model, capture, specs, settings)
+    if not any(part.rows for part in found.parts):
+        raise UsageError("no object got any part of the scene; look at the label maps.")
+    path = model_path(options, model)
+    write_model(found.model, path)
+    write_scene_file(scene_of_parts(found, path.name, options.out.parent), options.out)
+    return found, counts
+
+
+def straight_capture(options: Options, model: "AnchorModel | SplatLayers") -> "Capture":
+    """The capture, its cameras where the training found them.  Raises BadFile."""
+    from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
+
+    return with_extrinsics(open_capture(options.capture, options.memory), rig_of(model.provenance))
+
+
+def read_maps(
+    options: Options, folder: Path, capture: "Capture", model: "AnchorModel | SplatLayers"
+) -> "list[LabelledView]":
+    """The label maps of a folder.  Raises BadFile."""
+    from shapeshift.app.training.evaluate import trained_downscale
+    from shapeshift.decomposition.segment_scene import read_pictures
+
+    factor = options.downscale or trained_downscale(model.provenance)
+    return read_pictures(folder, capture, model, factor)
+
+
+@contextmanager
+def bar() -> "Iterator[Told]":
+    """A bar, or a line a minute without a terminal."""
+    from shapeshift.app.progress import progress_bar
+
+    with progress_bar() as shown:
+        task = shown.add_task("photos", total=None)
+        yield lambda what, done, of: shown.update(task, description=what, completed=done, total=of)
+
+
+def refuse_inputs(options: Options) -> None:
+    """What cannot be meant, before any work.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+
+    if options.masks is None and options.objects is None:
+        raise UsageError(
+            "give --objects objects.json with a prompt an object, or --masks FOLDER with label "
+            "maps; docs/objects.md says how to make them."
+        )
+    if options.masks is not None and options.segmenter is not None:
+        raise UsageError("--masks has the label maps already; leave out --segmenter.")
+    if options.downscale is not None and not 1 <= options.downscale <= 64:
+        raise UsageError(f"--downscale is {options.downscale}, expected 1 to 64.")
+    if not options.photos >= 1:
+        raise UsageError(f"--photos is {options.photos}; give 1 or more.")
 
 
 def refuse_outputs(options: Options) -> None:
@@ -134,22 +205,30 @@ def refuse_outputs(options: Options) -> None:
         raise UsageError(f"--report is {folder}, which is a file; name a folder.")
     if folder is not None and folder.is_dir() and any(folder.iterdir()) and not options.overwrite:
         raise UsageError(f"{folder} holds files; choose another --report or add --overwrite.")
+    if options.segmenter is not None:
+        maps = options.out.with_name(stem + ".masks")
+        if maps.exists() and not (options.overwrite and maps.is_dir()):
+            raise UsageError(f"{maps} exists; choose another --out or add --overwrite.")
 
 
 def open_labelled(options: Options) -> "AnchorModel | SplatLayers":
     """The model, of a kind that can have labels.  Raises BadFile, UsageError."""
+    return labelled(open_model(options.scene, options), str(options.scene))
+
+
+def labelled(model: "Model", where: str) -> "AnchorModel | SplatLayers":
+    """The model, if it is of a kind that can have labels.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
     from shapeshift.runtime_models.model import AnchorModel, SplatLayers
 
-    model = open_model(options.scene, options)
     if not isinstance(model, AnchorModel | SplatLayers):
         raise UsageError(
-            f"{options.scene} is a Scaffold-GS model, whose splats depend on the eye; export it as "
+            f"{where} is a Scaffold-GS model, whose splats depend on the eye; export it as "
             ".ply first, and segment that."
         )
     if isinstance(model, SplatLayers) and len(model.stops) > 1:
         raise UsageError(
-            f"{options.scene} has {len(model.stops)} layers of plain splats; a labelled scene is a "
+            f"{where} has {len(model.stops)} layers of plain splats; a labelled scene is a "
             "package, or splats of one file: segment one layer."
         )
     return model
@@ -185,7 +264,12 @@ def write_model(model: "AnchorModel | SplatLayers", path: Path) -> None:
     )
 
 
-def facts_of(found: "Segmented", scores: "Sequence[LabelScore]", options: Options) -> dict:
+def facts_of(
+    found: "Segmented",
+    scores: "Sequence[LabelScore]",
+    options: Options,
+    counts: "dict[int, Counts]",
+) -> dict:
     """The tables as JSON has them."""
     from math import isfinite
 
@@ -198,6 +282,7 @@ def facts_of(found: "Segmented", scores: "Sequence[LabelScore]", options: Option
             "rows": part.rows,
             "pixels": round(part.pixels, 1),
             "share": round(part.share, DECIMALS),
+            **(vars(counts[part.spec.label]) if counts else {}),
         }
         for part in found.parts
     }
@@ -211,6 +296,20 @@ def facts_of(found: "Segmented", scores: "Sequence[LabelScore]", options: Option
     if scores:
         facts["miou"] = round(mean_score(scores), DECIMALS)
     return facts
+
+
+def print_counts(found: "Segmented", counts: "dict[int, Counts]") -> None:
+    """What became of each object in the photos that a segmenter was asked about."""
+    from rich.table import Table
+
+    if not counts:
+        return
+    table = Table("object", "photos given", "accepted", "rejected", "unknown")
+    for part in found.parts:
+        here = counts[part.spec.label]
+        cells = (here.given, here.accepted, here.rejected, here.unknown)
+        table.add_row(part.spec.name, *map(str, cells))
+    open_console(stderr=False).print(table)
 
 
 def print_tables(found: "Segmented", scores: "Sequence[LabelScore]") -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from PIL import Image
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, label
 
 from shapeshift.decomposition.masks.random_walk import conjugate_gradients
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
@@ -25,6 +25,8 @@ PRIOR = 0.02  # pull of the colours, against an edge of weight 1
 SURE = 6.0  # log odds beyond which colours pull no harder
 LEAST_PIXELS = 9  # fewer inside teach no colours
 CORE = 0.3  # of the box's sides: half axes of the ellipse whose colours are the first guess
+SPECK = 0.05  # of the largest part's pixels: smaller ones are left out
+HOLE = 0.02  # of the mask's pixels: smaller ones are filled
 INSIDE, OUTSIDE, UNKNOWN = 1, 0, -1
 
 
@@ -54,9 +56,24 @@ class PixelWalk:
         seeds = seeds_of(moved(prompt, (left, top), np.divide(size, part.shape[1::-1])), small)
         share = walk(small.astype(np.float64) / 255, *seeds)
         mask = np.zeros(encoded.shape[:2], bool)
-        mask[top:bottom, left:right] = resized(share.astype(np.float32), part.shape[1::-1]) > 0.5
+        found = resized(share.astype(np.float32), part.shape[1::-1]) > 0.5
+        mask[top:bottom, left:right] = tidied(found)
         sure = float(np.abs(2 * share - 1)[share > 0.5].mean()) if (share > 0.5).any() else 0.0
         return [Candidate(mask, sure)]
+
+
+def tidied(mask: np.ndarray) -> np.ndarray:
+    """Without specks beside the largest part, and without small holes."""
+    parts, count = label(mask)
+    if not count:
+        return mask
+    sizes = np.bincount(parts.ravel())
+    sizes[0] = 0
+    kept = (sizes >= SPECK * sizes.max())[parts]
+    holes, count = label(~kept)
+    sizes = np.bincount(holes.ravel())
+    sizes[0] = kept.sum()  # no hole
+    return kept | (sizes < HOLE * kept.sum())[holes]
 
 
 def with_box_of_mask(prompt: Prompt) -> Prompt:

@@ -4,6 +4,7 @@ The paper's object specifications (OWD section 3.1), docs/objects.md.
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -61,20 +62,30 @@ class ObjectSpecs:
 def read_specs(path: str | Path) -> ObjectSpecs:
     """Raises BadFile, one sentence that names the object and the key."""
     path = Path(path)
-    advice = "docs/objects.md describes the file"
-    file = Fields(read_json(path, path.name, unique=True), path.name, advice)
+    return specs_of(read_json(path, path.name, unique=True), path.name, path.parent)
+
+
+def checked(objects: Sequence[ObjectSpec], folder: Path) -> ObjectSpecs:
+    """Objects that were made by a program, under the rules of the file.  Raises BadFile."""
+    rows = [object_row(spec) for spec in objects]
+    return specs_of({"format": FORMAT, "objects": rows}, "objects", folder)
+
+
+def specs_of(data: object, where: str, folder: Path) -> ObjectSpecs:
+    """What the JSON says; `where` is for messages.  Raises BadFile."""
+    file = Fields(data, where, "docs/objects.md describes the file")
     if file.value("format") != FORMAT:
         raise file.error("format", f"'{FORMAT}', which this program reads,")
     rows = file.rows("objects", MOST_LABEL, "object")
     file.refuse_unknown_keys()
     if not rows:
         raise file.error("objects", "a list of one object or more")
-    objects = tuple(read_object(row, path.name) for row in rows)
+    objects = tuple(read_object(row, where) for row in rows)
     for key in ("label", "name"):
         values = [getattr(spec, key) for spec in objects]
         if twice := next((v for v in values if values.count(v) > 1), None):
-            raise BadFile(f"{path.name}: two objects have the {key} {twice!r}; choose another.")
-    return ObjectSpecs(path.parent, objects)
+            raise BadFile(f"{where}: two objects have the {key} {twice!r}; choose another.")
+    return ObjectSpecs(folder, objects)
 
 
 def read_object(row: Fields, file: str) -> ObjectSpec:

@@ -7,8 +7,8 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
+from shapeshift.decomposition.label_folder import below_capture, sampled, stop_of
 from shapeshift.decomposition.masks.label_maps import read_mask
 from shapeshift.decomposition.masks.segmenter import Prompt
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs, PhotoPrompt
@@ -17,7 +17,7 @@ from shapeshift.runtime_models.stop import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.photo import load_photo
-from shapeshift.scene.captures.undistort import pinhole_of, undistorted
+from shapeshift.scene.captures.undistort import pinhole_of
 from shapeshift.scene.pose import View
 
 MOST_SIDE = 1024  # pixels: what segmenters look at
@@ -48,14 +48,9 @@ class WorkPhoto:
 
     def mask(self, path: Path, label: int | None) -> np.ndarray:
         """(H, W) bool of the divided photo, from a PNG of the file's shape.  Raises BadFile."""
-        mask = Image.fromarray(read_mask(path, self.photo.file_size, label))
-        if self.photo.lens is not None:
-            size = pinhole_of(self.photo.lens).size
-            mask = undistorted(mask.convert("L"), self.photo.lens, size)
-        width, height = self.view.size
-        whole = mask.convert("L").crop((0, 0, width * self.factor, height * self.factor))
-        small = whole if self.factor == 1 else whole.reduce(self.factor)
-        return np.asarray(small.resize(self.view.size, Image.Resampling.NEAREST)) > 127
+        whole = read_mask(path, self.photo.file_size, label)
+        mask, gone = sampled(whole, self.photo, self.factor)
+        return mask if gone is None else mask & ~gone
 
 
 def straight_points(lens: ColmapCamera, points: np.ndarray) -> np.ndarray:
@@ -72,30 +67,20 @@ def work_photos(capture: Capture, stops: Sequence[Stop]) -> list[WorkPhoto]:
     """The photos in the capture's order, without those of modalities that a model with these
     stops does not have.  Raises BadFile where none is left.
     """
-    stop_of = {stop.name: stop for stop in stops}
-    found = []
+    found: list[WorkPhoto] = []
+    refusal: BadFile | None = None
     for photo in capture.photos:
-        if photo.modality not in stop_of:
+        try:
+            stop = stop_of(photo, tuple(stops))
+        except BadFile as error:
+            refusal = error
             continue
         factor = max(math.ceil(max(photo.view.size) / MOST_SIDE), 1)
-        name = name_of(photo.path, capture.folder)
-        view = photo.view.divided(factor)
-        found.append(WorkPhoto(name, photo, factor, view, stop_of[photo.modality]))
-    if not found:
-        theirs = ", ".join(sorted({photo.modality for photo in capture.photos}))
-        raise BadFile(
-            f"{capture.folder} has photos of {theirs}, the model the stops "
-            f"{', '.join(stop_of)}; give the capture that the model was trained on."
-        )
+        name = below_capture(photo, capture).as_posix()
+        found.append(WorkPhoto(name, photo, factor, photo.view.divided(factor), stop))
+    if not found and refusal is not None:
+        raise refusal
     return found
-
-
-def name_of(path: Path, folder: Path) -> str:
-    """Of a photo, as prompts have it: below the folder where it lies there."""
-    try:
-        return path.absolute().relative_to(folder.absolute()).as_posix()
-    except ValueError:
-        return path.as_posix()
 
 
 def find_photo(photos: Sequence[WorkPhoto], asked: str, where: str) -> int:

@@ -1,6 +1,6 @@
 """A scene as a library has it: opened once, never changed; every edit gives another one."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from shapeshift.api.arguments import Camera, Output, PathText, Size, X
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from shapeshift.api.picture import Picture
     from shapeshift.api.render import Context, Drawing
     from shapeshift.api.write import Exported
+    from shapeshift.decomposition.masks.specs import ObjectSpec
     from shapeshift.renderer.settings import RenderSettings
 
 
@@ -162,6 +163,42 @@ class Scene(OpenedScene):
         views = choose_views(self, camera, count, size)  # what cannot be is refused now
         scenes = [self.at(each) for each in spread(x, len(views))]
         return (each.render(None, view, **how) for each, view in zip(scenes, views, strict=True))
+
+    # ---- objects
+
+    def segment(
+        self,
+        capture: PathText,
+        out: PathText,
+        *,
+        objects: "PathText | Sequence[ObjectSpec] | None" = None,
+        masks: PathText | None = None,
+        segmenter: PathText | None = None,
+        photos: int = 24,
+        overwrite: bool = False,
+        progress: "Callable[[str, int, int], None] | None" = None,
+    ) -> "Scene":
+        """Cuts a scene into objects, and gives the scene of them that it writes to `out`,
+        NAME.scene.json, with the labelled model beside it (docs/objects.md).
+
+        capture: the photos that it was trained on.  objects: objects.json or ObjectSpecs, each with
+        a prompt that says in one photo where it is; or masks: a folder of label maps.  segmenter: a
+        folder with the ONNX files of SAM, MobileSAM, SAM 2 or SAM 3, asked about `photos` photos;
+        without one colours, heat and shape find compact things.  progress: called with (what, done,
+        of how many); an exception from it ends the work, which the same call then goes on with.
+
+        Object-Wise Decomposition, sections 3.2 and 3.3.  Raises BadFile, UsageError, NoDevice.
+
+            seen = ss.PhotoPrompt("rgb/012.jpg", box=(310, 200, 402, 296))
+            mug = ss.ObjectSpec(1, "mug", (seen,))
+            parts = scene.segment("capture", "room.scene.json", objects=[mug])
+            parts.objects["mug"].move(by=(0, 0.2, 0)).render()
+        """
+        from shapeshift.api.segment import segment
+
+        return Scene(
+            *segment(self, capture, out, objects, masks, segmenter, photos, overwrite, progress)
+        )
 
     # ---- files and figures
 

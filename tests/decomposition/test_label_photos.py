@@ -231,7 +231,7 @@ def test_a_capture_of_other_stops_is_refused(photos, tmp_path):
     from shapeshift.scene.captures.capture import Capture
 
     capture = Capture(tmp_path, (Stop("RGB", 0.0),), (photos[0].photo,))
-    with pytest.raises(BadFile, match="has photos of RGB, the model the stops Bone"):
-        work_photos(capture, (Stop("Bone", 0.0),))
+    with pytest.raises(BadFile, match="photos of 'RGB' belong to no stop"):
+        work_photos(capture, (Stop("Bone", 0.0), Stop("Skin", 1.0)))
     assert work_photos(capture, (Stop("Bone", 0.0), Stop("RGB", 1.0)))[0].stop.x == 1.0
     assert photos[0].view.size == SIZE

@@ -1,0 +1,65 @@
+"""A scene and photos of it to a scene of objects."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from shapeshift.api.arguments import PathText
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.read import read_document
+from shapeshift.app.document import Document
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import plain
+from shapeshift.decomposition.masks.specs import ObjectSpec
+
+Told = Callable[[str, int, int], None]  # what is done now, how many of how many
+
+
+def segment(
+    scene: OpenedScene,
+    capture: PathText,
+    out: PathText,
+    objects: PathText | Sequence[ObjectSpec] | None,
+    masks: PathText | None,
+    segmenter: PathText | None,
+    photos: int,
+    overwrite: bool,
+    progress: Told | None,
+) -> tuple[Document, Path]:
+    """What Scene.segment gives, and where it lies."""
+    from shapeshift.app.decomposition.segment import (
+        Options,
+        cut,
+        labelled,
+        refuse_inputs,
+        refuse_outputs,
+        straight_capture,
+    )
+    from shapeshift.decomposition.masks.specs import checked, read_specs
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.runtime_models.splats.plain_splats import Reading
+
+    if objects is None and masks is None:
+        raise UsageError("objects with a prompt each are wanted, or masks: a folder of label maps.")
+    if masks is not None and segmenter is not None:
+        raise UsageError("masks has the label maps already; leave out segmenter.")
+
+    def path(text: PathText | None) -> Path | None:
+        return None if text is None else plain(str(text))
+
+    by_path = objects is None or isinstance(objects, str) or hasattr(objects, "__fspath__")
+    options = Options(
+        scene=scene.path or Path("scene"), capture=plain(str(capture)), out=plain(str(out)),
+        masks=path(masks), objects=path(objects) if by_path else Path("objects"),
+        segmenter=path(segmenter), photos=photos, overwrite=overwrite,
+    )  # fmt: skip
+    refuse_inputs(options)
+    refuse_outputs(options)
+    model = labelled(scene.model, "the scene")
+    if by_path:
+        specs = read_specs(options.objects) if options.objects else None
+    else:
+        specs = checked(objects, Path())
+    found = straight_capture(options, model)
+    told = progress or (lambda what, done, of: None)
+    cut(options, specs, model, found, open_device(), told, lambda sentence: None)
+    return read_document(options.out, Reading())
