@@ -1,0 +1,196 @@
+"""Render and verify: a patch stays only where it closes holes and harms nothing (OWD, section 3.4).
+
+Holes are pixels of the thing's own mask through which nothing of the background is seen.  All other
+pixels of background are protected: they may hardly change, and around the mask they may not become
+less like the photos.  What fills a hole has to look as the background around the mask does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeshift.decomposition.completion.draw import ModelPictures, over
+from shapeshift.decomposition.partition import LabelledView
+from shapeshift.rasterizer.device import Device
+from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.scene.pose import View
+
+OPEN = 0.5  # alpha below which a pixel is a hole
+MARGIN = 3  # pixels around a mask that are not protected: the thing's own border
+AROUND = 24  # pixels around a mask that are compared with photos, and lend their colours
+LEAST_PIXELS = 30  # of a mask, for a view to say something
+LEAST_FEWER = 0.75  # of the holes over the cells that were filled that must be closed
+LEAST_ALIKE_DB = 30.0  # PSNR of protected pixels, before against after, in the worst view
+MOST_LOST_DB = 2.0  # that protected pixels around a mask may lose against the photos
+MOST_STRANGE = 0.06  # display units from a filled pixel to the nearest colour around, mean
+MOST_COLORS = 4000  # around a mask that are compared with
+
+
+@dataclass(frozen=True)
+class PhotoView:
+    """A labelled picture with its photo; None: nothing to compare with."""
+
+    labelled: LabelledView
+    photo: np.ndarray | None = None  # (H, W, 3) display sRGB 0..1
+
+
+class Cells(NamedTuple):
+    """Squares on a plane."""
+
+    middles: np.ndarray  # (n, 3) metres
+    side_m: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a step did, over all views that show the thing."""
+
+    views: int
+    holes_before: int  # pixels
+    holes_after: int
+    alike_db: float  # the worst view's protected pixels, before against after
+    photo_before_db: float  # protected pixels around the masks, against the photos
+    photo_after_db: float
+    strange: float  # display units from the colours of fills to those around, mean
+    why: str  # "": accepted; else what is wrong with it, a clause
+
+    @property
+    def is_accepted(self) -> bool:
+        return not self.why
+
+    def sentence(self) -> str:
+        """For people."""
+        holes = f"holes {self.holes_before:,} -> {self.holes_after:,} pixels in {self.views} views"
+        return f"refused: {self.why} ({holes})" if self.why else holes
+
+
+@dataclass
+class Tally:
+    views: int = 0
+    before: int = 0
+    after: int = 0
+    meant: int = 0  # holes over the cells that are filled
+    met: int = 0  # of those, closed
+    alike_db: float = np.inf
+    error_before: float = 0.0
+    error_after: float = 0.0
+    beside: int = 0
+    strange: float = 0.0
+    filled: int = 0
+
+
+def verify(
+    device: Device,
+    before: AnchorModel,
+    after: AnchorModel,
+    label: int,
+    views: Sequence[PhotoView],
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    cells: Cells | None = None,
+    shadows: bool = False,
+) -> Verdict:
+    """Whether `after` is better than `before`, a model without the thing of that label.
+
+    cells: where holes have to close; all over the masks, if None.  shadows: what photos show of
+    these cells is not protected, since it is shadow there.
+    """
+    tally = Tally()
+    drawings = ModelPictures(device, before), ModelPictures(device, after)
+    for view in sorted(views, key=lambda view: str(view.labelled.x)):
+        mask = view.labelled.labels == label
+        if mask.sum() < LEAST_PIXELS:
+            continue
+        pair = [each.draw(view.labelled.view, view.labelled.x) for each in drawings]
+        add_view(tally, view, mask, pair, background, cells, shadows)
+    return judge(tally)
+
+
+def add_view(
+    tally: Tally,
+    view: PhotoView,
+    mask: np.ndarray,
+    pair: list[np.ndarray],
+    background: tuple[float, float, float],
+    cells: Cells | None,
+    shadows: bool,
+) -> None:
+    """One view's pictures (H, W, 4) before and after."""
+    from scipy import ndimage
+
+    first, second = (over(picture, background) for picture in pair)
+    hole = mask & (pair[0][..., 3] < OPEN)
+    tally.views += 1
+    tally.before += int(hole.sum())
+    tally.after += int((mask & (pair[1][..., 3] < OPEN)).sum())
+    meant = hole if cells is None else hole & shown_cells(view.labelled.view, cells, 0.5)
+    tally.meant += int(meant.sum())
+    tally.met += int((meant & (pair[1][..., 3] >= OPEN)).sum())
+    grown = ndimage.binary_dilation(mask, iterations=MARGIN)
+    protected = ~grown & (view.labelled.labels == 0)
+    if cells is not None and shadows:
+        protected &= ~shown_cells(view.labelled.view, cells, 1.0)
+    if protected.any():
+        error = float(((first - second)[protected] ** 2).mean())
+        tally.alike_db = min(tally.alike_db, decibels(error))
+    beside = ndimage.binary_dilation(grown, iterations=AROUND) & protected
+    if view.photo is not None:
+        tally.beside += int(beside.sum())
+        tally.error_before += float(((first - view.photo)[beside] ** 2).mean(1).sum())
+        tally.error_after += float(((second - view.photo)[beside] ** 2).mean(1).sum())
+    filled = hole & (pair[1][..., 3] >= OPEN)
+    known = first if view.photo is None else view.photo
+    if filled.any() and beside.any():
+        tally.strange += float(strangeness(second[filled], known[beside]).sum())
+        tally.filled += int(filled.sum())
+
+
+def shown_cells(view: View, cells: Cells, reach: float) -> np.ndarray:
+    """(H, W) bool: pixels nearer than so many sides of a cell to its middle."""
+    from PIL import Image, ImageDraw
+
+    eye_from_world, fx, fy, cx, cy = view.pinhole()
+    at = np.c_[cells.middles, np.ones(len(cells.middles))] @ eye_from_world.T
+    picture = Image.new("1", view.size)
+    pen = ImageDraw.Draw(picture)
+    for x, y, z in at[at[:, 2] > view.near, :3]:
+        u, v, far = fx * x / z + cx, fy * y / z + cy, reach * cells.side_m * max(fx, fy) / z
+        pen.ellipse((u - far, v - far, u + far, v + far), fill=1)
+    return np.array(picture)
+
+
+def strangeness(colors: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(n,) display units from colours (n, 3) to the nearest of the known ones (m, 3)."""
+    from scipy.spatial import cKDTree
+
+    few = known[:: -(-len(known) // MOST_COLORS)]
+    return cKDTree(few).query(colors, workers=1)[0]
+
+
+def judge(tally: Tally) -> Verdict:
+    """The verdict of all views."""
+    beside = max(tally.beside, 1)
+    photo = [decibels(e / beside) for e in (tally.error_before, tally.error_after)]
+    strange = tally.strange / max(tally.filled, 1)
+    why = ""
+    if not tally.views:
+        why = "no view shows the thing, so that nothing can be verified"
+    elif not tally.meant:
+        why = "there was no hole"
+    elif not tally.met >= LEAST_FEWER * tally.meant:
+        why = f"it closes {100 * tally.met / tally.meant:.0f} % of the holes where it lies"
+    elif not tally.alike_db >= LEAST_ALIKE_DB:
+        why = f"it changes what is not behind the thing ({tally.alike_db:.1f} dB alike)"
+    elif not photo[1] >= photo[0] - MOST_LOST_DB:
+        why = f"it is less like the photos ({photo[0]:.1f} -> {photo[1]:.1f} dB)"
+    elif not strange <= MOST_STRANGE:
+        why = f"its colours are not those around the thing ({strange:.2f} away)"
+    return Verdict(
+        tally.views, tally.before, tally.after, tally.alike_db, photo[0], photo[1], strange, why
+    )
+
+
+def decibels(error: float) -> float:
+    """PSNR of a mean squared error."""
+    return np.inf if error == 0 else float(-10 * np.log10(error))  # NaN stays

@@ -1,0 +1,1 @@
+"""What the physics touches of an object instead of its splats, chosen by silhouettes."""

@@ -1,0 +1,70 @@
+"""How well a proxy covers an object in photos: silhouettes against masks (OWD, section 3.5)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeshift.decomposition.partition import LabelledView
+from shapeshift.rasterizer.evidence import SILENT
+from shapeshift.scene.colliders.collider import Collider
+from shapeshift.scene.colliders.collider_pieces import hull_faces
+from shapeshift.scene.pose import View
+
+FINER = 4  # times the picture's resolution that outlines are filled at
+LEAST_PIXELS = 30  # of a mask, for a view to count
+
+
+@dataclass(frozen=True)
+class SilhouetteScore:
+    """Over all pixels of all views that show the object."""
+
+    views: int
+    recall: float  # of the object's pixels, that the proxy covers
+    iou: float
+
+
+def silhouette(view: View, parts: Sequence[np.ndarray]) -> np.ndarray | None:
+    """(H, W) bool: pixels whose centre one of the convex pieces (V, 3), world metres, covers.
+
+    None where a corner lies behind the near plane.
+    """
+    from PIL import Image, ImageDraw
+
+    eye_from_world, fx, fy, cx, cy = view.pinhole()
+    picture = Image.new("1", (view.size[0] * FINER, view.size[1] * FINER))
+    pen = ImageDraw.Draw(picture)
+    for part in parts:
+        x, y, z = (np.c_[part, np.ones(len(part))] @ eye_from_world.T).T[:3]
+        if not (z > view.near).all():
+            return None
+        pixels = np.stack([fx * x / z + cx, fy * y / z + cy], 1) * FINER - 0.5
+        for face in hull_faces(part):
+            pen.polygon([tuple(corner) for corner in pixels[face]], fill=1)
+    return np.array(picture)[FINER // 2 :: FINER, FINER // 2 :: FINER]
+
+
+def score_silhouettes(
+    collider: Collider, world_from_part: np.ndarray, label: int, views: Sequence[LabelledView]
+) -> SilhouetteScore:
+    """The proxy of the object of that label; world_from_part (4, 4).
+
+    Pixels where another object is seen say nothing: it may stand before this one.
+    """
+    turn, move = world_from_part[:3, :3], world_from_part[:3, 3]
+    parts = [part.astype(np.float64) @ turn.T + move for part in collider.parts]
+    seen = both = either = count = 0
+    for each in views:
+        mask = each.labels == label
+        if mask.sum() < LEAST_PIXELS:
+            continue
+        covered = silhouette(each.view, parts)
+        if covered is None:
+            continue
+        known = mask | (each.labels == 0)
+        known &= each.labels != SILENT
+        count += 1
+        seen += int(mask.sum())
+        both += int((mask & covered).sum())
+        either += int(((mask | covered) & known).sum())
+    return SilhouetteScore(count, both / max(seen, 1), both / max(either, 1))
