@@ -116,6 +116,12 @@ class PartsTool:
             self._asked = Query(self.state.shown(view), view, (*place, *place), self._against(how))
             self.finder.ask(self._asked)
 
+    def click_lit(self, how: str) -> None:
+        """Takes what is lit up: for a hand, which is never quite still."""
+        self.how = how
+        if self.found is not None:
+            self._take(self.found)
+
     def _is_at(self, query: Query, view: View, place: tuple[float, float]) -> bool:
         near = np.hypot(query.corners[0] - place[0], query.corners[1] - place[1]) < 1.5
         same = np.array_equal(query.view.eye_from_world(), view.eye_from_world())
