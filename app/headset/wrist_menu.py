@@ -10,6 +10,7 @@ from shapeshift.app.editor.panels.panel import Section, draw_sections
 from shapeshift.app.editor.panels.scale_bar import has_scale
 from shapeshift.app.editor.panels.sections.look_panel import draw_look
 from shapeshift.app.editor.panels.sections.objects_panel import draw_object_list
+from shapeshift.app.editor.panels.sections.parts_panel import draw_parts
 from shapeshift.app.editor.panels.sections.stops_panel import draw_stops
 from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.panels.slider import track_ends
@@ -83,6 +84,7 @@ class WristMenu:
             Section("Stops", lambda scale: draw_stops(editor, scale)),
             Section("Look", lambda scale: draw_look(editor, scale)),
             Section("Objects", lambda scale: draw_object_list(objects, scale)),
+            Section("Parts", lambda scale: draw_parts(state.parts, scale)),
             Section("Performance", self._draw_figures),
             Section("Help", lambda scale: draw_help()),
         ]
@@ -149,7 +151,8 @@ class WristMenu:
         return (
             objects, playing, editor.chosen, editor.palette, editor.settings.debug,
             editor.settings.background, tuple(editor.messages.problems),
-            tuple(state.touch.reactions),
+            tuple(state.touch.reactions), editor.shown_scene.show, editor.shown_scene.lit is None,
+            state.parts.on, state.parts.count, state.parts.factor,
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
             self._foot.sure_s > 0, editor.messages.note,
             state.figures if self._figures_seen else None,

@@ -9,12 +9,14 @@ import moderngl
 from shapeshift.app.document import DARK, Document
 from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
 from shapeshift.app.headset.panel_picture import PanelPicture
+from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.performance_section import Figures
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
@@ -91,7 +93,9 @@ class XrApp:
         editor.settings = replace(editor.settings, background=self.background)
         user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
         touch = TouchState(editor, True, keys=False)
-        self.state = XrState(editor, touch, pacing, user, floor_shown=floor)
+        parts = PartsTool(editor, lambda: None)
+        self.state = XrState(editor, touch, pacing, user, parts, floor_shown=floor)
+        self._parts_hand = PartsHand(parts)
         actions = MenuActions(self.recentre, self.leave, self.pulse)
         self.menu = WristMenu(self.state, actions, eyes.panel, panel_hand)
         self._level_m = 0.0  # of the floor in the world
@@ -144,6 +148,7 @@ class XrApp:
         self._seen_s = frame.seen_s
         before = self.state.play_space
         left_over = self.menu.act(frame, seconds)
+        left_over = self._parts_hand.act(left_over, self.state.play_space, self.menu.carried)
         self.state.play_space = self.state.user.act(left_over, self.state.play_space, seconds)
         self._clearness = clearness(self._clearness, before, self.state.play_space, seconds)
         if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
@@ -216,7 +221,7 @@ class XrApp:
         settings = replace(self.state.pacing.settings(), debug=look.debug)
         self.renderer.settings = replace(settings, background=look.background)
         start = time.perf_counter()
-        self.renderer.update(self.state.editor.scene)
+        self.renderer.update(self.state.editor.shown(views[0]))
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
         self._drawing_ms = (time.perf_counter() - start) * 1e3
         self.session.pace.drew(self._drawing_ms)

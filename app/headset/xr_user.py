@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.performance_section import Figures
@@ -74,6 +75,7 @@ class XrState:
     touch: TouchState
     pacing: Pacing
     user: XrUser
+    parts: PartsTool
     play_space: PlaySpace = field(default_factory=PlaySpace)
     floor_shown: bool = True
     figures: Figures | None = None  # of the last second

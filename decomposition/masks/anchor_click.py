@@ -19,6 +19,7 @@ RETURN = 1e-3  # of an anchor's edges: the chance that a walk ends there
 # 0.5, as the border of a surface grows, the smallest; 0.6 was best of 0.3 to 1 on the demo.
 BY_VOLUME = 0.6
 LEAST, MOST = 8, 0.3  # anchors, part of all that a walk may reach: what a click may mean
+FEW, MOST_OF_FEW = 2000, 0.6  # of a small scene a thing may be more: so many anchors, that part
 NEAR = 20_000  # anchors about the click that the walk may reach: it bounds its time
 WALL = 1e6  # largest degrees: an anchor that is no part of it ends every walk
 TOLERANCE, MOST_STEPS = 1e-3, 80
@@ -60,7 +61,9 @@ def grow(
     visits[walls] = -np.inf
     visits[row_of[seeds]] = np.inf
     order = np.argsort(-visits, kind="stable")[: np.count_nonzero(visits > -np.inf)]
-    most = len(part) if within is not None else int(MOST * len(part))
+    most = len(part)
+    if within is None:
+        most = max(int(MOST * most), min(FEW, int(MOST_OF_FEW * most)))
     return Growth(part[order], best_cut(weights, degrees, order, len(np.unique(seeds)), most))
 
 

@@ -42,16 +42,14 @@ def demo() -> tuple[AnchorGraph, np.ndarray]:
 
 
 @pytest.mark.parametrize("seed", [0, 7, 40, 79])
-def test_the_ring_of_the_click_and_no_more(seed, monkeypatch):
-    monkeypatch.setattr("shapeshift.decomposition.masks.anchor_click.MOST", 0.6)
+def test_the_ring_of_the_click_and_no_more(seed):
     graph = two_rings()
     growth = grow(graph, np.array([seed]), NOBODY)
     assert sorted(growth.nodes[: growth.count] // 40) == [seed // 40] * 40
     assert growth.nodes[0] == seed and len(set(growth.nodes)) == len(growth.nodes)
 
 
-def test_what_it_is_not_is_a_wall(monkeypatch):
-    monkeypatch.setattr("shapeshift.decomposition.masks.anchor_click.MOST", 0.6)
+def test_what_it_is_not_is_a_wall():
     graph = two_rings(bridge=1.0)
     growth = grow(graph, np.array([10]), np.array([0, 20]))
     assert not np.isin([0, 20], growth.nodes).any()

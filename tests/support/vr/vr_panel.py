@@ -9,6 +9,7 @@ import numpy as np
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import edited_from_file
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.open_xr import editor_of
 from shapeshift.app.headset.pacing import Pacing
@@ -60,7 +61,8 @@ def some_things() -> EditorState:
 def a_state(editor: EditorState | None = None) -> XrState:
     editor = editor or some_things()
     user = XrUser(editor.world, SimpleNamespace(), None)
-    return XrState(editor, TouchState(editor, True, keys=False), Pacing((0, 0, 0)), user)
+    touch, tool = TouchState(editor, True, keys=False), PartsTool(editor, lambda: None)
+    return XrState(editor, touch, Pacing((0, 0, 0)), user, tool)
 
 
 class Wearer:

@@ -85,12 +85,12 @@ def _history(objects: ObjectEdits, saving: Saving, ui_scale: float) -> None:
 
 
 def draw_object_list(objects: ObjectEdits, ui_scale: float) -> None:
-    """Which of the four views, then a line an object; of a long list those that are in sight."""
-    draw_four_views(objects.state, ui_scale)
+    """A line an object, of a long list those that are in sight; then which of the four views."""
     count = len(objects.state.scene.objects)
     if count <= MOST_ROWS:
         for index in range(count):
             _row(objects, index, ui_scale)
+        draw_four_views(objects.state, ui_scale)
         return
     line = imgui.get_frame_height_with_spacing()
     imgui.begin_child("list", Vec(0, MOST_ROWS * line))
@@ -101,6 +101,7 @@ def draw_object_list(objects: ObjectEdits, ui_scale: float) -> None:
             _row(objects, index, ui_scale)
     clipper.end()
     imgui.end_child()
+    draw_four_views(objects.state, ui_scale)
 
 
 def draw_four_views(state: EditorState, ui_scale: float) -> None:

@@ -17,6 +17,10 @@ DEEDS = {
     "Hide": "An object that is not seen; its box in Objects shows it again.",
     "Delete": "Gone, and not in what is saved. Key Delete; Ctrl+Z brings it back.",
 }
+SIZES = {
+    "Less": "The next click takes less than it means. Ctrl+wheel.",
+    "More": "The next click takes more than it means. Ctrl+wheel.",
+}
 CHOICES = {
     "None": "Choose nothing. Esc.",
     "Invert": "Everything else of the object.",
@@ -44,9 +48,17 @@ def draw_parts(tool: PartsTool, ui_scale: float) -> None:
     imgui.end_disabled()
     if clicked:
         {"Object": tool.make, "Hide": tool.hide, "Delete": tool.delete}[clicked]()
+    size = f"{100 * tool.factor:.0f} %" if tool.factor != 1 else ""
+    clicked = button_row(SIZES, ui_scale, 2)
+    if clicked:
+        tool.grow(1.0 if clicked == "More" else -1.0)
+    if size:
+        imgui.text_disabled(f"a click takes {size} of what it means")
     clicked = button_row(CHOICES, ui_scale, 3)
     if clicked:
         {"None": tool.clear, "Invert": tool.invert, "Crop\u2026": tool.begin_crop}[clicked]()
+    if not theme.has_keys():
+        return  # a hand in a headset draws no boxes
     imgui.push_item_width(-1)
     labels = ("a box takes the thing in it", "a box takes all in it")
     tool.takes_all = choice("box", tool.takes_all, (False, True), labels)

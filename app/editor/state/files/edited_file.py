@@ -100,7 +100,10 @@ class EditedFile:
         """For the title, and for saving."""
         if self.path is not None:
             return self.path.name
-        return file_name(self.file.all_items[0].name if self.file.all_items else "") + ENDING
+        first = self.file.all_items[0] if self.file.all_items else None
+        if first is None or first is not self.file.background:
+            return file_name(first.name if first else "") + ENDING
+        return file_name(self.source(first).path.stem) + ENDING  # what it is the background of
 
 
 def compared(saved: SceneFile, file: SceneFile) -> tuple[bool, bool]:

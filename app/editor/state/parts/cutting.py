@@ -19,10 +19,12 @@ from shapeshift.app.editor.state.regions import Region, selector_of
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import four, three
 from shapeshift.scene.document import edits
-from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
+from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneFile, SceneItem
 from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Painted, Selector, Sphere
+
+STRAYS = 1.0  # percent of the anchors of a scene that may lie below its floor
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,9 +124,19 @@ def without_pieces(
         rest = replace(rest, name=BACKGROUND, static=True, collider=collider)
         rest = replace(rest, mass_kg=SceneItem.mass_kg, ring=False)
         items = tuple(one for one in file.items if one is not item)
-        return replace(file, items=items, background=rest), rest.name, place
+        file = replace(file, items=items, background=rest)
+        if has_objects and file.floor_y is None:  # what is thrown off it falls no farther
+            file = edits.ground(file, lowest_m(obj))
+        return file, rest.name, place
     items = tuple(rest if one is item else one for one in file.items)
     return replace(file, items=items), rest.name, place
+
+
+def lowest_m(obj: SceneObject) -> float:
+    """Metres: how low an object reaches in the world, a few strays aside."""
+    matrix = obj.world_from_object.matrix()
+    heights = anchor_places(obj.model) @ matrix[1, :3] + matrix[1, 3]
+    return float(np.clip(np.nanpercentile(heights, STRAYS), -FAR_M, FAR_M))
 
 
 def add_piece(

@@ -92,7 +92,7 @@ class Finder:
                 self._thread.start()
             self._wake.notify()
 
-    def take(self) -> tuple[Query, Found | None] | None:
+    def take_answer(self) -> tuple[Query, Found | None] | None:
         """The answer to the question that was asked last, once; None while there is none."""
         with self._wake:
             if self._answered is None:
@@ -129,14 +129,14 @@ class Finder:
                 query, self._query, self._busy = self._query, None, True
             found = None
             try:
-                found = self._find(query)
+                found = self.find(query)
             except (BadFile, ValueError, MemoryError) as error:
                 self.problem = str(error) or "There is no memory for what a click means."
             with self._wake:
                 self._busy, self.status = False, ""
                 self._answered, self._found = query, found
 
-    def _find(self, query: Query) -> Found | None:
+    def find(self, query: Query) -> Found | None:
         hits = self._hits(query)
         if not hits:
             return None

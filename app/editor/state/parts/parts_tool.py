@@ -111,10 +111,16 @@ class PartsTool:
         self.how = how
         found = self.found
         if found is not None and found.query.is_click and self._is_at(found.query, view, place):
-            self._take(found)
+            self._take_found(found)
         else:
             self._asked = Query(self.state.shown(view), view, (*place, *place), self._against(how))
             self.finder.ask(self._asked)
+
+    def click_lit(self, how: str) -> None:
+        """Takes what is lit up: for a hand, which is never quite still."""
+        self.how = how
+        if self.found is not None:
+            self._take_found(self.found)
 
     def _is_at(self, query: Query, view: View, place: tuple[float, float]) -> bool:
         near = np.hypot(query.corners[0] - place[0], query.corners[1] - place[1]) < 1.5
@@ -166,14 +172,14 @@ class PartsTool:
         """Once a frame: takes what was found; True while it is looked for."""
         if not self.on:
             return False
-        answer = self.finder.take()
+        answer = self.finder.take_answer()
         if answer is not None:
             query, found = answer
             self.found = found
             if query is self._asked:
                 self._asked = None
                 if found is not None:
-                    self._take(found)
+                    self._take_found(found)
                 elif query.is_click and self.how == REPLACE:
                     self._keep()
                     self.chosen = np.zeros(0, bool)
@@ -182,7 +188,7 @@ class PartsTool:
         self.light()
         return self.finder.busy
 
-    def _take(self, found: Found) -> None:
+    def _take_found(self, found: Found) -> None:
         for obj in self.state.scene.objects:
             if obj.name == found.name and len(found.owner) == len(anchor_places(obj.model)):
                 self._choose(obj, found.rows(self.factor), self.how)

@@ -103,6 +103,8 @@ def test_a_piece_becomes_an_object_in_one_step_and_goes_back(state):
     assert (rest.label, mug.label) == (0, 1)
     file = state.edited.file
     assert file.background.static and file.items[0].collider == HULLS and not file.items[0].static
+    low = places[:, 1].min()
+    assert low <= file.floor_y <= low + 0.2 and state.edited.name == "room.scene.json"
     np.testing.assert_allclose(mug.model.anchors.mean(axis=0), 0, atol=1e-6)  # a frame of its own
     np.testing.assert_allclose(anchors_of(state), places, atol=2e-6)
     same_picture(picture(state), before)

@@ -46,7 +46,9 @@ def test_everything_in_the_panel_explains_itself(touch_viewer, unfolded, monkeyp
 def test_first_comes_what_a_first_visitor_needs(viewer, unfolded):
     run_frames(viewer, 1)
     sections = [name for name in unfolded if name in panel.ORDER]
-    assert sections == ["Stops", "Look", "Camera", "Objects", "Regions", "Export", "Performance"]
+    assert sections == [
+        "Stops", "Look", "Camera", "Objects", "Parts", "Regions", "Export", "Performance",
+    ]  # fmt: skip
     inside = unfolded[unfolded.index("Performance") + 1 :]
     assert [n for n in inside if n in ("Budget", "Quality", "Passes", "Counts", "Machine")] == [
         "Budget", "Quality", "Passes", "Counts", "Machine",

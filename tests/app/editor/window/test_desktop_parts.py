@@ -232,13 +232,13 @@ def test_the_window_never_waits_for_a_walk(viewer, hands, truth, monkeypatch):
     hands.key("o")
     hands.move(*middle(viewer, truth, "mug"))
     settle(viewer)
-    slow = tool.finder._find
+    slow = tool.finder.find
 
     def find(query):
         time.sleep(0.5)
         return slow(query)
 
-    monkeypatch.setattr(tool.finder, "_find", find)
+    monkeypatch.setattr(tool.finder, "find", find)
     x, y = middle(viewer, truth, "cabinet")
     start = time.perf_counter()
     viewer.window.on_cursor(None, x, y)
