@@ -11,7 +11,7 @@ from shapeshift.decomposition.label_photos import (
     MOST_PHOTOS,
     PhotoLabelling,
     PhotoLabels,
-    Told,
+    Progress,
     choose_photos,
 )
 from shapeshift.decomposition.masks.journal import open_journal
@@ -33,7 +33,7 @@ def label_by_segmenter(
     segmenter: Segmenter,
     work: Path,
     about: dict[str, object],
-    told: Told = lambda what, done, of: None,
+    progress: Progress = lambda what, done, of: None,
     most: int = MOST_PHOTOS,
 ) -> PhotoLabels:
     """Label maps of at most so many photos; what is decided lies in the folder `work` until all is.
@@ -45,7 +45,7 @@ def label_by_segmenter(
     inputs = {"format": FORMAT, "photos": [photo.name for photo in photos],
               "prompts": digest_of(specs), **about}  # fmt: skip
     journal = open_journal(work, json.loads(json.dumps(inputs)))
-    labelling = PhotoLabelling(shown, photos, specs, segmenter, journal, told)
+    labelling = PhotoLabelling(shown, photos, specs, segmenter, journal, progress)
     labelling.run()
     return labelling.labels()
 

@@ -135,10 +135,10 @@ def segment_by_walk(
     shown: ShownAnchors,
     photos: list[WorkPhoto],
     specs: ObjectSpecs,
-    told: Told = lambda what, done, of: None,
+    progress: Progress = lambda what, done, of: None,
 ) -> Segmented:
     """The model with the labels of walk_objects; its pictures say nothing beside the masks."""
-    labels, masks = walk_objects(shown, photos, specs, told)
+    labels, masks = walk_objects(shown, photos, specs, progress)
     pictures, parts = {}, []
     for spec in specs.objects:
         rows = labels == spec.label
