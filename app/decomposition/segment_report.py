@@ -52,8 +52,8 @@ def write_report(device: Device, found: Segmented, folder: Path, overwrite: bool
         save_png(sheet(four), folder / "views.png")
         for part in tracked(parts, "objects"):
             label = part.spec.label
-            shown = [int((picture.labels == label).sum()) for picture in found.pictures]
-            best = found.pictures[int(np.argmax(shown))]
+            pixels = [int((picture.labels == label).sum()) for picture in found.pictures]
+            best = found.pictures[int(np.argmax(pixels))]
             alone = drawn(best, best.x, f"isolated:{label}")
             save_png(alone, folder / f"{label:03d}_{file_name(part.spec.name)}.png")
 
