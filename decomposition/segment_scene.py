@@ -37,6 +37,7 @@ from shapeshift.scene.document.scene_file import (
     SceneItem,
 )
 
+MOSTLY = 9  # times as many silent pixels as labelled ones: white masks with soft edges
 LONGEST_SIDE = 1024  # pixels of a photo whose training size nobody knows
 
 
@@ -82,15 +83,21 @@ def named_objects(
 
     Raises BadFile for a label that objects.json does not know, and where there is none.
     """
-    there = np.zeros(256, bool)
+    pixels = np.zeros(256, np.int64)
     for picture in pictures:
-        there[np.unique(picture.labels)] = True
-    there[[BACKGROUND_LABEL, SILENT]] = False
-    labels = np.flatnonzero(there).tolist()
+        pixels += np.bincount(picture.labels.ravel(), minlength=256)
+    silent, pixels[[BACKGROUND_LABEL, SILENT]] = int(pixels[SILENT]), 0
+    labels = np.flatnonzero(pixels).tolist()
     if not labels:
         raise BadFile(
             f"the label maps of {len(pictures)} photos show the background alone; an object has a "
             "label from 1 to 254."
+        )
+    if not known and silent > MOSTLY * pixels.sum():
+        raise BadFile(
+            "nearly all pixels of the label maps that are not 0 are 255, which says nothing: these "
+            "look like masks in black and white; write an object's label, 1 to 254, into its "
+            "pixels."
         )
     if not known:
         return tuple(ObjectSpec(label, f"object {label}") for label in labels)

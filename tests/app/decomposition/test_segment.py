@@ -194,6 +194,7 @@ def test_what_is_read_or_there_is_never_replaced(given, tmp_path, capsys):
         (lambda f: [p.unlink() for p in f.rglob("*.png")], "called rgb/0.png"),
         (lambda f: paint(f, np.zeros(SIZE[::-1], np.uint8)), "show the background alone"),
         (lambda f: paint(f, np.full(SIZE[::-1], 255, np.uint8)), "show the background alone"),
+        (lambda f: paint(f, white_mask()), "look like masks in black and white"),
         (lambda f: paint(f, np.ones((40, 40), np.uint8)), "40x40 pixels, its photo 96x72"),
         (lambda f: (f / "rgb" / "1.png").write_bytes(b"no picture"), "not a PNG"),
         (lambda f: Image.new("RGB", SIZE).save(f / "rgb" / "1.png"), "its colours are RGB"),
@@ -206,6 +207,13 @@ def test_bad_label_maps_are_one_sentence(given, tmp_path, capsys, change, words)
     base = (given / "room.shift", given / "capture", "--masks", tmp_path / "masks", "--out", out)
     refused(capsys, words, base)
     assert not out.exists() and not (tmp_path / "cut.shift").exists()
+
+
+def white_mask() -> np.ndarray:
+    """As a matting program writes it: white inside, one soft row at its edge."""
+    mask = np.zeros(SIZE[::-1], np.uint8)
+    mask[20:50], mask[19] = 255, 128
+    return mask
 
 
 def paint(folder: Path, labels: np.ndarray) -> None:
