@@ -26,7 +26,8 @@ class ShownAnchors:
         self.device, self.model = device, model
         self.each = model.splats_per_anchor if isinstance(model, AnchorModel) else 1
         self.count = model.splat_count // self.each  # A: anchors, or splats of plain layers
-        self._evaluator, self._x = Evaluator(model), None
+        self._evaluator = Evaluator(model)
+        self._x: Control | None = None  # what the arrays are of
         splats = model.splat_count
         self._means, self._covariance = device.zeros((splats, 4)), device.zeros((splats, 8))
         self._color, self._object = device.zeros((splats, 4)), device.zeros(splats, np.int32)

@@ -139,7 +139,8 @@ def segment_by_walk(
 ) -> Segmented:
     """The model with the labels of walk_objects; its pictures say nothing beside the masks."""
     labels, masks = walk_objects(shown, photos, specs, progress)
-    pictures, parts = {}, []
+    pictures: dict[int, LabelledView] = {}
+    parts: list[SegmentedPart] = []
     for spec in specs.objects:
         rows = labels == spec.label
         inside = seen = 0.0

@@ -16,7 +16,7 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import open_console, print_json, say
 
 if TYPE_CHECKING:
-    from shapeshift.decomposition.label_photos import Counts, Told
+    from shapeshift.decomposition.label_photos import Counts, Progress
     from shapeshift.decomposition.masks.specs import ObjectSpecs
     from shapeshift.decomposition.partition import LabelledView
     from shapeshift.decomposition.score import LabelScore
@@ -78,8 +78,8 @@ def run(options: Options) -> int:
     with working("reading label maps"):
         true = read_maps(options, options.score, capture, model) if options.score else []
     specs = read_specs(options.objects) if options.objects else None
-    with bar() as told:
-        found, counts = cut(options, specs, model, capture, device, told, say)
+    with bar() as progress:
+        found, counts = cut(options, specs, model, capture, device, progress, say)
     with working("scoring"):
         scores = scores_of(device, found, true) if true else ()
     if options.json:
@@ -106,8 +106,8 @@ def cut(
     model: "AnchorModel | SplatLayers",
     capture: "Capture",
     device: "Device",
-    told: "Told",
-    tell: Callable[[str], None],
+    progress: "Progress",
+    notice: Callable[[str], None],
 ) -> "tuple[Segmented, dict[int, Counts]]":
     """Writes the labelled model and the scene file; what was found, and what became of each label
     in the photos where a segmenter was asked.  Raises BadFile, UsageError.
@@ -122,13 +122,13 @@ def cut(
         objects = named_objects(pictures, specs.objects if specs else ())
         found = segment(
             device, model, pictures, objects, len(capture.photos),
-            lambda done, count: told("evidence of photos", done, count),
+            lambda done, count: progress("evidence of photos", done, count),
         )  # fmt: skip
     else:
         from shapeshift.app.decomposition.segment_prompts import PromptSettings, find_by_prompts
 
         assert specs is not None, "refused before"
-        settings = PromptSettings(options.out, options.segmenter, options.photos, told, tell)
+        settings = PromptSettings(options.out, options.segmenter, options.photos, progress, notice)
         found, counts = find_by_prompts(device, model, capture, specs, settings)
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
@@ -157,7 +157,7 @@ def read_maps(
 
 
 @contextmanager
-def bar() -> "Iterator[Told]":
+def bar() -> "Iterator[Progress]":
     """A bar, or a line a minute without a terminal."""
     from shapeshift.app.progress import progress_bar
 

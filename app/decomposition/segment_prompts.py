@@ -1,6 +1,6 @@
 """launch.py segment --objects: prompts in a few photos, a segmenter of the user's or none.
 
-Nothing is printed here: `tell` takes sentences, `told` what is done now.
+Nothing is printed here: `notice` takes sentences, `progress` what is done now.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ import numpy as np
 from shapeshift.app.paths import full
 
 if TYPE_CHECKING:
-    from shapeshift.decomposition.label_photos import Counts, Told
+    from shapeshift.decomposition.label_photos import Counts, Progress
     from shapeshift.decomposition.masks.specs import ObjectSpecs
     from shapeshift.decomposition.segment_scene import Segmented
     from shapeshift.decomposition.shown import ShownAnchors
@@ -33,8 +33,8 @@ class PromptSettings:
     out: Path  # NAME.scene.json; label maps of a segmenter go to NAME.masks beside it
     segmenter: Path | None  # a folder; None: a walk over pixels and anchors
     photos: int  # that a segmenter is asked about
-    told: "Told"
-    tell: Callable[[str], None]
+    progress: "Progress"
+    notice: Callable[[str], None]
 
 
 def find_by_prompts(
@@ -55,8 +55,8 @@ def find_by_prompts(
     shown = ShownAnchors(device, model)
     if settings.segmenter is not None:
         return find_by_segmenter(shown, capture, specs, settings.segmenter, settings)
-    found = segment_by_walk(shown, work_photos(capture, model.stops), specs, settings.told)
-    settings.tell(
+    found = segment_by_walk(shown, work_photos(capture, model.stops), specs, settings.progress)
+    settings.notice(
         "No --segmenter: objects are found by colours, heat and shape alone, which does for "
         "compact things; look at them."
     )
@@ -81,18 +81,18 @@ def find_by_segmenter(
 
     segmenter = open_segmenter(folder)
     if not segmenter.reads_text and any(spec.text for spec in specs.objects):
-        settings.tell(f"{segmenter.name} does not read: 'text' is not used.")
+        settings.notice(f"{segmenter.name} does not read: 'text' is not used.")
     if not segmenter.takes_boxes:
-        settings.tell(f"{segmenter.name} takes no boxes: each counts as a click in its middle.")
-    work, told = beside(settings.out, WORK), settings.told
-    about = {"scene": digest_of(shown.model),
+        settings.notice(f"{segmenter.name} takes no boxes: each counts as a click in its middle.")
+    work, progress = beside(settings.out, WORK), settings.progress
+    about: dict[str, object] = {"scene": digest_of(shown.model),
              "segmenter": files_about([p for p in folder.iterdir() if p.is_file()])}  # fmt: skip
     try:
         labels = label_by_segmenter(
-            shown, capture, specs, segmenter, work, about, told, settings.photos
+            shown, capture, specs, segmenter, work, about, progress, settings.photos
         )
     except KeyboardInterrupt:
-        settings.tell(f"{full(work)} keeps the masks so far; the same command goes on there.")
+        settings.notice(f"{full(work)} keeps the masks so far; the same command goes on there.")
         raise
     write_label_maps(labels, beside(settings.out, MASKS))
     pictures = [
@@ -101,7 +101,7 @@ def find_by_segmenter(
     ]
     found = segment(
         shown.device, shown.model, pictures, specs.objects, len(capture.photos),
-        lambda done, count: told("evidence of photos", done, count),
+        lambda done, count: progress("evidence of photos", done, count),
     )  # fmt: skip
     shutil.rmtree(work)
     return found, labels.counts
@@ -109,8 +109,9 @@ def find_by_segmenter(
 
 def digest_of(model: "AnchorModel | SplatLayers") -> str:
     """Of where its anchors or splats are: another training has others."""
-    places = getattr(model, "anchors", None)
-    places = model.means if places is None else places
+    from shapeshift.runtime_models.model import AnchorModel
+
+    places = model.anchors if isinstance(model, AnchorModel) else model.means
     return hashlib.sha256(np.ascontiguousarray(places).tobytes()).hexdigest()
 
 

@@ -82,8 +82,8 @@ def with_box_of_mask(prompt: Prompt) -> Prompt:
     rows, columns = np.nonzero(prompt.mask)
     if prompt.box is not None or not len(rows):
         return replace(prompt, mask=None)
-    box = (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
-    return replace(prompt, box=tuple(map(float, box)), mask=None)
+    left, top, right, bottom = columns.min(), rows.min(), columns.max() + 1, rows.max() + 1
+    return replace(prompt, box=(float(left), float(top), float(right), float(bottom)), mask=None)
 
 
 def region_of(prompt: Prompt, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
@@ -113,7 +113,10 @@ def moved(prompt: Prompt, corner: tuple[int, int], scale: np.ndarray) -> Prompt:
     def places(points: np.ndarray) -> np.ndarray:
         return (np.reshape(points, (-1, 2)) - corner) * scale
 
-    box = None if prompt.box is None else tuple(places(np.array(prompt.box)).ravel())
+    box = None
+    if prompt.box is not None:
+        (left, top), (right, bottom) = places(np.array(prompt.box))
+        box = (left, top, right, bottom)
     return Prompt(box, places(prompt.inside), places(prompt.outside))
 
 

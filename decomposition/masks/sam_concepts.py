@@ -45,7 +45,7 @@ class ConceptSam:
         said = self.text.run({"tokens": self.words.tokens(prompt.text or VISUAL)})
         mask, memory, embeds = self.text_outputs(said)
         given = features | {
-            "original_height": np.int64(height), "original_width": np.int64(width),
+            "original_height": np.array(height), "original_width": np.array(width),
             "language_mask": mask, "language_features": memory, "language_embeds": embeds,
             **self.boxes_of(prompt, square),
         }  # fmt: skip

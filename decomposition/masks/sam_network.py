@@ -35,7 +35,7 @@ class Network:
 
     def run(self, given: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Outputs by name; each input is turned into the type that it has.  Raises BadFile."""
-        fed = {}
+        fed: dict[str, np.ndarray] = {}
         for name, entry in self.inputs.items():
             if name not in given:
                 raise BadFile(f"{self.path}: it asks for '{name}', which no known segmenter has.")

@@ -11,8 +11,9 @@ from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 from shapeshift.decomposition.masks.square import Square
 from shapeshift.runtime_models.model import BadFile
 
-MEAN, DEVIATION = np.float32([123.675, 116.28, 103.53]), np.float32([58.395, 57.12, 57.375])
-HALF = np.float32([127.5] * 3)  # SAM 3's mean and deviation
+MEAN = np.array([123.675, 116.28, 103.53], np.float32)
+DEVIATION = np.array([58.395, 57.12, 57.375], np.float32)
+HALF = np.full(3, 127.5, np.float32)  # SAM 3's mean and deviation
 OUTSIDE, INSIDE, CORNER, FAR_CORNER, NOTHING = 0, 1, 2, 3, -1  # labels of points
 SIDE, SIDE_3 = 1024, 1008  # pixels of the square: SAM and SAM 2, SAM 3
 PATCH_3 = 14  # pixels of a patch of SAM 3, whose image embedding has SIDE_3 / 14 a side
@@ -64,7 +65,7 @@ class PointSam:
             given |= {"point_coords": points[None], "point_labels": labels[None]}
             given |= self.mask_of(prompt, square)
             width, height = square.size
-            given["orig_im_size"] = np.float32([height, width])
+            given["orig_im_size"] = np.array([height, width], np.float32)
             # Exports of SAM freeze the crop of "masks" to the aspect of the photo they were made
             # with; the small ones are cut and stretched here.
             low = "low_res_masks" in self.decoder.outputs
@@ -103,7 +104,7 @@ class PointSam:
         before = np.zeros((low, low), np.float32)
         if prompt.mask is not None:
             before = square.logits(prompt.mask, low, SURE)
-        has = np.float32([prompt.mask is not None])
+        has = np.array([prompt.mask is not None], np.float32)
         return {"mask_input": before[None, None], "has_mask_input": has}
 
     def features_of(self, features: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,6 +1,7 @@
 """A scene and photos of it to a scene of objects."""
 
 from collections.abc import Callable, Sequence
+from os import PathLike
 from pathlib import Path
 
 from shapeshift.api.arguments import PathText
@@ -9,9 +10,9 @@ from shapeshift.api.read import read_document
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
-from shapeshift.decomposition.masks.specs import ObjectSpec
+from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs
 
-Told = Callable[[str, int, int], None]  # what is done now, how many of how many
+Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
 
 
 def segment(
@@ -23,7 +24,7 @@ def segment(
     segmenter: PathText | None,
     photos: int,
     overwrite: bool,
-    progress: Told | None,
+    progress: Progress | None,
 ) -> tuple[Document, Path]:
     """What Scene.segment gives, and where it lies."""
     from shapeshift.app.decomposition.segment import (
@@ -46,20 +47,22 @@ def segment(
     def path(text: PathText | None) -> Path | None:
         return None if text is None else plain(str(text))
 
-    by_path = objects is None or isinstance(objects, str) or hasattr(objects, "__fspath__")
+    specs: ObjectSpecs | None = None
+    if isinstance(objects, str | PathLike):
+        specs = read_specs(plain(str(objects)))
+    elif objects is not None:
+        specs = checked(objects, Path())
     options = Options(
         scene=scene.path or Path("scene"), capture=plain(str(capture)), out=plain(str(out)),
-        masks=path(masks), objects=path(objects) if by_path else Path("objects"),
+        masks=path(masks), objects=None if specs is None else specs.folder,
         segmenter=path(segmenter), photos=photos, overwrite=overwrite,
     )  # fmt: skip
     refuse_inputs(options)
     refuse_outputs(options)
     model = labelled(scene.model, "the scene")
-    if by_path:
-        specs = read_specs(options.objects) if options.objects else None
-    else:
-        specs = checked(objects, Path())
     found = straight_capture(options, model)
-    told = progress or (lambda what, done, of: None)
-    cut(options, specs, model, found, open_device(), told, lambda sentence: None)
+    cut(
+        options, specs, model, found, open_device(),
+        progress or (lambda what, done, of: None), lambda sentence: None,
+    )  # fmt: skip
     return read_document(options.out, Reading())
