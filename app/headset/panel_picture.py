@@ -10,13 +10,13 @@ from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import Box, clean_texts, listing_items
 from shapeshift.renderer.gl.context import is_software
-from shapeshift.vr.panel.plane import Plane, Pointing
+from shapeshift.vr.panel.plane import PanelPlane, Pointing
 
 # So large that at 0.6 m, an arm's length, a capital is 1.0 degree high (type of 25 dmm), and what
 # can be hit 2.3 degrees: 34 by 38 cm.
 UNITS, METRES_PER_UNIT = (290, 330), 0.00116
 UI_SCALE = 3  # logical pixels a unit: ImGui knows whole ones alone, and a knob shall not stutter
-PANEL = Plane((UNITS[0] * UI_SCALE, UNITS[1] * UI_SCALE), METRES_PER_UNIT / UI_SCALE)
+PANEL = PanelPlane((UNITS[0] * UI_SCALE, UNITS[1] * UI_SCALE), METRES_PER_UNIT / UI_SCALE)
 FINE, COARSE = 4, 2  # pixels a unit; coarse on software GL, where each costs
 AWAY = 3.4028234e38  # FLT_MAX: there ImGui has no mouse
 OPAQUE = (True, True, True, False)  # of the texture, what is drawn into: alpha stays 1

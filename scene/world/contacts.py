@@ -36,7 +36,7 @@ class Touch:
     event: Any
 
 
-class Tally:
+class ContactTally:
     """The contacts of one step, gathered substep by substep."""
 
     def __init__(self, world: Any, ids: dict[Any, int], gravity_m_s2: float) -> None:

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world import physics_rules
-from shapeshift.scene.world.contacts import Contact, Tally, any_near, velocities
+from shapeshift.scene.world.contacts import Contact, ContactTally, any_near, velocities
 from shapeshift.scene.world.grab import (
     WITH_HAND,
     Hold,
@@ -291,7 +291,7 @@ class Physics:
         starts = [
             (hold, self._world.rigid_bodies[hold.hand].position) for hold in self._holds.values()
         ]
-        tally = Tally(self._world, self._ids, -self._world.gravity.y)
+        tally = ContactTally(self._world, self._ids, -self._world.gravity.y)
         for k in range(substeps):
             move_hands(self._world, starts, (k + 1) / substeps)
             rules.contact_clustering = not any_near(self._world, at_meshes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import SIDES, Frame, Hand
-from shapeshift.vr.panel.plane import NOBODY, Plane, Pointing, hang, point
+from shapeshift.vr.panel.plane import NOBODY, PanelPlane, Pointing, hang, point
 from shapeshift.vr.panel.stick import MIDDLE, OURS
 
 PALM_UP, PALM_AWAY = 0.8, 0.55  # of a palm's normal, up: it opens the panel; it closes it again
@@ -29,7 +29,7 @@ class Palm:
 class Carried:
     """A panel and where it is; closed at first, so that the scene is what one sees."""
 
-    plane: Plane
+    plane: PanelPlane
     home: str = "left"  # the hand that carries it
     open: bool = False
     pinned: bool = False  # open by a menu button, until that closes it

@@ -26,7 +26,7 @@ Place = tuple[float, float]  # logical pixels of the panel
 
 
 @dataclass(frozen=True)
-class Plane:
+class PanelPlane:
     """How large a panel is: for who draws it, and in the room."""
 
     size: tuple[int, int]  # logical pixels, width and height
@@ -90,7 +90,7 @@ def hang(
 
 
 def point(
-    pointing: Pointing, play_from_panel: Pose, plane: Plane, side: str, hand: Hand
+    pointing: Pointing, play_from_panel: Pose, plane: PanelPlane, side: str, hand: Hand
 ) -> Pointing:
     """Where the hand of a side points in this frame, and whether it presses; a lost hand does
     neither, and what it held is let go.
@@ -113,7 +113,7 @@ def point(
     return _pressed(now, plane)
 
 
-def _pressed(pointing: Pointing, plane: Plane) -> Pointing:
+def _pressed(pointing: Pointing, plane: PanelPlane) -> Pointing:
     """Only what begins on the panel presses there: a hand that fires while it sweeps across, or
     carries something over it, does not.
     """
@@ -126,7 +126,7 @@ def _pressed(pointing: Pointing, plane: Plane) -> Pointing:
 
 
 def _near(
-    panel_from_play: np.ndarray, tip: np.ndarray, plane: Plane, was: bool
+    panel_from_play: np.ndarray, tip: np.ndarray, plane: PanelPlane, was: bool
 ) -> tuple[Place, float] | None:
     """The place below a fingertip close to the panel, and its height over it, metres."""
     local = panel_from_play[:3, :3] @ tip + panel_from_play[:3, 3]
@@ -137,7 +137,7 @@ def _near(
     return plane.place(local), float(local[2])
 
 
-def ray_place(panel_from_play: np.ndarray, aim: Pose | None, plane: Plane) -> Place | None:
+def ray_place(panel_from_play: np.ndarray, aim: Pose | None, plane: PanelPlane) -> Place | None:
     """Where a ray along -Z of a pose meets the plane from its front; None where it does not."""
     if aim is None:
         return None

@@ -7,9 +7,9 @@ import numpy as np
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.vr.frame import LOST, Frame, Hand
 from shapeshift.vr.panel.carried import Carried
-from shapeshift.vr.panel.plane import Plane
+from shapeshift.vr.panel.plane import PanelPlane
 
-PLANE = Plane((320, 360), 0.001)
+PLANE = PanelPlane((320, 360), 0.001)
 OPEN = Carried(PLANE, open=True, pinned=True)  # a panel that a menu button has opened
 HEAD = Pose(np.array([0.0, 1.6, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))
 GRIP_TURN = np.array([0.8660254, 0.5, 0.0, 0.0])  # 60 degrees up, as a fist holds a controller

@@ -17,7 +17,7 @@ from shapeshift.vr.panel.plane import (
     PRESS,
     RAY_M,
     RELEASE,
-    Plane,
+    PanelPlane,
     hang,
     ray_place,
 )
@@ -227,7 +227,7 @@ def test_where_a_ray_meets_the_panel_is_where_the_plane_says(seed):
     wxyz = rng.normal(size=4)
     pose = Pose(rng.normal(size=3), wxyz / np.linalg.norm(wxyz))
     right, up, normal = pose.matrix()[:3, :3].T
-    plane = Plane((300, 400), 0.0007)
+    plane = PanelPlane((300, 400), 0.0007)
     at = rng.uniform(-0.2, 1.2, 2) * plane.size
     metres = (at - np.array(plane.size) / 2) * 0.0007
     target = pose.position + right * metres[0] - up * metres[1]
