@@ -72,6 +72,11 @@ class WristMenu:
         """The headset's own, and those of the desktop's panel that need no keys and no window."""
         state, editor = self._state, self._state.editor
         objects = ObjectEdits(editor, None, lambda: None)
+
+        def draw_objects(scale: float) -> None:
+            draw_object_list(objects, scale)
+            draw_parts(state.parts, scale)
+
         return [
             Section("Room", lambda scale: draw_room(state, room), open_first=True),
             Section(
@@ -83,8 +88,7 @@ class WristMenu:
             Section("Touch", lambda scale: draw_touch(state.touch, scale, False), open_first=True),
             Section("Stops", lambda scale: draw_stops(editor, scale)),
             Section("Look", lambda scale: draw_look(editor, scale)),
-            Section("Objects", lambda scale: draw_object_list(objects, scale)),
-            Section("Parts", lambda scale: draw_parts(state.parts, scale)),
+            Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
             Section("Help", lambda scale: draw_help()),
         ]

@@ -17,7 +17,7 @@ from shapeshift.decomposition.masks.random_walk import conjugate_gradients
 RETURN = 1e-3  # of an anchor's edges: the chance that a walk ends there
 # The cut of a set is told by its volume to this power.  By 1 (conductance) the largest set wins, by
 # 0.5, as the border of a surface grows, the smallest; 0.6 was best of 0.3 to 1 on the demo.
-BY_VOLUME = 0.6
+BY_VOLUME = 0.6  # docs/bench/clicks.csv has what it gives
 LEAST, MOST = 8, 0.3  # anchors, part of all that a walk may reach: what a click may mean
 FEW, MOST_OF_FEW = 2000, 0.6  # of a small scene a thing may be more: so many anchors, that part
 NEAR = 20_000  # anchors about the click that the walk may reach: it bounds its time

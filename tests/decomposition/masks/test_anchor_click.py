@@ -93,8 +93,8 @@ def test_the_smallest_graphs(count):
 
 def test_one_click_on_a_thing_of_the_demo(demo):
     """Intersection over union with the tracer's truth: what the thing is cut to, and the best of
-    the nested sets, which a turn of the wheel reaches.  Measured: .58 and .74 over ten things, .93
-    and .96 of the cabinet and the mug; thin ones (spanner .2) need more than one click.
+    the nested sets, which a turn of the wheel reaches.  docs/bench/clicks.csv: .57 and .74 over
+    ten things, .91 and .96 of the cabinet and the mug; thin ones (spanner .15) need more clicks.
     """
     graph, truth = demo
     rng, found, best = np.random.default_rng(0), {}, {}
