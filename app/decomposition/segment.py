@@ -44,6 +44,11 @@ class Options(ReadingOptions):
     Default: not scored."""
     report: Path | None = None
     """A folder for pictures of what was found.  Default: none are drawn."""
+    complete: bool = True
+    """Fill the background where objects stood, verified against the photos, and make what is
+    touched of each object, cut at the plane that it stood on; into the folder "colliders"."""
+    shadows: bool = False
+    """With --complete: take out the shadows of objects, too, which no photo can confirm."""
     downscale: Annotated[int | None, EXPERT] = None
     """Divide the photos' sides by this number.  Default: as in the training, if the scene knows it,
     else such that neither exceeds 1024 pixels."""
@@ -54,9 +59,12 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.decomposition.assembling import completed
+    from shapeshift.app.decomposition.segment_report import write_report
     from shapeshift.app.errors import UsageError
     from shapeshift.app.progress import progress_bar, working
     from shapeshift.app.training.evaluate import trained_downscale
+    from shapeshift.decomposition.label_folder import find_maps
     from shapeshift.decomposition.masks.specs import read_specs
     from shapeshift.decomposition.segment_scene import (
         named_objects,
@@ -69,9 +77,7 @@ def run(options: Options) -> int:
     from shapeshift.scene.document.write_scene_file import write_scene_file
     from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
 
-    if options.downscale is not None and not 1 <= options.downscale <= 64:
-        raise UsageError(f"--downscale is {options.downscale}, expected 1 to 64.")
-    refuse_outputs(options)
+    refuse_options(options)
     known = read_specs(options.objects).objects if options.objects else ()
     model = open_labelled(options)
     capture = with_extrinsics(
@@ -92,8 +98,12 @@ def run(options: Options) -> int:
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
     path = model_path(options, model)
+    file = scene_of_parts(found, path.name, options.out.parent)
+    if options.complete:
+        photos = [photo for photo, _ in find_maps(options.masks, capture)]
+        file, found = completed(device, file, found, photos, capture, options)
     write_model(found.model, path)
-    write_scene_file(scene_of_parts(found, path.name, options.out.parent), options.out)
+    write_scene_file(file, options.out)
     with working("scoring"):
         scores = scores_of(device, found, true)
     if options.json:
@@ -102,8 +112,6 @@ def run(options: Options) -> int:
         print_tables(found, scores)
     tell_gaps(found)
     if options.report is not None:
-        from shapeshift.app.decomposition.segment_report import write_report
-
         write_report(device, found, options.report, options.overwrite)
         say(f"pictures in {full(options.report)}")
     say(
@@ -112,17 +120,21 @@ def run(options: Options) -> int:
     return 0
 
 
-def refuse_outputs(options: Options) -> None:
+def refuse_options(options: Options) -> None:
     """Before any work.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.document.scene_file import ENDING, is_scene_file
 
+    if options.downscale is not None and not 1 <= options.downscale <= 64:
+        raise UsageError(f"--downscale is {options.downscale}, expected 1 to 64.")
     if is_scene_file(options.scene):
         raise UsageError(f"{options.scene} is a scene file; name the one model that is to be cut.")
     if not options.out.name.lower().endswith(ENDING) or options.out.name.lower() == ENDING:
         raise UsageError(f"--out is {options.out.name}; name a file that ends in {ENDING}.")
     stem = options.out.name[: -len(ENDING)]
     written = [options.out, *(options.out.with_name(stem + end) for end in (".shift", ".ply"))]
+    if options.complete:
+        written.append(options.out.parent / "colliders")
     read = {options.scene.resolve(), options.capture.resolve()}
     for path in written:
         if path.resolve() in read:
