@@ -6,6 +6,7 @@ largest share of its evidence, with all its splats, so that every object keeps t
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -41,6 +42,7 @@ class LabelledView:
     view: View
     x: Controls  # of the model as the picture shows it
     labels: np.ndarray  # (H, W) uint8 of view.size; SILENT: nothing is known of the pixel
+    photo: Path | None = None  # that it is of
 
 
 class ViewEvidence:

@@ -72,7 +72,7 @@ def read_pictures(
     pictures = []
     for photo, path in find_maps(folder, capture):
         view, labels = read_map(path, photo, factor_of(photo, trained))
-        pictures.append(LabelledView(view, stop_of(photo, model.stops).x, labels))
+        pictures.append(LabelledView(view, stop_of(photo, model.stops).x, labels, photo.path))
     return pictures
 
 

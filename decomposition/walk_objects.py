@@ -149,7 +149,9 @@ def segment_by_walk(
             (within,), total = shown.masks(photo.view, photo.stop.x, [mask])
             inside, seen = inside + float(within[rows].sum()), seen + float(total[rows].sum())
             silent = np.full(mask.shape, SILENT, np.uint8)
-            picture = pictures.setdefault(view, LabelledView(photo.view, photo.stop.x, silent))
+            picture = pictures.setdefault(
+                view, LabelledView(photo.view, photo.stop.x, silent, photo.photo.path)
+            )
             picture.labels[mask] = spec.label
         share = inside / seen if seen else 0.0
         parts.append(SegmentedPart(spec, len(masks[spec.label]), int(rows.sum()), seen, share))

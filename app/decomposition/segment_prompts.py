@@ -96,7 +96,7 @@ def find_by_segmenter(
         raise
     write_label_maps(labels, beside(settings.out, MASKS))
     pictures = [
-        LabelledView(photo.view, photo.stop.x, here)
+        LabelledView(photo.view, photo.stop.x, here, photo.photo.path)
         for photo, here in zip(labels.photos, labels.maps, strict=True)
     ]
     found = segment(
