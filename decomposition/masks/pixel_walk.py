@@ -26,7 +26,7 @@ SURE = 6.0  # log odds beyond which colours pull no harder
 LEAST_PIXELS = 9  # fewer inside teach no colours
 CORE = 0.3  # of the box's sides: half axes of the ellipse whose colours are the first guess
 SPECK = 0.05  # of the largest part's pixels: smaller ones are left out
-HOLE = 0.02  # of the mask's pixels: smaller ones are filled
+HOLE = 0.15  # of the mask's pixels: smaller ones that it encloses are filled
 INSIDE, OUTSIDE, UNKNOWN = 1, 0, -1
 
 
@@ -63,7 +63,7 @@ class PixelWalk:
 
 
 def tidied(mask: np.ndarray) -> np.ndarray:
-    """Without specks beside the largest part, and without small holes."""
+    """Without specks beside the largest part, and without holes: a face of the wall's colour."""
     parts, count = label(mask)
     if not count:
         return mask

@@ -151,7 +151,7 @@ def miou_after(shown: ShownAnchors, views: list[View], maps: Maps, tests: list) 
     pictures = [LabelledView(view, 0.0, labels) for view, labels in zip(views, maps, strict=True)]
     sums = gather_evidence(shown.device, shown.model, pictures, len(LABELS))
     cut = LabelPictures(shown.device, partition(shown.model, sums, NAMES))
-    pairs = [(cut.label_map(view, 0.0, len(LABELS)), true) for view, true in tests]
+    pairs = [(cut.label_map(view, 0.0), true) for view, true in tests]
     return mean_score(score_maps(pairs, NAMES))
 
 

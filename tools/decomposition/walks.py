@@ -94,7 +94,7 @@ class Bench:
         """part: (A,) 1 where an anchor is the object's."""
         pictures = LabelPictures(self.shown.device, self.model, np.repeat(part, self.shown.each))
         found = [
-            iou(pictures.label_map(view, 0.0, 2) == 1, true == label)
+            iou(pictures.label_map(view, 0.0) == 1, true == label)
             for view, true in self.tests
             if (true == label).sum() >= LEAST_PIXELS
         ]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.decomposition.masks.pixel_walk import PixelWalk
+from shapeshift.decomposition.masks.pixel_walk import PixelWalk, tidied
 from shapeshift.decomposition.masks.segmenter import Prompt
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "maryrose_tankard"
@@ -119,3 +119,16 @@ def test_the_tankards_masks_from_a_box():
         box = columns.min() - 4, rows.min() - 4, columns.max() + 4, rows.max() + 4
         found.append(iou(answer(np.asarray(image), Prompt(box)), true))
     assert len(found) == 5 and np.mean(found) >= 0.88
+
+
+@pytest.mark.parametrize(("side", "filled"), [(0, True), (5, True), (14, True), (15, False), (25, False)])
+def test_what_a_mask_encloses_is_filled_unless_it_is_large(side, filled):
+    """A face before a wall of its colour; but a ring stays a ring.  14 px: 14 %, 15 px: 16 %."""
+    mask = np.zeros((60, 60), bool)
+    mask[10:50, 10:50] = True
+    mask[20 : 20 + side, 20 : 20 + side] = False
+    mask[0, 0] = True  # a speck
+    found = tidied(mask)
+    assert not found[0, 0] and found[10:50, 10:50].all() == filled
+    assert filled or not found[20 : 20 + side, 20 : 20 + side].any()
+    assert not tidied(np.zeros((4, 4), bool)).any() and tidied(np.ones((4, 4), bool)).all()
