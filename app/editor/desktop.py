@@ -69,7 +69,7 @@ def run(options: Options) -> int:
                     window, state, hooks, viewer.free,
                     lambda: Renderer(window.ctx, drawing=options.drawing),
                 )  # fmt: skip
-            with two:
+            with two, viewer.parts.finder:
                 viewer.loop()
     return 0
 

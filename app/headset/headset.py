@@ -145,7 +145,7 @@ def wear(options: Options) -> int:
                 options.panel_hand, options.floor, options.hints,
             )  # fmt: skip
             try:
-                with interrupting(xr_app):
+                with interrupting(xr_app), xr_app.state.parts.finder:
                     xr_app.loop(options.frames)
             except Lost:
                 report.ended = "runtime lost"

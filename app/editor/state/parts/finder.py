@@ -82,6 +82,12 @@ class Finder:
     _wake: threading.Condition = field(default_factory=threading.Condition)
     _thread: threading.Thread | None = None
 
+    def __enter__(self) -> "Finder":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def ask(self, query: Query) -> None:
         """A new question; the one before is forgotten, unless it is being answered already."""
         with self._wake:
@@ -216,11 +222,11 @@ def in_box(
     """(N,) bool: which places (N, 3), object frame, show within a box of the picture, pixels."""
     eye_from_object = view.eye_from_world() @ obj.world_from_object.matrix()
     in_eye = places @ eye_from_object[:3, :3].T + eye_from_object[:3, 3]
-    left, right, _, up = view.tangents
-    per_pixel = (right - left) / view.size[0]
+    left, right, low, up = view.tangents
+    width, height = view.size
     with np.errstate(divide="ignore", invalid="ignore"):
-        across = (in_eye[:, 0] / -in_eye[:, 2] - left) / per_pixel
-        down = (up - in_eye[:, 1] / -in_eye[:, 2]) / per_pixel
+        across = (in_eye[:, 0] / -in_eye[:, 2] - left) / (right - left) * width
+        down = (up - in_eye[:, 1] / -in_eye[:, 2]) / (up - low) * height
     inside = (across >= corners[0]) & (across <= corners[2])
     inside &= (down >= corners[1]) & (down <= corners[3])
     return inside & (-in_eye[:, 2] > view.near)
