@@ -56,6 +56,11 @@ class Options(ReadingOptions):
     Default: not scored."""
     report: Path | None = None
     """A folder for pictures of what was found.  Default: none are drawn."""
+    complete: bool = True
+    """Fill the background where objects stood, verified against the photos, and make what is
+    touched of each object, cut at the plane that it stood on; into the folder "colliders"."""
+    shadows: bool = False
+    """With --complete: take out the shadows of objects, too, which no photo can confirm."""
     downscale: Annotated[int | None, EXPERT] = None
     """Divide the photos' sides by this number.  Default: as in the training, if the scene knows it,
     else such that neither exceeds 1024 pixels."""
@@ -112,6 +117,7 @@ def cut(
     """Writes the labelled model and the scene file; what was found, and what became of each label
     in the photos where a segmenter was asked.  Raises BadFile, UsageError.
     """
+    from shapeshift.app.decomposition.assembling import completed
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
     from shapeshift.scene.document.write_scene_file import write_scene_file
@@ -133,8 +139,11 @@ def cut(
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
     path = model_path(options, model)
+    file = scene_of_parts(found, path.name, options.out.parent)
+    if options.complete:
+        file, found = completed(device, file, found, capture, options, progress)
     write_model(found.model, path)
-    write_scene_file(scene_of_parts(found, path.name, options.out.parent), options.out)
+    write_scene_file(file, options.out)
     return found, counts
 
 
@@ -194,6 +203,8 @@ def refuse_outputs(options: Options) -> None:
         raise UsageError(f"--out is {options.out.name}; name a file that ends in {ENDING}.")
     stem = options.out.name[: -len(ENDING)]
     written = [options.out, *(options.out.with_name(stem + end) for end in (".shift", ".ply"))]
+    if options.complete:
+        written.append(options.out.parent / "colliders")
     read = {options.scene.resolve(), options.capture.resolve()}
     for path in written:
         if path.resolve() in read:

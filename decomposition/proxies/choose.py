@@ -16,7 +16,7 @@ from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
 PIECES = "hulls"  # CoACD's: the name of that candidate
-LIMIT_S = 300.0  # for CoACD, on a machine that is busy with photos
+LIMIT_S = 120.0  # for CoACD, on a machine that is busy with photos
 AS_GOOD = 0.02  # of IoU below the best, at which a candidate of fewer corners is taken
 LEAST_RECALL = 0.85  # below, a proxy does not cover its object
 

@@ -139,7 +139,9 @@ def main() -> None:
         sys.stdout.flush()
     if told.out:
         with told.out.open("w", newline="") as file:
-            file.write("# python tools/decomposition/proxies.py --out docs/bench/proxies.csv\n")
+            chosen = "" if told.things == THINGS else f"--things {' '.join(told.things)} "
+            command = f"tools/decomposition/proxies.py {chosen}--out docs/bench/proxies.csv"
+            file.write(f"# python {command}\n")
             file.write("# F1 at 4 mm; silhouettes in 8 views of 384x288; 2 s at 90 Hz\n")
             csv.writer(file, lineterminator="\n").writerows([FIELDS, *rows])
 

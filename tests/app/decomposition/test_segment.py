@@ -63,7 +63,7 @@ def given(tmp_path_factory) -> Path:
 
 def segment(folder: Path, *arguments) -> int:
     words = [folder / "room.shift", folder / "capture", "--masks", folder / "masks"]
-    return cli.main(["segment", *map(str, (*words, *arguments))])
+    return cli.main(["segment", "--no-complete", *map(str, (*words, *arguments))])
 
 
 def refused(capsys, words: str, arguments) -> None:
@@ -133,7 +133,12 @@ def test_labels_may_have_any_numbers(given, tmp_path, capsys):
         labels = np.asarray(Image.open(path))
         write_label_map(np.choose(labels, np.uint8([0, 254, 7])), path)
     base = (given / "room.shift", given / "capture", "--masks", tmp_path / "masks")
-    assert cli.main(["segment", *map(str, (*base, "--out", tmp_path / "far.scene.json"))]) == 0
+    assert (
+        cli.main(
+            ["segment", "--no-complete", *map(str, (*base, "--out", tmp_path / "far.scene.json"))]
+        )
+        == 0
+    )
     assert segment(given, "--out", tmp_path / "near.scene.json") == 0
     far, near = (read_model(tmp_path / f"{name}.shift") for name in ("far", "near"))
     assert np.array_equal(far.labels, np.choose(near.labels, np.uint8([0, 254, 7])))
@@ -159,7 +164,7 @@ def test_plain_splats_are_cut_splat_by_splat(given, tmp_path, capsys):
             write_label_map(pictures.label_map(photo.view, 0.0), out)
     words = (tmp_path / "room.ply", tmp_path / "capture", "--masks", tmp_path / "maps", "--out",
              tmp_path / "cut.scene.json")  # fmt: skip
-    assert cli.main(["segment", *map(str, words)]) == 0
+    assert cli.main(["segment", "--no-complete", *map(str, words)]) == 0
     assert "splats" in capsys.readouterr().out
     cut = read_model(tmp_path / "cut.ply")
     order, other = np.lexsort(cut.means.T), np.lexsort(model.anchors.T)

@@ -1,0 +1,118 @@
+"""What the physics touches of the background: flat where things stood, a skin around the rest.
+
+The skin around splats is bumpy by some millimetres, and open where a thing was taken out: what
+stands on it would rock, or fall through.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shapeshift.decomposition.completion.anchor_looks import AnchorLooks
+from shapeshift.decomposition.completion.plane import Plane
+from shapeshift.decomposition.completion.plane_cells import CELL, ROOM
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.scene.colliders.collider import Making, mesh_of_splats
+from shapeshift.scene.colliders.collider_wrap import join_meshes
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+
+THICK = 4.0  # sides of a cell: of the slab below a plane
+SUNK = 0.5  # sides of a cell that the skin near a plane is kept below it
+NEAR = 1.5  # sides of a cell above and below, in which the skin counts as the plane's
+SAME_ANGLE, SAME_OFFSET = 0.999, 1.0  # cosine, sides of a cell: planes that are one
+
+
+def ground_mesh(
+    background: AnchorModel,
+    looks: AnchorLooks,
+    labels: np.ndarray,
+    planes: Sequence[Plane],
+    x: float,
+    making: Making,
+) -> TriangleMesh:
+    """The background's mesh, in the model's frame: slabs under the planes, and the skin.
+
+    background: without the objects.  looks, labels (A,): of the whole model, so that a slab lies
+    under the things, too.  Raises BadFile where nothing can be touched.
+    """
+    skin = mesh_of_splats(*Evaluator(background).geometry(x), making)
+    side = CELL * looks.spacing_m
+    vertices, slabs = skin.vertices.astype(np.float64), []
+    for plane in distinct(planes, side):
+        low, covered = covered_cells(looks, labels, plane, side)
+        slabs.append(slab(plane, low, covered, side))
+        cells = ((vertices @ plane.axes().T - low) / side).astype(int)
+        inside = ((cells >= 0) & (cells < covered.shape)).all(1)
+        inside[inside] = covered[tuple(cells[inside].T)]
+        height = plane.height(vertices)
+        low_skin = inside & (np.abs(height) < NEAR * side)
+        vertices[low_skin] -= (height[low_skin, None] + SUNK * side) * plane.normal
+    return join_meshes([TriangleMesh(vertices.astype(np.float32), skin.faces), *slabs])
+
+
+def distinct(planes: Sequence[Plane], side: float) -> list[Plane]:
+    """One of several that are nearly the same."""
+    found: list[Plane] = []
+    for plane in planes:
+        same = (
+            plane.normal @ other.normal > SAME_ANGLE
+            and abs(plane.offset - other.offset) < SAME_OFFSET * side
+            for other in found
+        )
+        if not any(same):
+            found.append(plane)
+    return found
+
+
+def covered_cells(
+    looks: AnchorLooks, labels: np.ndarray, plane: Plane, side: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(2,) metres along the plane's axes, and the cells (X, Y) bool from there that carry."""
+    from scipy import ndimage
+
+    height = plane.height(looks.places)
+    on = looks.there & (np.abs(height) < side) & ((labels == 0) | (height < side))
+    flat = looks.places[on] @ plane.axes().T
+    low = flat.min(0) - ROOM * side
+    shape = np.ceil((flat.max(0) - low) / side).astype(int) + ROOM
+    cells = np.zeros(shape, bool)
+    cells[tuple(((flat - low) / side).astype(int).T)] = True
+    cells = ndimage.binary_fill_holes(ndimage.binary_closing(cells, iterations=2))
+    pieces, count = ndimage.label(cells)
+    sizes = np.bincount(pieces.ravel(), minlength=count + 1)
+    sizes[0] = 0
+    return low, without_diagonals(sizes[pieces] >= 0.05 * sizes.max())
+
+
+def without_diagonals(cells: np.ndarray) -> np.ndarray:
+    """The cells with more taken where two touch at a corner alone: else no solid has that edge."""
+    cells = cells.copy()
+    while True:
+        a, b, c, d = cells[:-1, :-1], cells[1:, :-1], cells[:-1, 1:], cells[1:, 1:]
+        rising, falling = a & d & ~b & ~c, b & c & ~a & ~d
+        if not (rising.any() or falling.any()):
+            return cells
+        cells[1:, :-1] |= rising
+        cells[:-1, :-1] |= falling
+
+
+def slab(plane: Plane, low: np.ndarray, cells: np.ndarray, side: float) -> TriangleMesh:
+    """A closed plate under the cells (X, Y) bool, its upper face on the plane."""
+    wide = np.pad(cells, 1)
+    width = cells.shape[1] + 1
+    x, y = np.nonzero(cells)
+    corner = np.stack([x * width + y, (x + 1) * width + y, (x + 1) * width + y + 1,
+                       x * width + y + 1], 1)  # fmt: skip
+    below = (cells.shape[0] + 1) * width
+    faces = [corner[:, [0, 1, 2]], corner[:, [0, 2, 3]]]
+    faces += [corner[:, [0, 2, 1]] + below, corner[:, [0, 3, 2]] + below]
+    for k, (i, j) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):  # the side from corner k on
+        rim = ~wide[x + 1 + i, y + 1 + j]
+        a, b = corner[rim, k], corner[rim, (k + 1) % 4]
+        faces += [np.stack([a, a + below, b + below], 1), np.stack([a, b + below, b], 1)]
+    grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in cells.shape), indexing="ij"), -1)
+    flat = (low + grid.reshape(-1, 2) * side) @ plane.axes() + plane.offset * plane.normal
+    vertices = np.concatenate([flat, flat - THICK * side * plane.normal])
+    used, rows = np.unique(np.concatenate(faces), return_inverse=True)
+    return TriangleMesh(vertices[used].astype(np.float32), rows.reshape(-1, 3).astype(np.int32))
