@@ -18,7 +18,7 @@ from shapeshift.scene.colliders.collider_wrap import join_meshes
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
 THICK = 4.0  # sides of a cell: of the slab below a plane
-SUNK = 0.5  # sides of a cell that the skin near a plane is kept below it
+SUNK = 2.0  # sides of a cell that the skin near a plane is kept below it: out of all contacts
 NEAR = 1.5  # sides of a cell above and below, in which the skin counts as the plane's
 SAME_ANGLE, SAME_OFFSET = 0.999, 1.0  # cosine, sides of a cell: planes that are one
 

@@ -1,0 +1,140 @@
+"""Proxies: cut at the plane, chosen by silhouettes, scored by distances; primitives and ground."""
+
+import numpy as np
+import pytest
+
+from shapeshift.decomposition.completion.plane import Plane
+from shapeshift.decomposition.partition import LabelledView
+from shapeshift.decomposition.proxies.choose import choose_proxy
+from shapeshift.decomposition.proxies.ground import distinct, slab, without_diagonals
+from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
+from shapeshift.decomposition.proxies.standing import SNAP, pressed
+from shapeshift.decomposition.proxies.surface_scores import score_surfaces, surface_of
+from shapeshift.scene.colliders.collider import Collider, box_around
+from shapeshift.scene.colliders.collider_wrap import volume
+from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
+from shapeshift.scene.colliders.stitch_mesh import is_watertight
+from shapeshift.scene.pose import View, look_at, perspective
+
+FLOOR = Plane(np.array([0.0, 1.0, 0.0]), 0.0)
+SIZE = (160, 120)
+
+
+def cube(half: float = 0.1) -> Collider:
+    mesh = box_around(np.array([[-half] * 3, [half] * 3]))
+    return Collider((mesh.vertices,), mesh)
+
+
+def view_from(eye: tuple) -> View:
+    return View(look_at(eye, (0, 0, 0)), perspective(0.8, SIZE), 0.05, 10.0, SIZE)
+
+
+def test_what_lies_below_the_plane_or_on_the_lowest_is_moved_onto_it():
+    points = np.array([[0, -0.02, 0], [0, 0, 0], [0, SNAP * 0.1 * 0.99, 1], [0, SNAP * 0.1, 2],
+                       [0, 0.1, 0]], np.float32)  # fmt: skip
+    (out,) = pressed([points], FLOOR)
+    assert out[:3, 1].tolist() == [0, 0, 0]
+    assert np.array_equal(out[3:], points[3:])  # at the threshold itself it stays
+
+
+def test_a_thing_above_the_plane_is_drawn_down_to_it():
+    points = np.array([[0, 0.004, 0], [0, 0.1, 0]], np.float32)
+    (out,) = pressed([points], FLOOR)
+    assert out[:, 1].tolist() == pytest.approx([0, 0.1])
+
+
+def test_a_silhouette_is_what_the_cube_covers():
+    view = view_from((0, 0, 1.0))
+    covered = silhouette(view, cube().parts)
+    # The near face is .2 m wide, .9 m away; the far one lies within it.
+    wide = 0.2 * view.pinhole()[1] / 0.9
+    assert np.sqrt(covered.sum()) == pytest.approx(wide, abs=1.0)  # half a pixel on either side
+    assert silhouette(view_from((0, 0, 0.12)), cube().parts) is None
+
+
+def test_the_true_cube_is_chosen_and_a_smaller_one_covers_too_little():
+    views = [view_from(eye) for eye in ((0, 0.5, 1), (1, 0.5, 0), (0.3, 0.9, -0.8))]
+    maps = [LabelledView(v, 0.0, silhouette(v, cube().parts).astype(np.uint8)) for v in views]
+    candidates = {"large": cube(0.2), "true": cube(), "small": cube(0.05)}
+    best, scored = choose_proxy(candidates, np.eye(4), 1, maps)
+    assert best.name == "true"
+    assert best.score.iou == 1
+    assert [proxy.name for proxy in scored] == ["true", "small", "large"] or scored[0] is best
+    small = score_silhouettes(candidates["small"], np.eye(4), 1, maps)
+    assert small.recall == pytest.approx(0.25, abs=0.06)  # half as wide, a little farther away
+
+
+def test_other_objects_say_nothing():
+    view = view_from((0, 0, 1))
+    labels = silhouette(view, cube().parts).astype(np.uint8)
+    labels[:, SIZE[0] // 2 :] *= 2  # another object hides half of it
+    score = score_silhouettes(cube(), np.eye(4), 1, [LabelledView(view, 0.0, labels)])
+    assert (score.recall, score.iou) == (1, 1)
+
+
+def test_without_a_view_the_first_candidate_is_taken():
+    best, _ = choose_proxy({"first": cube(), "second": cube(0.2)}, np.eye(4), 1, [])
+    assert best.name == "first"
+
+
+def test_distances_of_cubes_of_two_sizes():
+    same = score_surfaces(surface_of(cube()), surface_of(cube()))
+    assert (same.chamfer_m, same.f1, same.hausdorff_m) == (0, 1, 0)
+    apart = score_surfaces(surface_of(cube(0.11)), surface_of(cube(0.1)))
+    # 10 mm from face to face, sqrt(3) of it from corner to corner; samples lie 4 mm apart.
+    assert 0.0095 < apart.chamfer_m < 0.0135
+    assert apart.f1 == 0
+    assert 0.015 < apart.hausdorff_m < 0.0215
+
+
+def test_faces_between_pieces_are_no_surface():
+    left, right = (box_around(np.array([[x, -1, -1], [x + 1, 1, 1.0]])) for x in (-1, 0))
+    halves = Collider((left.vertices - [1e-3, 0, 0], right.vertices), left)
+    overlapping = Collider((left.vertices + np.float32([0.1, 0, 0]), right.vertices), left)
+    inner = np.abs(surface_of(overlapping)[:, 0]) < 0.05
+    inner &= np.abs(surface_of(overlapping)[:, 1:]).max(1) < 0.99
+    assert not inner.any()
+    assert len(surface_of(halves)) > len(surface_of(overlapping))
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_primitives_hold_nearly_all_of_a_tilted_brick(shape):
+    random = np.random.default_rng(0)
+    turn = np.linalg.qr(random.standard_normal((3, 3)))[0]
+    points = (random.uniform(-1, 1, (800, 3)) * [0.05, 0.02, 0.1]) @ turn.T + 0.3
+    mesh = collider_of_shape(box_around(points), "hull").mesh
+    made = collider_of_shape(mesh, shape)
+    assert len(made.parts) == 1
+    assert is_watertight(made.mesh.faces)
+    low, high = made.parts[0].min(0), made.parts[0].max(0)
+    assert (low < 0.3).all() and (high > 0.3).all()
+    size = volume(made.mesh.vertices, made.mesh.faces)
+    assert size >= 0.9 * volume(mesh.vertices, mesh.faces)
+
+
+def test_a_box_is_the_smallest_upright_one():
+    turn = np.deg2rad(30)
+    flat = np.array([[-2, -1], [2, -1], [2, 1], [-2, 1.0]]) @ np.array(
+        [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    )
+    corners = np.concatenate([np.insert(flat, 1, y, axis=1) for y in (0.0, 3.0)])
+    mesh = collider_of_shape(box_around(corners), "hull").mesh
+    found = collider_of_shape(type(mesh)(corners.astype(np.float32), mesh.faces), "box")
+    assert volume(found.mesh.vertices, found.mesh.faces) == pytest.approx(4 * 2 * 3, rel=1e-5)
+
+
+def test_a_slab_is_closed_and_as_large_as_its_cells():
+    cells = without_diagonals(np.random.default_rng(0).random((20, 30)) > 0.4)
+    plane = Plane(np.array([0.0, 1.0, 0.0]), 0.5)
+    made = slab(plane, np.array([0.1, 0.2]), cells, 0.02)
+    assert is_watertight(made.faces)
+    size = cells.sum() * 0.02**2 * 0.08  # cells of .02 m, 4 sides of a cell thick
+    assert volume(made.vertices, made.faces) == pytest.approx(
+        cells.sum() * 0.02**2 * 0.08, rel=1e-4
+    )
+    assert made.vertices[:, 1].max() == np.float32(0.5)
+
+
+def test_planes_that_are_one_give_one_slab():
+    other = Plane(np.array([0.0, 1.0, 0.0]), 0.3)
+    assert distinct([FLOOR, Plane(FLOOR.normal, 0.001), other], 0.01) == [FLOOR, other]
