@@ -50,7 +50,7 @@ def completed(
         device, found.model, views, RowEvidence(found.own, found.behind), wanted,
         shadows=options.shadows, background=capture.background or (0.0, 0.0, 0.0), making=making,
     )  # fmt: skip
-    tell(made, {part.spec.label: part.spec.name for part in found.parts})
+    tell_assembled(made, {part.spec.label: part.spec.name for part in found.parts})
     return write_colliders(file, found, made, options.out), replace(found, model=made.model)
 
 
@@ -124,7 +124,7 @@ def write_colliders(
     return replace(file, items=items, background=background)
 
 
-def tell(made: "Assembled", names: dict[int, str]) -> None:
+def tell_assembled(made: "Assembled", names: dict[int, str]) -> None:
     """A sentence an object."""
     for label, proxy in made.proxies.items():
         score, count = proxy.score, len(proxy.collider.parts)
