@@ -1,21 +1,31 @@
 """The end of launch.py segment: what is touched of every object, and what stood behind it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
-    from shapeshift.app.decomposition.segment import Options
     from shapeshift.decomposition.assemble import Assembled
+    from shapeshift.decomposition.label_photos import Progress
     from shapeshift.decomposition.segment_scene import Segmented
     from shapeshift.rasterizer.device import Device
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.scene.document.scene_file import SceneFile
 
-FOLDER = "colliders"  # beside the scene file
+COLLIDERS = ".colliders"  # a folder, after the scene file's name without its ending
+
+
+@dataclass(frozen=True)
+class CompletionSettings:
+    """Where to, and what may be done."""
+
+    out: Path  # NAME.scene.json
+    downscale: int | None  # of the photos; None: as in the training
+    shadows: bool
+    progress: "Progress"
 
 
 def completed(
@@ -23,13 +33,12 @@ def completed(
     file: "SceneFile",
     found: "Segmented",
     capture: "Capture",
-    options: "Options",
+    settings: CompletionSettings,
 ) -> "tuple[SceneFile, Segmented]":
     """With a completed background and colliders in files; of plain splats the same.
 
     Raises BadFile.
     """
-    from shapeshift.app.opening import PATIENCE_S, progress_after
     from shapeshift.app.training.evaluate import trained_downscale
     from shapeshift.decomposition.assemble import assemble
     from shapeshift.decomposition.photo_views import photo_views, row_evidence
@@ -41,16 +50,22 @@ def completed(
         say("Nothing is completed: plain splats have no features that copies could keep.")
         return file, found
     wanted = {p.spec.label: None for p in found.parts if p.rows and p.spec.collider == HULLS}
-    factor = options.downscale or trained_downscale(found.model.provenance)
-    with progress_after(PATIENCE_S) as report:
-        views = photo_views(device, found, capture, factor)
-        made = assemble(
-            device, found.model, views, row_evidence(device, found.model, views), wanted,
-            shadows=options.shadows, background=capture.background or (0.0, 0.0, 0.0),
-            making=Making(progress=report),
-        )  # fmt: skip
+    factor = settings.downscale or trained_downscale(found.model.provenance)
+    views = photo_views(device, found, capture, factor)
+    made = assemble(
+        device, found.model, views, row_evidence(device, found.model, views), wanted,
+        shadows=settings.shadows, background=capture.background or (0.0, 0.0, 0.0),
+        making=Making(progress=lambda what, part: settings.progress(what, int(100 * part), 100)),
+    )  # fmt: skip
     print_assembled(made, {part.spec.label: part.spec.name for part in found.parts})
-    return write_colliders(file, found, made, options.out), replace(found, model=made.model)
+    return write_colliders(file, found, made, settings.out), replace(found, model=made.model)
+
+
+def colliders_folder(out: Path) -> Path:
+    """Beside the scene file, named as it."""
+    from shapeshift.scene.document.scene_file import ENDING
+
+    return out.with_name(out.name[: -len(ENDING)] + COLLIDERS)
 
 
 def collider_paths(names: Sequence[str], out: Path) -> dict[str, Path]:
@@ -58,8 +73,9 @@ def collider_paths(names: Sequence[str], out: Path) -> dict[str, Path]:
     from shapeshift.app.paths import file_name
 
     found: dict[str, Path] = {}
+    folder = colliders_folder(out)
     for number, name in enumerate(names):
-        path = out.parent / FOLDER / f"{file_name(name)}.glb"
+        path = folder / f"{file_name(name)}.glb"
         taken = path in found.values()
         found[name] = path.with_stem(f"{path.stem}-{number}") if taken else path
     return found
@@ -76,7 +92,7 @@ def write_colliders(
     specs = [part.spec for part in found.parts if part.spec.label in made.proxies]
     proxies = {spec.name: made.proxies[spec.label] for spec in specs}
     paths = collider_paths([BACKGROUND, *proxies], out)
-    make_folders(out.parent, FOLDER)
+    make_folders(out.parent, colliders_folder(out).name)
     for name, proxy in proxies.items():
         write_collider(proxy.collider.parts, proxy.collider.mesh, paths[name])
     write_collider((), made.ground, paths[BACKGROUND])

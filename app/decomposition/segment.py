@@ -58,7 +58,7 @@ class Options(ReadingOptions):
     """A folder for pictures of what was found.  Default: none are drawn."""
     complete: bool = True
     """Fill the background where objects stood, verified against the photos, and make what is
-    touched of each object, cut at the plane that it stood on; into the folder "colliders"."""
+    touched of each object, cut at the plane that it stood on; into the folder NAME.colliders."""
     shadows: bool = False
     """With --complete: take out the shadows of objects, too, which no photo can confirm."""
     downscale: Annotated[int | None, EXPERT] = None
@@ -117,7 +117,7 @@ def cut(
     """Writes the labelled model and the scene file; what was found, and what became of each label
     in the photos where a segmenter was asked.  Raises BadFile, UsageError.
     """
-    from shapeshift.app.decomposition.assembling import completed
+    from shapeshift.app.decomposition.assembling import CompletionSettings, completed
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
     from shapeshift.scene.document.write_scene_file import write_scene_file
@@ -141,7 +141,8 @@ def cut(
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     if options.complete:
-        file, found = completed(device, file, found, capture, options)
+        settings = CompletionSettings(options.out, options.downscale, options.shadows, progress)
+        file, found = completed(device, file, found, capture, settings)
     write_model(found.model, path)
     write_scene_file(file, options.out)
     return found, counts
@@ -206,7 +207,7 @@ def refuse_outputs(options: Options) -> None:
     stem = options.out.name[: -len(ENDING)]
     written = [options.out, *(options.out.with_name(stem + end) for end in (".shift", ".ply"))]
     if options.complete:
-        written.append(options.out.parent / "colliders")
+        written.append(options.out.with_name(stem + ".colliders"))
     read = {options.scene.resolve(), options.capture.resolve()}
     for path in written:
         if path.resolve() in read:

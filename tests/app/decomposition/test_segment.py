@@ -237,3 +237,20 @@ def test_another_scenes_capture_is_noticed(given, tmp_path, capsys):
     write_package(away, tmp_path / "far.shift")
     refused(capsys, "none of the photos shows anything of the scene",
             (tmp_path / "far.shift", *words))  # fmt: skip
+
+
+def test_the_ground_of_a_completed_scene_travels_with_it(given, tmp_path):
+    specs = [
+        {"label": n, "name": name, "collider": None} for n, name in ((1, "left"), (2, "right"))
+    ]
+    objects = tmp_path / "objects.json"
+    objects.write_text(json.dumps({"format": "shapeshift-objects 1", "objects": specs}))
+    out = tmp_path / "cut.scene.json"
+    words = [given / "room.shift", given / "capture", "--masks", given / "masks"]
+    words += ["--objects", objects, "--out", out]
+    assert cli.main(["segment", *map(str, words)]) == 0
+    file = read_scene_file(out)
+    assert file.background.collider == "colliders/background.glb"
+    assert [item.collider for item in file.items] == [None, None]
+    assert (tmp_path / "colliders" / "background.glb").is_file()
+    assert cli.main(["segment", *map(str, words)]) == 2  # nothing is overwritten

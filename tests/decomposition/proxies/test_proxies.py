@@ -30,17 +30,20 @@ def view_from(eye: tuple) -> View:
 
 
 def test_what_lies_below_the_plane_or_on_the_lowest_is_moved_onto_it():
-    points = np.array([[0, -0.02, 0], [0, 0, 0], [0, SNAP * 0.1 * 0.99, 1], [0, SNAP * 0.1, 2],
-                       [0, 0.1, 0]], np.float32)  # fmt: skip
+    longest = 2.0  # along z
+    points = np.array([[0, -0.02, 0], [0, 0, 0], [0, SNAP * longest * 0.99, 1],
+                       [0, SNAP * longest, 2], [0, 0.1, 0]], np.float32)  # fmt: skip
     (out,) = pressed([points], FLOOR)
     assert out[:3, 1].tolist() == [0, 0, 0]
     assert np.array_equal(out[3:], points[3:])  # at the threshold itself it stays
 
 
-def test_a_thing_above_the_plane_is_drawn_down_to_it():
-    points = np.array([[0, 0.004, 0], [0, 0.1, 0]], np.float32)
-    (out,) = pressed([points], FLOOR)
-    assert out[:, 1].tolist() == pytest.approx([0, 0.1])
+def test_pieces_of_a_thing_above_the_plane_are_drawn_down_to_it():
+    pieces = [np.array([[0, 0.004, 0], [0, 0.1, 0]], np.float32),
+              np.array([[0, 0.0045, 0], [0, 0.05, 0]], np.float32)]  # fmt: skip
+    first, second = pressed(pieces, FLOOR)
+    assert first[:, 1].tolist() == pytest.approx([0, 0.1])
+    assert second[:, 1].tolist() == pytest.approx([0, 0.05])
 
 
 def test_a_silhouette_is_what_the_cube_covers():
@@ -129,9 +132,7 @@ def test_a_slab_is_closed_and_as_large_as_its_cells():
     made = slab(plane, np.array([0.1, 0.2]), cells, 0.02)
     assert is_watertight(made.faces)
     size = cells.sum() * 0.02**2 * 0.08  # cells of .02 m, 4 sides of a cell thick
-    assert volume(made.vertices, made.faces) == pytest.approx(
-        cells.sum() * 0.02**2 * 0.08, rel=1e-4
-    )
+    assert volume(made.vertices, made.faces) == pytest.approx(size, rel=1e-4)
     assert made.vertices[:, 1].max() == np.float32(0.5)
 
 
