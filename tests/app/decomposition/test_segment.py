@@ -250,7 +250,7 @@ def test_the_ground_of_a_completed_scene_travels_with_it(given, tmp_path):
     words += ["--objects", objects, "--out", out]
     assert cli.main(["segment", *map(str, words)]) == 0
     file = read_scene_file(out)
-    assert file.background.collider == "colliders/background.glb"
+    assert file.background.collider == "cut.colliders/background.glb"
     assert [item.collider for item in file.items] == [None, None]
-    assert (tmp_path / "colliders" / "background.glb").is_file()
+    assert (tmp_path / "cut.colliders" / "background.glb").is_file()
     assert cli.main(["segment", *map(str, words)]) == 2  # nothing is overwritten
