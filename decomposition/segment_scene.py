@@ -58,8 +58,6 @@ class Segmented:
     parts: tuple[SegmentedPart, ...]
     pictures: tuple[LabelledView, ...]  # what the label maps said
     silent: int  # photos without a label map
-    own: np.ndarray  # (rows,) pixels of evidence for the object that each is of
-    behind: np.ndarray  # (rows,) pixels of evidence for the background
 
 
 def factor_of(photo: Photo, trained: int | None) -> int:
@@ -143,9 +141,8 @@ def segment(
         share = float(sums[mine, column].sum() / pixels) if pixels else 0.0
         seen = sum(bool((picture.labels == spec.label).any()) for picture in pictures)
         parts.append(SegmentedPart(spec, seen, int(mine.sum()), pixels, share))
-    own = sums[np.arange(len(sums)), np.searchsorted(numbers, cut.labels)]
     silent = photos - len(pictures)
-    return Segmented(cut, tuple(parts), tuple(pictures), silent, own, sums[:, 0])
+    return Segmented(cut, tuple(parts), tuple(pictures), silent)
 
 
 def scores_of(
