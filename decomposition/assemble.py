@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.decomposition.completion.anchor_looks import AnchorLooks, looks_of
+from shapeshift.decomposition.completion.anchor_looks import looks_of
 from shapeshift.decomposition.completion.complete import (
     Completion,
     complete,
@@ -88,7 +88,15 @@ def assemble(
             background=background,
             progress=lambda what, done, count: making.report(what, done / max(count, 1)),
         )  # fmt: skip
-    ground = ground_of(whole, looks, model.labels, list(planes.values()), x, making)
+    standing = [
+        (planes[label], corners_of(proxy, model, label))
+        for label, proxy in proxies.items()
+        if label in planes
+    ]
+    hollow = replace(making, hollow=True, faces=BACKGROUND_FACES)
+    ground = ground_mesh(
+        only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing
+    )
     return Assembled(whole, proxies, ground, tuple(told), failed)
 
 
@@ -121,14 +129,7 @@ def most_of(pictures: Sequence[LabelledView], label: int) -> list[LabelledView]:
     return [pictures[i] for i in order if counts[i]]
 
 
-def ground_of(
-    model: AnchorModel,
-    looks: AnchorLooks,
-    labels: np.ndarray,
-    planes: Sequence[Plane],
-    x: float,
-    making: Making,
-) -> TriangleMesh:
-    """The background's mesh; looks and labels are of before it was completed.  Raises BadFile."""
-    hollow = replace(making, hollow=True, faces=BACKGROUND_FACES)
-    return ground_mesh(only_background(model), looks, labels, planes, x, hollow)
+def corners_of(proxy: Proxy, model: AnchorModel, label: int) -> np.ndarray:
+    """(V, 3) metres, the model's frame: of all pieces of what is touched of an object."""
+    _, at = part_of(model, label)
+    return np.concatenate([np.asarray(each, np.float64) for each in proxy.collider.parts]) + at

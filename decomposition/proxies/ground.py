@@ -30,11 +30,14 @@ def ground_mesh(
     planes: Sequence[Plane],
     x: float,
     making: Making,
+    standing: Sequence[tuple[Plane, np.ndarray]] = (),
 ) -> TriangleMesh:
     """The background's mesh, in the model's frame: slabs under the planes, and the skin.
 
     background: without the objects.  looks, labels (A,): of the whole model, so that a slab lies
-    under the things, too.  Raises BadFile where nothing can be touched.
+    under the things, too.  standing: the plane that each object stands on, and the corners (V, 3)
+    of what is touched of it; no skin is left within them, or the object would jump out of it.
+    Raises BadFile where nothing can be touched.
     """
     skin = mesh_of_splats(*Evaluator(background).geometry(x), making)
     side = CELL * looks.spacing_m
@@ -48,7 +51,27 @@ def ground_mesh(
         height = plane.height(vertices)
         low_skin = inside & (np.abs(height) < NEAR * side)
         vertices[low_skin] -= (height[low_skin, None] + SUNK * side) * plane.normal
+    for plane, corners in standing:
+        within = is_within(vertices, corners, side)
+        height = plane.height(vertices[within])
+        vertices[within] -= np.maximum(height + SUNK * side, 0)[:, None] * plane.normal
     return join_meshes([TriangleMesh(vertices.astype(np.float32), skin.faces), *slabs])
+
+
+def is_within(places: np.ndarray, corners: np.ndarray, margin: float) -> np.ndarray:
+    """(N,) bool: the places (N, 3) in the convex hull of corners (V, 3), or so many metres off it.
+
+    Fur and carpets make a skin that stands above the plane around a thing and reaches into it.
+    """
+    from scipy.spatial import ConvexHull
+
+    low, high = corners.min(0) - margin, corners.max(0) + margin
+    near = np.flatnonzero(((places > low) & (places < high)).all(1))
+    equations = ConvexHull(corners).equations  # (F, 4) outward normals
+    inside = (places[near] @ equations[:, :3].T + equations[:, 3] < margin).all(1)
+    found = np.zeros(len(places), bool)
+    found[near[inside]] = True
+    return found
 
 
 def distinct(planes: Sequence[Plane], side: float) -> list[Plane]:

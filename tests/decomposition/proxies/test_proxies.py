@@ -6,7 +6,7 @@ import pytest
 from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.partition import LabelledView
 from shapeshift.decomposition.proxies.choose import choose_proxy
-from shapeshift.decomposition.proxies.ground import distinct, slab, without_diagonals
+from shapeshift.decomposition.proxies.ground import distinct, is_within, slab, without_diagonals
 from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
 from shapeshift.decomposition.proxies.standing import SNAP, pressed
 from shapeshift.decomposition.proxies.surface_scores import score_surfaces, surface_of
@@ -139,3 +139,16 @@ def test_a_slab_is_closed_and_as_large_as_its_cells():
 def test_planes_that_are_one_give_one_slab():
     other = Plane(np.array([0.0, 1.0, 0.0]), 0.3)
     assert distinct([FLOOR, Plane(FLOOR.normal, 0.001), other], 0.01) == [FLOOR, other]
+
+
+def test_places_within_a_hull_and_around_it_are_found():
+    """Against the distance to a box, which has a formula."""
+    box = np.array([[x, y, z] for x in (0, 2) for y in (0, 1) for z in (0, 1)], float)
+    places = np.random.default_rng(0).uniform(-1, 3, (4000, 3))
+    outside = np.maximum(np.maximum(-places, places - [2, 1, 1]).max(1), -1)  # beyond its faces
+    for margin in (0.0, 0.25):
+        found = is_within(places, box, margin)
+        np.testing.assert_array_equal(found, outside < margin)
+        assert 0 < found.sum() < len(found)
+    assert not is_within(np.zeros((0, 3)), box, 0.1).any()
+    assert not is_within(np.full((1, 3), np.nan), box, 0.1).any()
