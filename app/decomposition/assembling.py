@@ -1,11 +1,9 @@
 """The end of launch.py segment: what is touched of every object, and what stood behind it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.assemble import Assembled
@@ -26,6 +24,7 @@ class CompletionSettings:
     downscale: int | None  # of the photos; None: as in the training
     shadows: bool
     progress: "Progress"
+    notice: Callable[[str], None]  # takes sentences
 
 
 def completed(
@@ -47,7 +46,9 @@ def completed(
     from shapeshift.scene.document.scene_file import HULLS
 
     if not isinstance(found.model, AnchorModel):
-        say("Nothing is completed: plain splats have no features that copies could keep.")
+        settings.notice(
+            "Nothing is completed: plain splats have no features that copies could keep."
+        )
         return file, found
     wanted = {p.spec.label: None for p in found.parts if p.rows and p.spec.collider == HULLS}
     factor = settings.downscale or trained_downscale(found.model.provenance)
@@ -57,7 +58,9 @@ def completed(
         shadows=settings.shadows, background=capture.background or (0.0, 0.0, 0.0),
         making=Making(progress=lambda what, part: settings.progress(what, int(100 * part), 100)),
     )  # fmt: skip
-    print_assembled(made, {part.spec.label: part.spec.name for part in found.parts})
+    names = {part.spec.label: part.spec.name for part in found.parts}
+    for sentence in sentences_of(made, names):
+        settings.notice(sentence)
     return write_colliders(file, found, made, settings.out), replace(found, model=made.model)
 
 
@@ -105,14 +108,14 @@ def write_colliders(
     return replace(file, items=items, background=background)
 
 
-def print_assembled(made: "Assembled", names: dict[int, str]) -> None:
-    """A sentence an object."""
+def sentences_of(made: "Assembled", names: dict[int, str]) -> Iterator[str]:
+    """What became of each object."""
     for label, proxy in made.proxies.items():
         score, count = proxy.score, len(proxy.collider.parts)
         pieces = f"{count} piece{'s' * (count > 1)}"
         covers = f", IoU {score.iou:.2f} in {score.views} photos" if score.views else ""
-        say(f"{names[label]}: touched as {proxy.name} of {pieces}{covers}.")
+        yield f"{names[label]}: touched as {proxy.name} of {pieces}{covers}."
     for label, why in made.failed.items():
-        say(f"{names[label]}: touched by all of its splats: {why}")
+        yield f"{names[label]}: touched by all of its splats: {why}"
     for one in made.completions:
-        say(f"{names[one.label]}: {one.sentence()}.")
+        yield f"{names[one.label]}: {one.sentence()}."

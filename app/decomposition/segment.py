@@ -141,7 +141,9 @@ def cut(
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     if options.complete:
-        settings = CompletionSettings(options.out, options.downscale, options.shadows, progress)
+        settings = CompletionSettings(
+            options.out, options.downscale, options.shadows, progress, notice
+        )
         file, found = completed(device, file, found, capture, settings)
     write_model(found.model, path)
     write_scene_file(file, options.out)

@@ -175,6 +175,7 @@ class Scene(OpenedScene):
         masks: PathText | None = None,
         segmenter: PathText | None = None,
         photos: int = 24,
+        complete: bool = True,
         overwrite: bool = False,
         progress: "Callable[[str, int, int], None] | None" = None,
     ) -> "Scene":
@@ -184,10 +185,11 @@ class Scene(OpenedScene):
         capture: the photos that it was trained on.  objects: objects.json or ObjectSpecs, each with
         a prompt that says in one photo where it is; or masks: a folder of label maps.  segmenter: a
         folder with the ONNX files of SAM, MobileSAM, SAM 2 or SAM 3, asked about `photos` photos;
-        without one colours, heat and shape find compact things.  progress: called with (what, done,
+        without one colours, heat and shape find compact things.  complete: also make what is touched
+        of each object, and fill the background where it stood if the photos agree.  progress: called with (what, done,
         of how many); an exception from it ends the work, which the same call then goes on with.
 
-        Object-Wise Decomposition, sections 3.2 and 3.3.  Raises BadFile, UsageError, NoDevice.
+        Object-Wise Decomposition, sections 3.2 to 3.5.  Raises BadFile, UsageError, NoDevice.
 
             seen = ss.PhotoPrompt("rgb/012.jpg", box=(310, 200, 402, 296))
             mug = ss.ObjectSpec(1, "mug", (seen,))
@@ -197,7 +199,9 @@ class Scene(OpenedScene):
         from shapeshift.api.segment import segment
 
         return Scene(
-            *segment(self, capture, out, objects, masks, segmenter, photos, overwrite, progress)
+            *segment(
+                self, capture, out, objects, masks, segmenter, photos, complete, overwrite, progress
+            )  # fmt: skip
         )
 
     # ---- files and figures

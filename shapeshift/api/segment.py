@@ -23,6 +23,7 @@ def segment(
     masks: PathText | None,
     segmenter: PathText | None,
     photos: int,
+    complete: bool,
     overwrite: bool,
     progress: Progress | None,
 ) -> tuple[Document, Path]:
@@ -55,7 +56,7 @@ def segment(
     options = Options(
         scene=scene.path or Path("scene"), capture=plain(str(capture)), out=plain(str(out)),
         masks=path(masks), objects=None if specs is None else specs.folder,
-        segmenter=path(segmenter), photos=photos, overwrite=overwrite,
+        segmenter=path(segmenter), photos=photos, complete=complete, overwrite=overwrite,
     )  # fmt: skip
     refuse_inputs(options)
     refuse_outputs(options)

@@ -57,7 +57,9 @@ def write_objects(path: Path, rows: list[dict]) -> None:
 
 
 def segment(given: Path, *words) -> int:
-    return cli.main(["segment", str(DEMO), str(given / "capture"), *map(str, words)])
+    return cli.main(
+        ["segment", str(DEMO), str(given / "capture"), "--no-complete", *map(str, words)]
+    )
 
 
 def refused(capsys, words: str, given: Path, *arguments) -> None:
