@@ -185,9 +185,10 @@ class Scene(OpenedScene):
         capture: the photos that it was trained on.  objects: objects.json or ObjectSpecs, each with
         a prompt that says in one photo where it is; or masks: a folder of label maps.  segmenter: a
         folder with the ONNX files of SAM, MobileSAM, SAM 2 or SAM 3, asked about `photos` photos;
-        without one colours, heat and shape find compact things.  complete: also make what is touched
-        of each object, and fill the background where it stood if the photos agree.  progress: called with (what, done,
-        of how many); an exception from it ends the work, which the same call then goes on with.
+        without one colours, heat and shape find compact things.  complete: also make what is
+        touched of each object, and fill the background where it stood if the photos agree.
+        progress: called with (what, done, of how many); an exception from it ends the work, which
+        the same call then goes on with.
 
         Object-Wise Decomposition, sections 3.2 to 3.5.  Raises BadFile, UsageError, NoDevice.
 
@@ -198,11 +199,8 @@ class Scene(OpenedScene):
         """
         from shapeshift.api.segment import segment
 
-        return Scene(
-            *segment(
-                self, capture, out, objects, masks, segmenter, photos, complete, overwrite, progress
-            )  # fmt: skip
-        )
+        words = (capture, out, objects, masks, segmenter, photos, complete, overwrite, progress)
+        return Scene(*segment(self, *words))
 
     # ---- files and figures
 
