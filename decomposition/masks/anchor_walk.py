@@ -24,7 +24,6 @@ COLOR = 8.0  # squared differences, in means of them, of which an edge is e time
 CREASE, BEND = 4.0, 1.0  # how much a concave edge, and any bend, weakens
 LEAST_WEIGHT = 1e-5
 TOLERANCE, MOST_STEPS = 1e-4, 300
-LEAK = 0.03  # chance at each step that a walk begins anew
 LEAST_PIXELS = 1.0  # that an anchor shows, to be a seed
 INSIDE_SHARE, OUTSIDE_SHARE = 0.85, 0.1  # of its pixels in the mask
 
@@ -81,42 +80,6 @@ class AnchorGraph:
         return conjugate_gradients(
             multiply, degrees, right, np.zeros_like(right), TOLERANCE, MOST_STEPS
         )
-
-    def grow(self, picked: np.ndarray, leak: float = LEAK) -> np.ndarray:
-        """(A,) bool: what hangs together with the anchors `picked`, rows of the model, alone.
-
-        Of the sets that a walk which returns with the chance `leak` at each step reaches first, the
-        one with the least conductance (Andersen, Chung and Lang 2006): for what lights up under a
-        pointer.  Compact things that stand free come whole; what lies flat on another does not.
-        leak: smaller looks further.
-        """
-        out = np.zeros(self.nodes.count, bool)
-        start = np.isin(self.nodes.rows, picked)
-        count = len(start)
-        if not start.any() or count < 3:
-            out[self.nodes.rows[start]] = True
-            return out
-
-        def multiply(x: np.ndarray) -> np.ndarray:
-            return self.degrees[:, None] * x - (1 - leak) * (self.weights @ x)
-
-        right = (leak * self.degrees * start)[:, None]
-        reached = conjugate_gradients(
-            multiply, self.degrees, right, np.zeros_like(right), TOLERANCE / 100, MOST_STEPS
-        )
-        order = np.argsort(-reached[:, 0], kind="stable")
-        rank = np.zeros(count, int)
-        rank[order] = np.arange(count)
-        rows, columns = self.weights.nonzero()
-        last = np.maximum(rank[rows], rank[columns])  # with this many nodes an edge is within
-        within = np.bincount(last, self.weights.data, minlength=count).cumsum()
-        volume = self.degrees[order].cumsum()
-        conductance = (volume - within) / np.maximum(np.minimum(volume, volume[-1] - volume), 1e-12)
-        least = min(int(start.sum()), count - 2)
-        most = max(count // 3, least + 1)
-        end = least + int(conductance[least:most].argmin())
-        out[self.nodes.rows[order[: end + 1]]] = True
-        return out
 
 
 def nodes_of(model: Model, eye: np.ndarray) -> Nodes:

@@ -6,8 +6,7 @@ Each row is what a person gives in the one of 16 views that shows most of the ob
 of it: the mask's IoU there, the IoU of the object in 8 other views (those that show 40 of its
 pixels), and the seconds of processor time of the walks.  "true mask" stands for what a network
 would give.  "box, heat, 15 more masks" makes masks of the other views in the same way, prompted by
-the walk and judged as a segmenter's are: it lost.  "click" is what grows from the one anchor in the
-middle of the object (AnchorGraph.grow).
+the walk and judged as a segmenter's are: it lost.
 """
 
 import argparse
@@ -36,12 +35,7 @@ from shapeshift.decomposition.propagate import Support, propagate  # noqa: E402
 from shapeshift.decomposition.shown import ShownAnchors  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.training.synthetic.labels import (  # noqa: E402
-    LABELS,
-    OBJECTS,
-    label_map,
-    labels_of_places,
-)
+from shapeshift.training.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome  # noqa: E402
 
 SIZE = (384, 288)
@@ -50,7 +44,7 @@ THERMAL = 0.5  # x of that stop
 EYE = (0.0, 0.6, 1.8)  # metres: from where colours of anchors are taken
 MARGIN = 3  # pixels of a person's box around the object
 LEAST_PIXELS = 40
-GIVEN = ("true mask", "box", "box, heat", "box, heat, 15 more masks", "click")
+GIVEN = ("true mask", "box", "box, heat", "box, heat, 15 more masks")
 COLUMNS = "given,object,mask_iou,object_iou,cpu_s"
 
 
@@ -74,7 +68,6 @@ class Bench:
         self.nodes = nodes_of(self.model, np.float32(EYE))
         self.graph: AnchorGraph = make_graph(self.nodes, self.eyes)
         self.graph_s = time.process_time() - began
-        self.true = labels_of_places(self.nodes.means)[0]
 
     def look(self, view, x: float) -> np.ndarray:
         return np.rint(255 * np.clip(self.shown.look(view, x), 0, 1)).astype(np.uint8)
@@ -103,13 +96,6 @@ class Bench:
     def row(self, given: str, name: str) -> tuple[float, float, float]:
         """The mask's IoU, the object's, and seconds."""
         label = LABELS[name]
-        if given == "click":
-            here = np.flatnonzero(self.true == label)
-            apart = self.nodes.means[here] - np.median(self.nodes.means[here], axis=0)
-            middle = here[(apart**2).sum(1).argmin()]
-            began = time.process_time()
-            part = self.graph.grow(self.nodes.rows[[middle]])
-            return np.nan, self.object_iou(part.astype(int), label), time.process_time() - began
         first = int(np.argmax([(labels == label).sum() for labels in self.maps]))
         true = self.maps[first] == label
         began = time.process_time()
@@ -138,7 +124,7 @@ def main() -> None:
     for given in GIVEN:
         figures = np.array([bench.row(given, name) for name in OBJECTS])
         for name, each in zip((*OBJECTS, "mean"), [*figures, figures.mean(0)], strict=True):
-            cells = ("" if np.isnan(n) else f"{n:.3f}" for n in each)
+            cells = (f"{n:.3f}" for n in each)
             rows.append(",".join([f'"{given}"', name, *cells]))
         sys.stdout.write(rows[-1] + "\n")
     head = [

@@ -57,13 +57,13 @@ def test_shares_add_up_to_one():
         assert (shares.argmax(1)[here >= 0] == here[here >= 0]).all()
 
 
-def two_lumps(color: bool, gap: float = 0.0, first: int = 200) -> Nodes:
+def two_lumps(color: bool, gap: float = 0.0) -> Nodes:
     """A lump of places at 0 and one beside it, touching; 400 together."""
     rng = np.random.default_rng(0)
     means = rng.random((400, 3))
-    means[first:, 0] += 1 + gap
+    means[200:, 0] += 1 + gap
     colors = np.zeros((400, 3))
-    colors[first:, 1] = color
+    colors[200:, 1] = color
     colors += rng.normal(0, 0.02, colors.shape)
     return Nodes(400, np.arange(400), means, colors)
 
@@ -75,20 +75,6 @@ def test_a_thing_ends_where_its_colour_or_its_shape_does(color, gap):
     seeds[[5, 205]] = 1, 0
     label = graph.walk(seeds)
     assert (label == np.repeat([1, 0], 200)).mean() > 0.98
-
-
-def test_what_is_picked_grows_to_the_thing():
-    grown = make_graph(two_lumps(True, first=100), EYES).grow(np.array([5]))
-    assert (grown == (np.arange(400) < 100)).mean() > 0.98
-
-
-def test_what_grows_from_a_pick_holds_it():
-    graph = make_graph(two_lumps(True), EYES)
-    for picked in ([0], [3, 7], [399]):
-        grown = graph.grow(np.array(picked))
-        assert grown[picked].all() and grown.sum() < 400
-    assert not graph.grow(np.array([], int)).any()
-    assert not graph.grow(np.array([5000])).any()
 
 
 def test_a_lump_joined_to_no_seed_is_background():
@@ -108,7 +94,6 @@ def test_few_anchors(count):
     seeds[0] = 1
     label = graph.walk(seeds)
     assert label.shape == (count + 1,) and label[0] == (count > 0) and label[-1] == 0
-    graph.grow(np.array([0]))
 
 
 def test_anchors_in_one_place_and_of_one_colour():
