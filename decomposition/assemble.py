@@ -80,7 +80,8 @@ def assemble(
             )
         except BadFile as why:
             failed[label] = str(why)
-    whole, told = model, []
+    told: list[Completion] = []
+    whole = model
     if completed:
         there = [int(label) for label in np.unique(model.labels) if label]
         whole, told = complete(

@@ -141,10 +141,8 @@ def cut(
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     if options.complete:
-        settings = CompletionSettings(
-            options.out, options.downscale, options.shadows, progress, notice
-        )
-        file, found = completed(device, file, found, capture, settings)
+        how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
+        file, found = completed(device, file, found, capture, how)
     write_model(found.model, path)
     write_scene_file(file, options.out)
     return found, counts

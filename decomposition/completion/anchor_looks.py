@@ -26,7 +26,8 @@ def looks_of(model: AnchorModel) -> AnchorLooks:
     low, high = np.percentile(model.anchors, (1, 99), axis=0)
     eye = (low + high) / 2 + np.array([0.0, 0.5, 1.5]) * (high - low).max()
     places = model.anchors.astype(np.float64)
-    there, colors = np.zeros(len(places), bool), []
+    there = np.zeros(len(places), bool)
+    colors: list[np.ndarray] = []
     for stop in reversed(model.stops):  # the first one decides where an anchor is
         splats = evaluator.geometry(stop.x)
         color = evaluator.color(stop.x, eye.astype(np.float32)).reshape(-1, count, 3)

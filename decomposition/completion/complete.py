@@ -94,7 +94,7 @@ def complete_one(
             first = first or Completion(label, plane, None, None, stamp)
             continue
         after = with_background_copies(apply_stamp(model, stamp), len(stamp.rows))
-        pair = [only_background(each) for each in (model, after)]
+        pair = only_background(model), only_background(after)
         cells = Cells(stamp.footprint, stamp.cell_m)
         verdict = verify(device, *pair, label, views, background, cells, shadows)
         if verdict.is_accepted:

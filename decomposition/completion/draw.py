@@ -31,9 +31,10 @@ class ModelPictures:
             self._geometry = [self._device.upload(np.asarray(c, np.float32)) for c in columns]
             self._x = x
         color = self._evaluator.color(x, np.asarray(view.world_from_eye.position, np.float32))
-        arrays = (*self._geometry, self._device.upload(np.asarray(color, np.float32)))
+        means, scales, wxyz, opacity = self._geometry
+        colors = self._device.upload(np.asarray(color, np.float32))
         camera = Camera(*view.pinhole(), view.size, view.near)
-        projected = project(self._device, *arrays, camera)
+        projected = project(self._device, means, scales, wxyz, opacity, colors, camera)
         tiles = bin_tiles(self._device, projected, view.size)
         return rasterize_rgba(self._device, projected, tiles, view.size).copy()
 

@@ -86,7 +86,8 @@ def find_stamp(
 def find_patches(grid: PlaneCells, foot: Footprint) -> list[tuple[np.ndarray, np.ndarray]]:
     """(cells of the hole (X, Y), step (2,) to where they are copied from), each cell once."""
     seam = seams(grid, foot)
-    left, total, found = foot.hole.copy(), foot.hole.sum(), []
+    left, total = foot.hole.copy(), foot.hole.sum()
+    found: list[tuple[np.ndarray, np.ndarray]] = []
     while left.sum() > LEAST_LEFT * total and len(found) < MOST_PATCHES:
         cover = correlate(left, foot.good) / left.sum()  # (2X - 1, 2Y - 1) for each step
         cost = seam - WORTH * np.minimum(cover, WHOLE)

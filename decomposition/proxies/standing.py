@@ -45,7 +45,8 @@ def standing_mesh(
             f"photos show {int(use.sum())} splats of it above the plane that it stood on, of "
             f"{len(use)}; {FEWEST} are wanted: mark it in more photos, or name a mesh file."
         )
-    mesh = mesh_of_splats(*(column[use] for column in columns), making or Making(kept=False))
+    means, scales, wxyz, opacity = (column[use] for column in columns)
+    mesh = mesh_of_splats(means, scales, wxyz, opacity, making or Making(kept=False))
     if plane is None:
         return mesh
     return TriangleMesh(pressed([mesh.vertices], plane)[0], mesh.faces)

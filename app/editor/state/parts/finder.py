@@ -132,6 +132,7 @@ class Finder:
                     self._wake.wait()
                 if self._closing:
                     return
+                assert self._query is not None, "it was waited for"
                 query, self._query, self._busy = self._query, None, True
             found = None
             try:

@@ -18,7 +18,7 @@ from shapeshift.runtime_models.model import (
     ScaffoldModel,
     SplatLayers,
 )
-from shapeshift.runtime_models.parts import BACKGROUND, Place, part_of, splat_labels
+from shapeshift.runtime_models.parts import BACKGROUND, Place, part_of
 
 OBJECT = 1  # any label above 0: part_of gives such rows a frame of their own
 MARK = "#"  # in the name of a piece, which no path of a file needs to be read
@@ -73,20 +73,19 @@ def labelled(model: Model, kept: np.ndarray, rows_of: dict[int, np.ndarray]) -> 
 
 def without_labels(model: Model) -> Model:
     """What an object of a scene is alone."""
-    changes = {"objects": ()} if isinstance(model, AnchorModel) else {}
-    return replace(model, labels=None, **changes)
+    if isinstance(model, AnchorModel):
+        return replace(model, labels=None, objects=())
+    assert isinstance(model, SplatLayers), "check_pieces refuses others"
+    return replace(model, labels=None)
 
 
 def rows_by_label(model: Model) -> dict[str, np.ndarray]:
     """(A,) bool by name of each object that a whole model has labels of; the background's is no."""
-    labels = splat_labels(model)
+    labels = model.labels if isinstance(model, AnchorModel | SplatLayers) else None
     if labels is None:
         return {}
-    if isinstance(model, AnchorModel):
-        names = {each.label: each.name for each in model.objects}
-        labels = model.labels
-    else:
-        names = {}
+    objects = model.objects if isinstance(model, AnchorModel) else ()
+    names = {each.label: each.name for each in objects}
     found = [int(n) for n in np.unique(labels) if n != BACKGROUND]
     return {names.get(n, f"object {n}"): labels == n for n in found}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.app.editor.state.files.edited_file import EditedFile, stamp_of
-from shapeshift.app.editor.state.parts.piece import Piece, labelled
+from shapeshift.app.editor.state.parts.piece import Piece, labelled, without_labels
 from shapeshift.app.paths import is_bundled
 from shapeshift.runtime_models.model import (
     MOST_LABEL,
@@ -60,8 +60,7 @@ class LabelledFile:
         kept = np.any([piece.rows for piece in self.pieces.values()], axis=0)
         model = labelled(self.base, kept, {n: piece.rows for n, piece in self.pieces.items()})
         if not self.names:
-            changes = {"objects": ()} if isinstance(model, AnchorModel) else {}
-            return replace(model, labels=None, **changes)
+            return without_labels(model)
         if isinstance(model, AnchorModel):
             objects = tuple(ObjectLabel(label, name) for label, name in self.names.items())
             return replace(model, objects=objects)
