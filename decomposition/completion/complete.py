@@ -95,7 +95,7 @@ def complete_one(
             continue
         after = with_background_copies(apply_stamp(model, stamp), len(stamp.rows))
         pair = only_background(model), only_background(after)
-        cells = Cells(stamp.footprint, stamp.cell_m)
+        cells = Cells(stamp.footprint, stamp.cell_m, plane.normal)
         verdict = verify(device, *pair, label, views, background, cells, shadows)
         if verdict.is_accepted:
             return after, Completion(label, plane, stamp, verdict)

@@ -2,7 +2,8 @@
 
 Holes are pixels of the thing's own mask through which nothing of the background is seen.  All other
 pixels of background are protected: they may hardly change, and around the mask they may not become
-less like the photos.  What fills a hole has to look as the background around the mask does.
+less like the photos.  What fills a hole has to look as the background around the mask does, and to
+lie on the plane that it fills.
 """
 
 from collections.abc import Sequence
@@ -25,6 +26,7 @@ LEAST_FEWER = 0.75  # of the holes over the cells that were filled that must be 
 LEAST_ALIKE_DB = 30.0  # PSNR of protected pixels, before against after, in the worst view
 MOST_LOST_DB = 2.0  # that protected pixels around a mask may lose against the photos
 MOST_STRANGE = 0.06  # display units from a filled pixel to the nearest colour around, mean
+MOST_AWAY = 1.0  # sides of a cell that what fills it may be above or under the plane, mean
 MOST_COLORS = 4000  # around a mask that are compared with
 
 
@@ -41,6 +43,7 @@ class Cells(NamedTuple):
 
     middles: np.ndarray  # (n, 3) metres
     side_m: float
+    normal: np.ndarray  # (3,) unit, of the plane
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ class Verdict:
     photo_before_db: float  # protected pixels around the masks, against the photos
     photo_after_db: float
     strange: float  # display units from the colours of fills to those around, mean
+    away: float  # sides of a cell from what fills cells to their plane, mean
     why: str  # "": accepted; else what is wrong with it, a clause
 
     @property
@@ -79,6 +83,8 @@ class Tally:
     beside: int = 0
     strange: float = 0.0
     filled: int = 0
+    away: float = 0.0  # sides of a cell, of filled pixels over the cells
+    placed: int = 0
 
 
 def verify(
@@ -104,6 +110,8 @@ def verify(
             continue
         pair = [each.draw(view.labelled.view, view.labelled.x) for each in drawings]
         add_view(tally, view, mask, pair, background, cells, shadows)
+        if cells is not None:
+            add_heights(tally, view.labelled, mask, pair, drawings[1], cells)
     return judge(tally)
 
 
@@ -146,6 +154,25 @@ def add_view(
         tally.filled += int(filled.sum())
 
 
+def add_heights(
+    tally: Tally,
+    picture: LabelledView,
+    mask: np.ndarray,
+    pair: list[np.ndarray],
+    after: ModelPictures,
+    cells: Cells,
+) -> None:
+    """How far from their plane the fills of one view lie: colours alone hardly show it."""
+    hole = mask & (pair[0][..., 3] < OPEN) & (pair[1][..., 3] >= OPEN)
+    filled = hole & shown_cells(picture.view, cells, 0.5)
+    if not filled.any():
+        return
+    offset = float((cells.middles @ cells.normal).mean())
+    heights = after.heights(picture.view, picture.x, cells.normal, offset)
+    tally.away += float(np.abs(heights[filled]).sum()) / cells.side_m
+    tally.placed += int(filled.sum())
+
+
 def shown_cells(view: View, cells: Cells, reach: float) -> np.ndarray:
     """(H, W) bool: pixels nearer than so many sides of a cell to its middle."""
     from PIL import Image, ImageDraw
@@ -173,6 +200,7 @@ def judge(tally: Tally) -> Verdict:
     beside = max(tally.beside, 1)
     photo = [decibels(e / beside) for e in (tally.error_before, tally.error_after)]
     strange = tally.strange / max(tally.filled, 1)
+    away = tally.away / max(tally.placed, 1)
     why = ""
     if not tally.views:
         why = "no view shows the thing, so that nothing can be verified"
@@ -186,8 +214,10 @@ def judge(tally: Tally) -> Verdict:
         why = f"it is less like the photos ({photo[0]:.1f} -> {photo[1]:.1f} dB)"
     elif not strange <= MOST_STRANGE:
         why = f"its colours are not those around the thing ({strange:.2f} away)"
+    elif not away <= MOST_AWAY:
+        why = f"what fills the holes lies {away:.1f} sides of a cell off the plane"
     return Verdict(
-        tally.views, tally.before, tally.after, tally.alike_db, photo[0], photo[1], strange, why
+        tally.views, tally.before, tally.after, tally.alike_db, *photo, strange, away, why
     )
 
 

@@ -5,8 +5,9 @@
 Labels come from true label maps of 24 views by evidence; 12 of them with their photos verify.  All
 other figures are of 8 views that nothing was made from: holes are pixels of the thing's mask with
 alpha below .5; "stood" is the PSNR there against the tracer without the thing, over all views;
-"rest" is how alike all other pixels stay, in the worst view.  "lifted" and "foreign" are stamps
-made wrong on purpose: copies 30 mm too high, and copies of the pipe: both have to be refused.
+"rest" is how alike all other pixels stay, in the worst view; "off_plane" is how far fills lie off
+the plane, in sides of a cell.  "lifted" and "foreign" are stamps made wrong on purpose: copies
+30 mm too high, and copies of the pipe: both have to be refused.
 """
 
 import argparse
@@ -58,7 +59,7 @@ VIEWS, VERIFYING, HELD_OUT = 24, 12, 8
 FIELDS = (
     "thing", "step", "anchors_copied", "anchors_dropped", "patches", "holes_before", "holes_after",
     "stood_before_db", "stood_after_db", "rest_db", "photo_before_db", "photo_after_db", "strange",
-    "cpu_s", "verdict",
+    "off_plane", "cpu_s", "verdict",
 )  # fmt: skip
 
 
@@ -130,7 +131,7 @@ def wrong_stamps(device, model, evidence, views: list, label: int) -> list:
     told = []
     for step, each in wrong.items():
         after = only_background(with_background_copies(apply_stamp(model, each), len(each.rows)))
-        cells = Cells(each.footprint, each.cell_m)
+        cells = Cells(each.footprint, each.cell_m, plane.normal)
         told.append((step, each, verify(device, before, after, label, views, STUDIO, cells)))
     return told
 
@@ -151,9 +152,9 @@ def save_sheet(path: Path):
 def told_of(verdict) -> list:
     """The verdict's own columns."""
     if verdict is None:
-        return ["", "", ""]
+        return [""] * 4
     return [f"{verdict.photo_before_db:.2f}", f"{verdict.photo_after_db:.2f}",
-            f"{verdict.strange:.3f}"]  # fmt: skip
+            f"{verdict.strange:.3f}", f"{verdict.away:.2f}"]  # fmt: skip
 
 
 def rows_of(device, names: list[str], sheets: Path | None):
@@ -186,7 +187,7 @@ def rows_of(device, names: list[str], sheets: Path | None):
     nothing = replace(model, labels=np.zeros(len(model.anchors), np.uint8))
     after, (told,) = complete(device, nothing, verifying, [LABELS["mug"]], evidence)
     added = len(after.anchors) - len(model.anchors)
-    yield ["nothing", "footprint", added, 0, 0, *[""] * 9, told.why]
+    yield ["nothing", "footprint", added, 0, 0, *[""] * 10, told.why]
 
 
 def main() -> None:
