@@ -13,15 +13,25 @@ from shapeshift.app.cli import COMMANDS, OPEN_ENDED, main
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs/tutorials"
-ORDER = ("photos.md", "thermal.md", "objects.md", "touch.md", "python.md")  # a later one uses earlier results
+ORDER = (
+    "photos.md",
+    "thermal.md",
+    "objects.md",
+    "touch.md",
+    "python.md",
+)  # a later one uses earlier results
 BLOCK = re.compile(
     r"^(?:Save this text as `(\S+)`.*?)?\n*```(sh|json|python)\n(.*?)^```", re.M | re.S
 )
 LEAVES = {
     "photos.md": ["out/first.shift", "out/first/0002_x1.000.png", "out/first_rgb.spz"],
     "thermal.md": ["out/thermal/0001_x0.250.png", "out/lens/0000_x0.000.png", "out/heat.spz"],
-    "objects.md": ["out/cut/workshop.scene.json", "out/cut/isolated/0001_x1.000.png",
-                   "out/cut/throw/00060.png", "out/lifted.png"],
+    "objects.md": [
+        "out/cut/workshop.scene.json",
+        "out/cut/isolated/0001_x1.000.png",
+        "out/cut/throw/00060.png",
+        "out/lifted.png",
+    ],
     "touch.md": ["out/mug/thermal.ply", "out/room/00090.png", "out/ready/room.scene.json"],
     "python.md": ["out/python/faded.spz", "out/python/touch.png", "out/python/trained.shift"],
 }
