@@ -27,6 +27,7 @@ LEAVES = {
     "08_film_frames.py": ["08_film/0000.png", "08_film/0003.png"],
     "09_edit_splats.py": ["09_faded.png", "09_wide.png", "09_both.png"],
     "10_full_speed.py": [],
+    "11_objects.py": ["11_room.scene.json", "11_without.png", "11_warm.png", "11_fallen.png"],
 }
 
 
