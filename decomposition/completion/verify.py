@@ -111,7 +111,7 @@ def verify(
         pair = [each.draw(view.labelled.view, view.labelled.x) for each in drawings]
         add_view(tally, view, mask, pair, background, cells, shadows)
         if cells is not None:
-            add_heights(tally, view.labelled, mask, pair, drawings[1], cells)
+            add_heights(tally, view.labelled, mask, pair[1], drawings[1], cells)
     return judge(tally)
 
 
@@ -158,13 +158,12 @@ def add_heights(
     tally: Tally,
     picture: LabelledView,
     mask: np.ndarray,
-    pair: list[np.ndarray],
+    picture_after: np.ndarray,
     after: ModelPictures,
     cells: Cells,
 ) -> None:
-    """How far from their plane the fills of one view lie: colours alone hardly show it."""
-    hole = mask & (pair[0][..., 3] < OPEN) & (pair[1][..., 3] >= OPEN)
-    filled = hole & shown_cells(picture.view, cells, 0.5)
+    """How far from their plane one view sees the cells: colours alone hardly show it."""
+    filled = mask & (picture_after[..., 3] >= OPEN) & shown_cells(picture.view, cells, 0.5)
     if not filled.any():
         return
     offset = float((cells.middles @ cells.normal).mean())
@@ -217,7 +216,15 @@ def judge(tally: Tally) -> Verdict:
     elif not away <= MOST_AWAY:
         why = f"what fills the holes lies {away:.1f} sides of a cell off the plane"
     return Verdict(
-        tally.views, tally.before, tally.after, tally.alike_db, *photo, strange, away, why
+        tally.views,
+        tally.before,
+        tally.after,
+        tally.alike_db,
+        photo[0],
+        photo[1],
+        strange,
+        away,
+        why,
     )
 
 
