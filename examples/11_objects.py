@@ -32,8 +32,7 @@ room.objects["mug"].at("Thermal").render(size=(480, 270)).save("out/11_warm.png"
 
 # 3. It has a body: from 20 cm above it falls back onto the bench.
 lifted = room.objects["mug"].move(by=(0, 0.2, 0))
-for step in ss.simulate(lifted, seconds=1.0):
-    pass
-fell = lifted.objects["mug"].pose.position[1] - step.scene.objects["mug"].pose.position[1]
+*_, last = ss.simulate(lifted, seconds=1.0)
+fell = lifted.objects["mug"].pose.position[1] - last.scene.objects["mug"].pose.position[1]
 print(f"the mug fell {100 * fell:.0f} cm")
-step.scene.render(size=(480, 270)).save("out/11_fallen.png")
+last.scene.render(size=(480, 270)).save("out/11_fallen.png")
