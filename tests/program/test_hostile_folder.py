@@ -117,6 +117,7 @@ HEAVY = [
     ("view", "a.ply", "--screenshot", "heavy/window.png", "--frames", "1"),
     ("vr", "--help"),  # without a runtime it only says so; tests/xr has one
     ("poses", "--help"),  # tests/decomposition/poses finds some
+    ("segment", "--help"),  # tests/app/decomposition cuts some
     (),
 ]  # fmt: skip
 
