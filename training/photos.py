@@ -8,7 +8,9 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import Memory, amount
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.depth_photo import load_depth
+from shapeshift.scene.captures.lens_resampling import LEAST_PHOTOS
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.pose import View
 
@@ -82,9 +84,12 @@ def memory_warnings(photos: tuple[Photo, ...], factor: int) -> list[str]:
     return [f"{why}: they are made {factor} times smaller; --memory GB allows more."] if why else []
 
 
-def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
-    """Load one photo, made smaller by `factor`; `masks` is that of TrainSettings."""
-    rgb, mask, lost = load_photo(photo, factor)
+def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> LoadedPhoto:
+    """Load one photo, made smaller by `factor`; `masks` is that of TrainSettings.
+
+    one_of_many: as in load_photo.
+    """
+    rgb, mask, lost = load_photo(photo, factor, one_of_many)
     alpha, weight = np.full(rgb.shape[:2], 255, np.uint8), None
     if mask is not None and (photo.mask is None or masks == "object"):
         alpha = mask
@@ -110,4 +115,12 @@ def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[L
     if mine and (why := memory_excess(mine, factor)):
         fits = choose_downscale(capture.photos)
         raise BadFile(f"{capture.folder}: {why}; --downscale {fits} fits, --memory GB allows more.")
-    return [read(photo, factor, masks) for photo in mine]
+    # Photos of one lens after each other: of the matrices one is kept.
+    of_lens: dict[ColmapCamera | None, list[int]] = {}
+    for i, photo in enumerate(mine):
+        of_lens.setdefault(photo.lens, []).append(i)
+    loaded: dict[int, LoadedPhoto] = {}
+    for lens, numbers in of_lens.items():
+        many = lens is not None and len(numbers) >= LEAST_PHOTOS
+        loaded |= {i: read(mine[i], factor, masks, many) for i in numbers}
+    return [loaded[i] for i in range(len(mine))]

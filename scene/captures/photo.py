@@ -14,6 +14,7 @@ from shapeshift.runtime_models.files.memory import GB, VARIABLE, Memory
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.lens_resampling import LARGEST, resampled
 from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27
@@ -56,7 +57,7 @@ class Pixels(NamedTuple):
     lost: np.ndarray | None  # (H, W) bool: what an undistorted photo does not show
 
 
-def load_photo(photo: Photo, factor: int = 1) -> Pixels:
+def load_photo(photo: Photo, factor: int = 1, one_of_many: bool = False) -> Pixels:
     """The photo with its sides divided by `factor`, each pixel the mean over the area it covers.
 
     What is less than a whole pixel at the right and at the bottom is cut off, as View.divided cuts
@@ -77,10 +78,10 @@ def load_photo(photo: Photo, factor: int = 1) -> Pixels:
                 f"{photo.mask}: the mask has {mask_size[0]}x{mask_size[1]} pixels, its photo "
                 f"{file_size[0]}x{file_size[1]}; make them the same size"
             )
-    image = smaller(image, file_size, photo.lens, factor)
+    image = smaller(image, file_size, photo.lens, factor, one_of_many)
     mask: np.ndarray | None = None
     if mask_image is not None:
-        mask = np.asarray(smaller(mask_image, file_size, photo.lens, factor))
+        mask = np.asarray(smaller(mask_image, file_size, photo.lens, factor, one_of_many))
     elif has_alpha:
         mask = np.asarray(image.getchannel("A"))
     gone = None
@@ -99,7 +100,11 @@ def over_black(image: Image.Image) -> Image.Image:
 
 
 def smaller(
-    image: Image.Image, file_size: tuple[int, int], lens: ColmapCamera | None, factor: int
+    image: Image.Image,
+    file_size: tuple[int, int],
+    lens: ColmapCamera | None,
+    factor: int,
+    one_of_many: bool = False,
 ) -> Image.Image:
     """The image with the sides of its file divided by `factor`, straight where a lens is given.
 
@@ -119,6 +124,8 @@ def smaller(
     # Twice as many pixels as are wanted, out of about as many: fewer would blur, more cost time.
     more = max(factor // done // 2, 1)
     image, twice = image.reduce(more), (2 * size[0], 2 * size[1])
+    if one_of_many and math.prod(size) <= LARGEST:
+        return resampled(image, lens, size, factor, done * more)
     return undistorted(image, lens, twice, factor / 2, done * more).reduce(2)
 
 

@@ -116,13 +116,14 @@ FORMULAS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("factor", [1, 2, 3, 7])
+@pytest.mark.parametrize("factor, least", [(1, 16), (2, 16), (2, 1), (3, 16), (3, 1), (7, 16)])
 @pytest.mark.parametrize("formula, keys, numbers, more", FORMULAS)
 def test_points_in_the_world_fall_where_the_view_says(
-    tmp_path, formula, keys, numbers, more, factor
+    tmp_path, monkeypatch, formula, keys, numbers, more, factor, least
 ):
     """White discs are drawn where the lens formula shows points; after reading they lie where the
-    pinhole of the photo's view shows them."""
+    pinhole of the photo's view shows them, by the mesh of one photo and by the matrix of many."""
+    monkeypatch.setattr("shapeshift.training.photos.LEAST_PHOTOS", least)
     size, rng = (800, 600), np.random.default_rng(0)
     points = np.column_stack([rng.uniform(-1.5, 1.5, (400, 2)), np.ones(400)])
     points *= rng.uniform(1, 5, (400, 1))
@@ -183,12 +184,54 @@ def bend_of_disc(formula, numbers, at, pinhole, sigma) -> np.ndarray:
 
 
 @every_bend
+@pytest.mark.parametrize("factor", [2, 3, 5])
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "L"])
+def test_the_matrix_of_many_photos_is_the_mean_of_four_samples(tmp_path, bend, factor, mode):
+    """By the lens's own formula to half a byte; the mesh of one photo, whose samples Pillow cuts
+    to bytes and places to 0.05 of its pixels, to a few."""
+    lens, picture = BENT[bend], smooth_picture(SIZE)
+    photo = photo_of(tmp_path, lens, picture)
+    picture = Image.open(photo.path).convert(mode)
+    picture.save(photo.path)
+    one, many = (load_photo(photo, factor, among) for among in (False, True))
+    known = ~one.lost
+    assert np.abs(one.rgb.astype(int) - many.rgb)[known].max() <= factor
+    np.testing.assert_array_equal(one.lost, many.lost)
+    if mode == "RGBA":
+        assert (many.mask[known] == 255).all()
+    more, straight = factor // 2, pinhole_of(lens)
+    read = np.asarray(picture.convert("RGB").reduce(more), float)
+    height, width = known.shape
+    x, y = np.meshgrid(*((np.arange(2 * side) + 0.5) * factor / 2 for side in (width, height)))
+    at = (np.stack([x.ravel(), y.ravel()], 1) - straight.centre) / straight.focal
+    want = bilinear(read, pixels_of(lens, at) / more)
+    want = want.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
+    compared = np.isfinite(want).all(axis=2) & known
+    assert compared.mean() > 0.25
+    assert np.abs(many.rgb - want)[compared].max() <= 0.501
+
+
+def test_photos_of_several_lenses_keep_their_order(tmp_path, monkeypatch):
+    monkeypatch.setattr("shapeshift.training.photos.LEAST_PHOTOS", 2)
+    lenses = [BENT["phone"], BENT["barrel"], BENT["phone"], BENT["pincushion"], BENT["barrel"]]
+    photos = []
+    for i, lens in enumerate(lenses):
+        (tmp_path / str(i)).mkdir()
+        pixels = np.full((SIZE[1], SIZE[0], 3), 40 * i, np.uint8)
+        photos.append(replace(photo_of(tmp_path / str(i), lens, pixels), split="train"))
+    capture = replace(read_capture_of(tmp_path), photos=tuple(photos))
+    read = load_photos(capture, "train", 2, "object")
+    assert [photo.name for photo in read] == [str(photo.path) for photo in photos]
+    assert [int(np.median(photo.rgba[..., 0])) for photo in read] == [0, 40, 80, 120, 160]
+
+
+@every_bend
 @pytest.mark.parametrize("factor", [1, 2, 3])
 def test_what_is_not_lost_is_whole_and_what_is_lost_does_not_count(tmp_path, bend, factor):
     """Of a white photo every pixel that counts is white: nothing from beyond its edges is in it."""
     lens = BENT[bend]
     photo = photo_of(tmp_path, lens, np.full((SIZE[1], SIZE[0], 3), 255, np.uint8))
-    rgb, _, gone = load_photo(photo, factor)
+    rgb, _, gone = load_photo(photo, factor, factor > 1)
     assert rgb.shape[:2] == gone.shape == photo.view.divided(factor).size[::-1]
     assert (rgb[~gone] == 255).all()
     barrel = bend in ("barrel", "brown", "field of view", "fisheye")
