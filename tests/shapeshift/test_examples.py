@@ -47,7 +47,12 @@ def test_every_example_is_known_and_told_of():
     assert all(f"`{path.name}`" in told for path in FOLDER.iterdir() if path.suffix != ".md")
 
 
-@pytest.mark.parametrize("name", LEAVES)
+LONG = {"11_objects.py"}  # half a minute of a core
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in LEAVES]
+)
 def test_it_runs_from_anywhere_and_leaves_what_it_says(name, tmp_path):
     done = started(FOLDER / name, tmp_path)
     assert done.returncode == 0, done.stderr[-2000:]

@@ -93,7 +93,7 @@ def test_resuming_equals_never_having_stopped(device, balls, tmp_path):
         assert same_bits(resumed.adam.state(), whole.adam.state()), stop
 
 
-@pytest.mark.parametrize("factor", [50.0, 400.0])
+@pytest.mark.parametrize("factor", [pytest.param(50.0, marks=pytest.mark.slow), 400.0])
 def test_the_guard_rescues_rates_that_are_too_high(device, balls, factor):
     """Each time it is turned back the rates are halved, and rise again over 200 steps."""
     trainer = Trainer(device, balls, replace(SETTINGS, iterations=750))
@@ -141,6 +141,7 @@ def test_the_package_draws_what_was_trained(trained, device, balls, tmp_path):
         assert 0 < score.alive <= model.splat_count and 0.5 < score.ssim < 1
 
 
+@pytest.mark.slow
 def test_growing_ends_higher(device, balls):
     settings = replace(SETTINGS, iterations=400)  # after 200 steps the new_anchors still cost
     few = replace(balls, points=balls.points[::40])  # of enough points a run starts at its cap

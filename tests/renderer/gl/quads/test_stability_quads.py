@@ -1,5 +1,7 @@
 """Every case of `launch.py stability` on a small scene with GL quads."""
 
+import gc
+
 import pytest
 
 from shapeshift.app.drawing import open_renderer
@@ -15,6 +17,7 @@ def reopen():
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_case_holds(ctx, name):
+    gc.freeze()  # "life" collects after every context, else what other tests left as well
     with Renderer(ctx, "quads") as renderer:
         case = make_case(renderer, ctx, reopen, random_layers(600, seed=3, layers=2))
         result = CASES[name](case)
