@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from shapeshift.app.command_line import POSITIONAL
+from shapeshift.app.command_line import POSITIONAL, Opt
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
+    from shapeshift.runtime_models.model import Model
     from shapeshift.scene.colliders.collider import Collider
-    from shapeshift.scene.document.scene_file import SceneFile
+    from shapeshift.scene.document.scene_file import SceneFile, SceneItem
 
 FOLDER = "colliders"  # beside the scene file that is written
 
@@ -27,6 +28,9 @@ class Options:
     """A scene file with objects whose collider is "hulls"."""
     out: Path
     """The scene file to write, which names the colliders in the folder "colliders" beside it."""
+    shape: Annotated[tuple[str, ...], Opt(metavar="[NAME=]SHAPE")] = ()
+    """One convex piece in place of up to 16, which costs the physics less: hull, box, cylinder,
+    sphere or capsule. Boxes and cylinders stand upright. NAME=SHAPE for one object."""
     overwrite: bool = False
     """Replace files that are there."""
 
@@ -41,19 +45,46 @@ def run(options: Options) -> int:
     file, models, _ = open_scene_file(options.scene, ReadingOptions())
     paths = paths_of(file, options.out)
     refuse(options, file, list(paths.values()))
+    shapes = shapes_of(options.shape, list(paths))
     made: dict[tuple, Path] = {}  # objects of one model at one x share a file
     for item in file.all_items:
         if item.collider != HULLS:
             continue
-        key = collider_key(item, models[item.name])
+        shape = shapes.get(item.name)
+        key = (*collider_key(item, models[item.name]), shape, *(item.wxyz if shape else ()))
         if key not in made:
             made[key] = paths[item.name]
-            written = write_one(make_one(file, item, models[item.name]), made[key])
+            written = write_one(make_one(file, item, models[item.name], shape), made[key])
             say(f"{item.name}: {written} in {full(made[key])}")
         file = naming(file, item.name, made[key])
     write_scene_file(file, options.out)
     say(f"{full(options.out)} names them.")
     return 0
+
+
+def shapes_of(asked: tuple[str, ...], names: list[str]) -> dict[str, str]:
+    """The shape of each object that is to have one; what is said by name counts before the rest.
+
+    names: of the objects whose colliders are made.  Raises UsageError.
+    """
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.colliders.primitives import SHAPES
+    from shapeshift.scene.document.scene_file import BACKGROUND
+
+    of_all: dict[str, str] = {}
+    of_one: dict[str, str] = {}
+    for text in asked:
+        name, separator, shape = text.rpartition("=")
+        if shape not in SHAPES:
+            raise UsageError(f"--shape is '{text}'; one of {', '.join(SHAPES)} is wanted.")
+        if not separator:
+            of_all = {n: shape for n in names if n != BACKGROUND}  # a room is hollow
+        elif name in names and name != BACKGROUND:
+            of_one[name] = shape
+        else:
+            known = ", ".join(n for n in names if n != BACKGROUND)
+            raise UsageError(f"--shape {text}: its object is none of {known or 'those made'}.")
+    return of_all | of_one
 
 
 def paths_of(file: "SceneFile", out: Path) -> dict[str, Path]:
@@ -87,13 +118,19 @@ def refuse(options: Options, file: "SceneFile", paths: list[Path]) -> None:
             raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
 
 
-def make_one(file: "SceneFile", item, model) -> "Collider":
+def make_one(file: "SceneFile", item: "SceneItem", model: "Model", shape: str | None) -> "Collider":
     from shapeshift.app.opening import PATIENCE_S, progress_after
-    from shapeshift.scene.colliders.collider import Making
+    from shapeshift.scene.colliders.collider import MOST_PARTS, Making
     from shapeshift.scene.colliders.collider_files import one_collider
+    from shapeshift.scene.colliders.primitives import UP, collider_of_shape
 
     with progress_after(PATIENCE_S) as progress:
-        return one_collider(file, item, model, Making(progress=progress))
+        most = 1 if shape else MOST_PARTS  # of a shape the mesh alone is asked
+        collider = one_collider(file, item, model, Making(most_parts=most, progress=progress))
+    if shape is None:
+        return collider
+    up_in_object = item.pose.matrix()[:3, :3].T @ UP
+    return collider_of_shape(collider.mesh, shape, up_in_object)
 
 
 def write_one(collider: "Collider", path: Path) -> str:

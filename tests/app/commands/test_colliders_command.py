@@ -50,6 +50,56 @@ def test_the_new_scene_names_what_was_made(scene, tmp_path, capsys):
         run(Options(out, tmp_path / "again.scene.json"))
 
 
+def test_shapes_of_objects_by_name_and_of_all(scene, tmp_path, capsys):
+    """A ball of radius r: each shape holds nearly all of it, and is as large as its formula."""
+    import numpy as np
+
+    out = tmp_path / "out" / "room.scene.json"
+    asked = ["colliders", str(scene), "--out", str(out), "--shape", "cylinder", "two=box"]
+    assert cli.main(asked) == 0
+    file = read_scene_file(out)
+    named = {item.name: item.collider for item in file.items}
+    assert named["one"] == named["a/b"] != named["two"] and named["seen"] is None
+    (cylinder,) = read_pieces(file.path(named["one"])).points
+    (box,) = read_pieces(file.path(named["two"])).points
+    assert len(box) == 8 and len(cylinder) == 48
+    height = np.ptp(box[:, 1])  # the same skin, the same axis
+    np.testing.assert_allclose(np.ptp(cylinder[:, 1]), height, rtol=1e-5)
+    across = cylinder[:, [0, 2]] - cylinder[:, [0, 2]].mean(axis=0)
+    np.testing.assert_allclose(np.linalg.norm(across, axis=1), height / 2, rtol=0.06)
+    assert capsys.readouterr().err.count("1 convex piece,") == 2
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("ring", "--shape is 'ring'; one of hull, box, cylinder, sphere, capsule is wanted."),
+        ("one=", "--shape is 'one='; one of hull"),
+        ("three=box", "--shape three=box: its object is none of one, two, a/b, a:b."),
+        ("seen=box", "its object is none of one, two"),
+    ],
+)
+def test_shapes_that_are_none_are_one_sentence(scene, tmp_path, capsys, asked, said):
+    out = tmp_path / "out" / "room.scene.json"
+    assert cli.main(["colliders", str(scene), "--out", str(out), "--shape", asked]) == 2
+    assert said in capsys.readouterr().err and not out.parent.exists()
+
+
+def test_an_upright_cylinder_stays_upright_of_a_turned_object(scene, tmp_path):
+    """Its frame is turned by a quarter about x: what is up in the world is its own z."""
+    import numpy as np
+
+    read = json.loads(scene.read_text())
+    read["objects"] = [read["objects"][0] | {"pose": {"wxyz": [0.5**0.5, 0.5**0.5, 0, 0]}}]
+    scene.write_text(json.dumps(read))
+    out = tmp_path / "out" / "room.scene.json"
+    assert cli.main(["colliders", str(scene), "--out", str(out), "--shape", "cylinder"]) == 0
+    file = read_scene_file(out)
+    (points,) = read_pieces(file.path(file.items[0].collider)).points
+    world = points @ file.items[0].pose.matrix()[:3, :3].T
+    assert len(np.unique(world[:, 1].round(4))) == 2
+
+
 def test_what_is_read_is_not_written(scene, tmp_path):
     with pytest.raises(UsageError, match="is read in this run"):
         run(Options(scene, scene, overwrite=True))
