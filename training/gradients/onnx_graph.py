@@ -39,7 +39,7 @@ class OnnxGraph:
         """The name of a stored tensor; of float32 where no other type is asked for."""
         from onnx import numpy_helper
 
-        array = np.asarray(value, kind)
+        array: np.ndarray = np.asarray(value, kind)
         name = self.new_name()
         self.constants[name] = numpy_helper.from_array(array, name)
         self.shapes[name] = array.shape

@@ -58,11 +58,7 @@ def divide(step: VjpStep) -> dict[int, str]:
 
 def power(step: VjpStep) -> dict[int, str]:
     """d(a^n) = n a^(n-1) da, for a stored exponent."""
-    exponent = step.constant(1)
-    if 1 in step.wanted or exponent is None:
-        raise step.refusal("with an exponent that is calculated")
-    graph = step.graph
-    n = np.asarray(exponent, np.float32)
+    graph, n = step.graph, step.stored(1).astype(np.float32)
     slope = graph.add_node("Pow", step.inputs[0], graph.add_constant(n - 1))
     slope = graph.add_node("Mul", graph.add_constant(n), slope)
     return broadcast(step, lambda: graph.add_node("Mul", step.gradient, slope))
@@ -87,7 +83,7 @@ def clip(step: VjpStep) -> dict[int, str]:
     """1 within the bounds, 0 beyond them."""
     graph, passed = step.graph, step.gradient
     for index, word, kind in ((1, "min", "Less"), (2, "max", "Greater")):
-        bound = step.constant(index, word)
+        bound = step.parameter(index, word)
         if bound is not None:
             outside = graph.add_node(kind, step.inputs[0], graph.add_constant(bound))
             passed = graph.add_node("Where", outside, graph.add_constant(0.0), passed)

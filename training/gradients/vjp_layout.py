@@ -47,7 +47,7 @@ def pad(step: VjpStep) -> dict[int, str]:
     """The part that the zeros (or another number) were put around."""
     if (mode := step.text("mode", "constant")) != "constant" or step.has(3):
         raise step.refusal(f"in the mode {mode!r}" if mode != "constant" else "along some axes")
-    pads = np.asarray(step.constant(1, "pads")).tolist()
+    pads = step.numbers(1, "pads") or []
     if min(pads) < 0:
         raise step.refusal("that cuts off")
     value = step.gradient
@@ -62,8 +62,7 @@ def gather(step: VjpStep) -> dict[int, str]:
     if 0 not in step.wanted:  # stored rows, picked by what the picture decides: no gradient
         return {}
     axis = step.attributes.get("axis", 0) % len(step.shape())
-    picked = step.constant(1)
-    rows = np.ravel(picked) % step.shape()[axis]
+    rows = np.ravel(step.stored(1)) % step.shape()[axis]
     shape = list(step.shape())
     shape[axis] = len(rows)
     return {0: picked_back(step, step.graph.reshape(step.gradient, shape), axis, rows)}
@@ -72,6 +71,8 @@ def gather(step: VjpStep) -> dict[int, str]:
 def picked_back(step: VjpStep, value: str, axis: int, rows: np.ndarray) -> str:
     """`value`, along an axis the given rows of the input, in zeros of the input's shape."""
     graph, shape = step.graph, step.shape()
+    if not len(rows):
+        raise step.refusal("that picks nothing")
     if len(rows) == 1 or (np.diff(rows) == 1).all():
         before = [0] * len(shape)
         before[axis] = int(rows[0])
@@ -82,31 +83,33 @@ def picked_back(step: VjpStep, value: str, axis: int, rows: np.ndarray) -> str:
         raise step.refusal("of so many rows")
     matrix = np.zeros((shape[axis], len(rows)), np.float32)
     matrix[rows, np.arange(len(rows))] = 1
-    before, after = math.prod(shape[:axis]), math.prod(shape[axis + 1 :])
-    flat = graph.reshape(value, (before, len(rows), after))
+    flat = graph.reshape(value, (math.prod(shape[:axis]), len(rows), math.prod(shape[axis + 1 :])))
     return graph.reshape(graph.add_node("MatMul", graph.add_constant(matrix), flat), shape)
 
 
 def slice_back(step: VjpStep) -> dict[int, str]:
-    starts, stops = (np.ravel(step.constant(i, w)) for i, w in ((1, "starts"), (2, "ends")))
-    axes, steps = step.constant(3, "axes"), step.constant(4, "steps")
-    axes = range(len(starts)) if axes is None else np.ravel(axes)
-    steps = [1] * len(starts) if steps is None else np.ravel(steps)
-    if len({int(axis) % len(step.shape()) for axis in axes}) != 1:
+    starts, stops = step.numbers(1, "starts") or [], step.numbers(2, "ends") or []
+    axes = step.numbers(3, "axes") or list(range(len(starts)))
+    steps = step.numbers(4, "steps") or [1] * len(starts)
+    if len(axes) != 1:
         return {0: several_slices_back(step, starts, stops, axes, steps)}
-    axis = int(axes[0]) % len(step.shape())
-    rows = np.arange(step.shape()[axis])[int(starts[0]) : bound(stops[0], steps[0]) : int(steps[0])]
+    axis = axes[0] % len(step.shape())
+    rows = np.arange(step.shape()[axis])[starts[0] : bound(stops[0], steps[0]) : steps[0]]
     return {0: picked_back(step, step.gradient, axis, rows)}
 
 
-def several_slices_back(step: VjpStep, starts, stops, axes, steps) -> str:
+def several_slices_back(
+    step: VjpStep, starts: list[int], stops: list[int], axes: list[int], steps: list[int]
+) -> str:
     """A slice along several axes at once, each in steps of 1."""
-    if any(int(s) != 1 for s in steps):
+    if any(s != 1 for s in steps):
         raise step.refusal("along several axes in steps other than 1")
     shape = step.shape()
     before, after = [0] * len(shape), [0] * len(shape)
     for axis, start, stop in zip(axes, starts, stops, strict=True):
-        rows = range(shape[axis])[int(start) : int(stop)]
+        rows = range(shape[axis])[start:stop]
+        if not rows:
+            raise step.refusal("that picks nothing")
         before[axis], after[axis] = rows[0], shape[axis] - rows[-1] - 1
     graph = step.graph
     return graph.add_node("Pad", step.gradient, graph.add_constant([*before, *after], np.int64))
@@ -114,16 +117,16 @@ def several_slices_back(step: VjpStep, starts, stops, axes, steps) -> str:
 
 def bound(stop: int, step: int) -> int | None:
     """An end as Python's slices have it: ONNX says a number below -size for `before the first`."""
-    return None if step < 0 and stop < -(1 << 30) else int(stop)
+    return None if step < 0 and stop < -(1 << 30) else stop
 
 
 def reduced_axes(step: VjpStep) -> list[int]:
     """What a reduction goes over."""
     rank = len(step.shape())
-    axes = step.constant(1, "axes")
-    if axes is None or not np.size(axes):
+    axes = step.numbers(1, "axes")
+    if not axes:
         return [] if step.attributes.get("noop_with_empty_axes") else list(range(rank))
-    return sorted(int(axis) % rank for axis in np.ravel(axes))
+    return sorted(axis % rank for axis in axes)
 
 
 def spread(step: VjpStep, value: str) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ class VjpStep:
     """A node, the gradients of its outputs, and which of its inputs want theirs."""
 
     graph: OnnxGraph
-    node: object  # onnx.NodeProto
+    node: Any  # onnx.NodeProto
     gradients: list[str | None]  # of each output; None: the loss does not depend on it
     wanted: frozenset[int]  # numbers of the inputs
 
@@ -52,16 +53,25 @@ class VjpStep:
     def output_shape(self) -> tuple[int, ...]:
         return self.graph.shape(self.node.output[0])
 
-    def constant(self, index: int, attribute: str = "") -> np.ndarray | None:
-        """A stored input, or the attribute that older versions have for it; None without both.
+    def stored(self, index: int) -> np.ndarray:
+        """An input that the file holds.  Raises BadFile where it is calculated."""
+        value = self.graph.constant(self.node.input[index]) if self.has(index) else None
+        if value is None:
+            raise self.refusal(f"whose input {index + 1} is calculated")
+        return value
 
-        Raises BadFile where the input is calculated.
+    def numbers(self, index: int, attribute: str) -> list[int] | None:
+        """A stored input of whole numbers, or the attribute that older versions have for it.
+
+        None without both.  Raises BadFile where the input is calculated.
         """
+        found = self.parameter(index, attribute)
+        return None if found is None else [int(n) for n in np.ravel(found)]
+
+    def parameter(self, index: int, attribute: str) -> np.ndarray | None:
+        """The same, of any numbers."""
         if self.has(index):
-            value = self.graph.constant(self.node.input[index])
-            if value is None:
-                raise self.refusal(f"whose input {index + 1} is calculated")
-            return value
+            return self.stored(index)
         found = self.attributes.get(attribute)
         return None if found is None else np.asarray(found)
 
