@@ -56,9 +56,10 @@ def export(
     out: its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, .usdz; .shift or a
     folder is our own package, which holds every x.  x: as of `Scene.at`.  sh_degree: 0 to 3, of the
     colours' spherical harmonics.  palette: thermal stops in their false colours.  only: what lies
-    in one of these regions (their x means nothing here).  object, label: that object alone.  eye:
-    (3,) metres, for scenes whose shape depends on it.  overwrite: replace an earlier file, never
-    what is read.  progress: called with (what, part 0..1).
+    in one of these regions (their x means nothing here).  object: that object of a scene file
+    alone.  label: what a labelled scene shows of that object alone, by its number or name; in a
+    package, its anchors.  eye: (3,) metres, for scenes whose shape depends on it.  overwrite:
+    replace an earlier file, never what is read.  progress: called with (what, part 0..1).
 
     Raises UsageError, BadFile; OSError where it cannot be written.
 
@@ -67,9 +68,9 @@ def export(
     """
     scene, out = opened(scene), plain(str(out))
     if is_folder(out) or out.suffix.lower() == PACKAGE:
-        if x is not None or only or object is not None or label is not None or eye is not None:
+        if x is not None or only or object is not None or eye is not None:
             raise UsageError("a package holds every x and every part; give out= another ending.")
-        return save(scene, out, overwrite)
+        return save(scene, out, overwrite, label)
     writer_of(out)  # before any work
     check_output(out, [scene.path] if scene.path and scene.path.exists() else [], overwrite, "")
     objects = tuple(scene.at(x).objects)
@@ -90,9 +91,13 @@ def export(
     return Exported(out, out.stat().st_size, len(splats.means), splats.findings)
 
 
-def save(scene: OpenedScene, path: PathText, overwrite: bool) -> Exported:
-    """What Scene.save does."""
+def save(
+    scene: OpenedScene, path: PathText, overwrite: bool, label: int | str | None = None
+) -> Exported:
+    """What Scene.save does; label: of the anchors of that object alone."""
+    from shapeshift.app.commands.exported import label_of
     from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.runtime_models.parts import labelled_anchors
 
     path = plain(str(path))
     subject = scene.subject
@@ -107,6 +112,9 @@ def save(scene: OpenedScene, path: PathText, overwrite: bool) -> Exported:
     check_output(path, [scene.path] if scene.path and scene.path.exists() else [], overwrite, "")
     model = scene.model
     assert isinstance(model, AnchorModel)
+    if label is not None:
+        name = subject.scene.objects[0].name
+        model = labelled_anchors(model, label_of(model, label, name))
     halves = np.array_equal(model.features.astype(np.float16), model.features)
     size = write_package(model, path, "float16" if halves else "float32")
     return Exported(path, size, model.splat_count)

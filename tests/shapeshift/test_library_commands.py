@@ -52,6 +52,27 @@ def test_a_package_is_saved_whole(demo, tmp_path):
     demo.save(saved.path, overwrite=True)
 
 
+def test_a_package_of_one_object_is_its_anchors(tmp_path):
+    from dataclasses import replace
+
+    from shapeshift.runtime_models.model import ObjectLabel
+    from tests.support.models import make_random_model
+
+    labels = np.uint8([0, 1, 0, 1, 1, 0])
+    model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
+    whole = ss.Scene.from_model(replace(model, labels=labels, objects=(ObjectLabel(1, "mug"),)))
+    for name, label in (("a", "mug"), ("b", 1)):
+        saved = whole.export(tmp_path / f"{name}.shift", label=label)
+        mug = ss.load(saved.path)
+        assert saved.splats == mug.splat_count == 6
+        np.testing.assert_array_equal(mug.model.anchors, model.anchors[labels == 1])
+    with pytest.raises(ss.UsageError, match="jug"):
+        whole.export(tmp_path / "c.shift", label="jug")
+    plain = ss.Scene.from_model(model)
+    with pytest.raises(ss.UsageError, match="label"):
+        plain.export(tmp_path / "d.shift", label=1)
+
+
 def test_comparing_a_scene_with_itself_and_with_another_stop(demo, tmp_path):
     same = demo.compare(demo, size=SMALL)
     assert len(same["views"]) == 8 and same["mean"]["psnr_db"] == "equal"
