@@ -43,6 +43,10 @@ COMMANDS = {
         "photos without poses, or a video, to a capture for train",
     ),
     "train": ("training.train", "posed photos of several modalities to a scene"),
+    "style": (
+        "training.style",
+        "put a new stop into a finished scene, all others as they were; or take one out",
+    ),
     "fit": (
         "training.fit",
         "the smallest scene that shows a capture as well as the largest, and why",

@@ -78,8 +78,10 @@ class Argument:
 
     @property
     def name(self) -> str:
-        """As it is typed, and as errors and help call it."""
-        name = self.field.name
+        """As it is typed, and as errors and help call it: from_, which Python lets no field be
+        called without a dash, is --from.
+        """
+        name = self.field.name.rstrip("_")
         return self.metavar if self.opt.positional else f"--{name.replace('_', '-')}"
 
     @property

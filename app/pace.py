@@ -21,8 +21,11 @@ def with_pace(model: AnchorModel) -> AnchorModel:
     """The model with the measured pace of its pairs of stops, a second or two of a core each; with
     that which it has, where it has one.
     """
-    if model.pace:
-        return model
+    return model if model.pace else with_every_pace(model)
+
+
+def with_every_pace(model: AnchorModel) -> AnchorModel:
+    """The model with its pace, and with that of every pair of stops that lacks one."""
     from shapeshift.app.opening import progress_after
     from shapeshift.renderer.pace import measure_pace
 

@@ -3,15 +3,27 @@
 import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK
-from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.model import AnchorFrames, BadFile
+from shapeshift.runtime_models.rotation import normalize
 
 FEATURES = ("float32", "float16", "uint8")  # kinds of storage
 STEPS = 255  # of a byte
+HALF_STEPS = 3  # halves of a unit quaternion change its length by less than 3 steps of the largest
 
 
 def range_of(name: str) -> str:
     """The array that holds the ends of the columns of another one that is stored as bytes."""
     return f"{name.removesuffix('s')}_range"
+
+
+def exact_kind(features: np.ndarray) -> str:
+    """The smallest of FEATURES as which features (A, F) are read again as they are."""
+    for kind in reversed(FEATURES):
+        found = encode_features(features, kind)
+        again = decode_features(found["features"], found.get("feature_range"), "features")
+        if np.array_equal(again, features):
+            return kind
+    return FEATURES[0]
 
 
 def encode_features(
@@ -60,3 +72,38 @@ def decode_features(
         rows = slice(start, start + BLOCK)
         out[rows] = low + codes[rows] * step
     return out
+
+
+def exact_frames(frames: AnchorFrames) -> dict[str, np.ndarray]:
+    """Arrays of the npz for anchors' frames, as halves where these are read as the same numbers."""
+    logs = np.log(frames.scales)
+    halves = logs.astype(np.float16)
+    kind = (
+        "float16" if np.array_equal(np.exp(halves.astype(np.float32)), frames.scales) else "float32"
+    )
+    turns = half_quaternions(frames.wxyz)
+    return {
+        "frame_log_scales": logs.astype(kind),
+        "frame_rotations": frames.wxyz if turns is None else turns,
+    }
+
+
+def half_quaternions(wxyz: np.ndarray) -> np.ndarray | None:
+    """(A, 4) float16 whose unit quaternions are exactly these (A, 4); None where there are none.
+
+    Halves are not of length 1, and what is read is divided by it, so the halves that were written
+    are looked for at lengths near 1: those at which the largest number is a half.
+    """
+    rows, found = np.arange(len(wxyz)), np.zeros(wxyz.shape, np.float16)
+    largest = np.abs(wxyz).argmax(axis=1)
+    halves = wxyz[rows, largest].astype(np.float16)
+    missing = np.ones(len(wxyz), bool)
+    for step in sorted(range(-HALF_STEPS, HALF_STEPS + 1), key=abs):
+        # Of one sign, neighbouring halves are neighbouring integers.
+        near = (halves.view(np.uint16) + np.uint16(step % 65536)).view(np.float16)
+        scale = near.astype(np.float64) / wxyz[rows, largest]
+        tried = (wxyz * scale[:, None]).astype(np.float16)
+        same = (normalize(tried.astype(np.float32)) == wxyz).all(axis=1) & missing
+        found[same] = tried[same]
+        missing &= ~same
+    return None if missing.any() else found

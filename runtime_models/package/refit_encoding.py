@@ -11,7 +11,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from shapeshift.runtime_models.model import AnchorModel, BadFile, ControlEncoding, Finding
+from shapeshift.runtime_models.model import (
+    AnchorModel,
+    BadFile,
+    ControlEncoding,
+    Finding,
+    Stop,
+)
 from shapeshift.runtime_models.stop_weights import StopBlend
 
 LEAST_GAP = 1 / 63  # of x between two stops; nearer ones would need more units than are allowed
@@ -59,12 +65,20 @@ def refit_encoding(model: AnchorModel) -> AnchorModel:
 
     Raises BadFile where x between the stops is not a blend of them, or two stops are too near.
     """
+    return place_stops(model, model.stops, [stop.name for stop in model.stops])
+
+
+def place_stops(model: AnchorModel, stops: tuple[Stop, ...], shown: list[str]) -> AnchorModel:
+    """The model with these stops instead of its own: each shows what its stop `shown` showed.
+
+    Of the pace, what is between two stops that stay is kept.  Raises BadFile as refit_encoding.
+    """
     if model.between_stops != "blend":
         raise BadFile("the networks of this scene know what lies between its stops; leave them so.")
-    xs = [stop.x for stop in model.stops]
-    encoding = encoding_for(xs)
-    was = np.stack([model.encoding.encode(x) for x in xs]).astype(np.float64)  # (S, d)
-    rows = solve_rows(encoding, model.blend)  # (d', S)
+    encoding = encoding_for([stop.x for stop in stops])
+    place = {stop.name: stop.x for stop in model.stops}
+    was = np.stack([model.encoding.encode(place[name]) for name in shown]).astype(np.float64)
+    rows = solve_rows(encoding, StopBlend(stops))  # (d', S)
     networks = {}
     for name, mlp in model.networks.items():
         if "control" not in mlp.inputs:
@@ -74,7 +88,9 @@ def refit_encoding(model: AnchorModel) -> AnchorModel:
         parts["control"] = parts["control"] @ was.T @ rows.T  # (hidden, S) (S, d')
         first = np.hstack([parts[part] for part in mlp.inputs]).astype(np.float32)
         networks[name] = replace(mlp, weights=(first, *mlp.weights[1:]))
-    return replace(model, networks=networks, encoding=encoding)
+    names = {stop.name for stop in stops}
+    pace = tuple(pace for pace in model.pace if {pace.start, pace.end} <= names)
+    return replace(model, networks=networks, encoding=encoding, stops=stops, pace=pace)
 
 
 def solve_rows(encoding: ControlEncoding, blend: StopBlend) -> np.ndarray:

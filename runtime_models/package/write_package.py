@@ -13,7 +13,11 @@ from shapeshift.runtime_models.files.npy import write_arrays
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Stop
-from shapeshift.runtime_models.package.feature_codes import encode_features
+from shapeshift.runtime_models.package.feature_codes import (
+    encode_features,
+    exact_frames,
+    exact_kind,
+)
 from shapeshift.runtime_models.package.package_files import (
     ANCHORS,
     FORMAT,
@@ -25,13 +29,15 @@ from shapeshift.runtime_models.package.package_files import (
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_onnx import write_onnx
 
+EXACT = "exact"  # a kind of storage besides FEATURES
 DATE = (1980, 1, 1, 0, 0, 0)  # of every zip entry: the same model gives the same bytes
 
 
 def write_package(model: AnchorModel, path: str | Path, features: str = "float16") -> int:
     """Write the package and return its bytes on disk.  Atomic: a reader sees all or nothing.
 
-    `path` ending in .shift is a zip, anything else a folder.  `features` is one of FEATURES.
+    `path` ending in .shift is a zip, anything else a folder.  `features` is one of FEATURES, or
+    EXACT: each table as the least that is read again as the numbers that it has.
     Raises BadFile rather than replace something that is not a package, or write one that
     read_package would refuse.
     """
@@ -52,8 +58,11 @@ def write_package(model: AnchorModel, path: str | Path, features: str = "float16
 def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
     """File name to content, the manifest first."""
     arrays = io.BytesIO()
-    tables = encode_features(model.features, features)
-    if model.frames is not None:
+    exact = features == EXACT
+    tables = encode_features(model.features, exact_kind(model.features) if exact else features)
+    if model.frames is not None and exact:
+        tables |= exact_frames(model.frames)
+    elif model.frames is not None:
         log_scales = np.log(model.frames.scales)
         tables |= encode_features(log_scales, features, "frame_log_scales")
         tables |= encode_features(model.frames.wxyz, features, "frame_rotations")

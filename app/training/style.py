@@ -1,0 +1,218 @@
+"""launch.py style: a new stop in a finished scene, all others as they were; or one out of it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from shapeshift.app.command_line import EXPERT, POSITIONAL, REGIONS, Opt
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.paths import full
+from shapeshift.app.program import program
+from shapeshift.app.terminal import say
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from shapeshift.runtime_models.model import AnchorModel
+    from shapeshift.training.styles.add_style import NewStyle
+
+INTERRUPTED = 130  # exit code
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Put a new stop into a finished scene: a shape by rule, a style of pictures, or both.
+
+    Every other stop stays as it was.  It takes seconds to two minutes and needs no photos.
+    """
+
+    scene: Annotated[Path, POSITIONAL]
+    """The package to start from; it is not changed."""
+    out: Path
+    """The package to write: NAME.shift or a folder."""
+    name: str = ""
+    """What the new stop is called.  Default: after its shape or its pictures."""
+    shape: Literal["", "fur", "blocks", "bubbles", "points", "melt", "explode", "strokes"] = ""
+    """What becomes of the splats, by a rule; a few seconds."""
+    network: Path | None = None
+    """An ONNX file of a feed-forward style network: it paints views of the scene, from which the
+    colours are learned."""
+    weights: Annotated[str, Opt(metavar="N=W,...")] = ""
+    """Which of the styles that the network knows, by numbers from 0, and how much of each: 3, or
+    3=0.5,12=0.5."""
+    image: Path | None = None
+    """A style picture, 16 to 4096 pixels a side, for a network that takes its code."""
+    encoder: Path | None = None
+    """The ONNX file that makes the code of --image for --network."""
+    pictures: Path | None = None
+    """A folder of pictures of the scene that any other program has painted, one for each of
+    --cameras, named as these or in their order."""
+    cameras: Path | None = None
+    """A file of cameras from which the scene is looked at.  Default: a dome of --views about it."""
+    from_: Annotated[str, Opt(metavar="STOP")] = ""
+    """The stop that the new one starts from.  Default: the first."""
+    after: Annotated[str, Opt(metavar="STOP")] = ""
+    """The stop that it comes after on the slider.  Default: the last."""
+    strength: float = 1.0
+    """How far from the stop that it starts from to the full style, 0 to 1."""
+    region: Annotated[tuple[str, ...], REGIONS] = ()
+    """Change only what lies here: sphere:x,y,z:radius box:x,y,z:hx,hy,hz half:x,y,z:nx,ny,nz,
+    label:NAME of an object, painted:FILE.scene.json.  Several add up.  Default: everything."""
+    keep: Annotated[tuple[str, ...], REGIONS] = ()
+    """Leave what lies here as it is, in the words of --region."""
+    remove: Annotated[str, Opt(metavar="STOP")] = ""
+    """Take this stop out instead, with all that it alone had."""
+    steps: int = 400
+    """Steps of training towards pictures, 1 to 100,000."""
+    sheet: Path | None = None
+    """A PNG to write: views of the stop that it starts from above those of the new one."""
+    seed: int = 0
+    """Seed of all random numbers: the same seed gives the same bytes."""
+    overwrite: bool = False
+    """Replace an earlier file of --out; never the scene that is read."""
+    views: Annotated[int, EXPERT] = 48
+    """How many views the dome has, 1 to 500."""
+    size: Annotated[int, EXPERT] = 384
+    """Pixels of the longer side of these views, 32 to 640."""
+    pace: Annotated[bool, EXPERT] = True
+    """Measure how fast the picture changes on the ways to the new stop, so that equal ways of the
+    slider are equal changes; --no-pace: leave that out."""
+    device: Annotated[Literal["cpu", "gpu"] | None, EXPERT] = None
+    """Kind of OpenCL device that must be used.  Default: the fastest that there is."""
+
+
+def run(options: Options) -> int:
+    from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.training.saving import check_writable
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
+    from shapeshift.training.styles.add_style import refuse_plain
+
+    check_options(options)
+    check_output(options.out, [options.scene], options.overwrite)
+    check_writable(options.out)
+    refuse_foreign(options.out)
+    model = refuse_plain(open_model(options.scene, options))
+    try:
+        return remove(options, model) if options.remove else add(options, model)
+    except KeyboardInterrupt:
+        say("Interrupted; nothing was written.  A style takes minutes at most and starts anew.")
+        return INTERRUPTED
+
+
+def check_options(options: Options) -> None:
+    """Raises UsageError for what does not go together."""
+    from shapeshift.app.errors import UsageError
+
+    asked = {
+        "--shape": options.shape, "--network": options.network, "--pictures": options.pictures,
+    }  # fmt: skip
+    given = [name for name, value in asked.items() if value]
+    if options.remove and (given or options.name):
+        raise UsageError(f"--remove takes a stop out; leave out {given[0] if given else '--name'}.")
+    if options.remove:
+        return
+    if not given:
+        raise UsageError(f"a new stop needs one of {', '.join(asked)}; --help says what they do.")
+    if options.network and options.pictures:
+        raise UsageError("--network and --pictures both paint the stop; leave one of them out.")
+    if options.pictures and not options.cameras:
+        raise UsageError("--pictures needs --cameras, the file that says where each was taken.")
+    if (options.image is None) != (options.encoder is None) or (
+        options.image and not options.network
+    ):
+        raise UsageError("--image, --encoder and --network go together; give all three, or none.")
+    if options.weights and not options.network:
+        raise UsageError("--weights are of a network's styles; add --network, or leave them out.")
+    if not (1 <= options.views <= 500 and 32 <= options.size <= 640):
+        raise UsageError(
+            f"--views is {options.views} and --size {options.size}; 1 to 500 and 32 to 640 are "
+            "wanted."
+        )
+
+
+def remove(options: Options, model: "AnchorModel") -> int:
+    """Takes a stop out of the scene."""
+    from dataclasses import replace
+
+    from shapeshift.runtime_models.stops.remove_stop import remove_stop
+    from shapeshift.training.styles.add_style import as_list
+
+    made = remove_stop(model, options.remove)
+    notes = [note for note in as_list(model.provenance.get("styles")) if note != options.remove]
+    provenance = {k: v for k, v in model.provenance.items() if k != "styles"}
+    made = replace(made, provenance=provenance | ({"styles": notes} if notes else {}))
+    finish(options, model, made)
+    return 0
+
+
+def add(options: Options, model: "AnchorModel") -> int:
+    """Puts a stop into the scene."""
+    from shapeshift.app.opening import progress_after
+    from shapeshift.app.training.style_region import anchors_inside
+    from shapeshift.app.training.style_sources import pictures_and_views
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.training.styles.add_style import add_style
+
+    style = style_of(options, model)
+    inside = anchors_inside(model, options.region, options.keep)
+    pictures, views = pictures_and_views(options, model)
+    device = None if pictures is None else open_device(options.device)
+    with progress_after(0.0) as progress:
+        made = add_style(device, model, style, pictures, views, inside, progress)
+    finish(options, model, made, style, inside)
+    return 0
+
+
+def style_of(options: Options, model: "AnchorModel") -> "NewStyle":
+    """What the options say of the new stop.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.style_sources import usual_name
+    from shapeshift.runtime_models.model import BadFile
+    from shapeshift.runtime_models.stops.insert_stop import insert_stop
+    from shapeshift.training.styles.add_style import NewStyle
+
+    names = {stop.name.casefold(): stop.name for stop in model.stops}
+    for option, value in (("--from", options.from_), ("--after", options.after)):
+        if value and value.casefold() not in names:
+            raise UsageError(f"{option} is '{value}'; the stops are {', '.join(names.values())}.")
+    name = options.name or usual_name(options)
+    source = names[options.from_.casefold()] if options.from_ else model.stops[0].name
+    after = names[options.after.casefold()] if options.after else None
+    try:
+        style = NewStyle(
+            name, source, after, options.shape, options.strength, options.seed, options.steps
+        )
+        insert_stop(model, name, source, after)  # what cannot be put in is refused now
+    except BadFile as error:
+        raise UsageError(f"--name {name}: {error}") from None
+    except ValueError as error:
+        raise UsageError(f"--{error}") from None
+    return style
+
+
+def finish(
+    options: Options, before: "AnchorModel", made: "AnchorModel", style: "NewStyle | None" = None,
+    inside: "np.ndarray | None" = None,
+) -> None:  # fmt: skip
+    """Measures the pace, writes the package, and says what there is and what moved."""
+    from shapeshift.app.pace import with_every_pace
+    from shapeshift.app.progress import working
+    from shapeshift.app.training.style_report import report, write_sheet
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.runtime_models.package.read_package import read_package
+    from shapeshift.runtime_models.package.write_package import EXACT, write_package
+    from shapeshift.training.styles.add_style import drift_db
+
+    if options.pace:
+        made = with_every_pace(made)
+    size = write_package(made, options.out, EXACT)
+    written = read_package(options.out)
+    with working("measuring what the other stops show"):
+        drift = drift_db(open_device(options.device), before, written)
+    for line in report(written, drift, style, inside):
+        say(line)
+    say(f"{full(options.out)}: {size:,} bytes.")
+    if options.sheet is not None and style is not None:
+        write_sheet(options.sheet, before, written, style, options.device)
+        say(f"{full(options.sheet)}: {style.source} above {style.name}.")
+    say(f"look: {program()} {full(options.out)}")

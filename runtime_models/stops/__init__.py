@@ -1,0 +1,1 @@
+"""Stops put into finished models, and taken out, without moving the others."""
