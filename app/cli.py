@@ -12,6 +12,7 @@ from shapeshift.app.terminal import clean_streams, drop_output, print_text, say
 COMMANDS = {
     "view": ("editor.desktop", "open a scene in a window"),
     "render": ("commands.render", "draw a scene into PNG files, no window needed"),
+    "film": ("film.film", "a flight through a scene that changes on the way, as a video"),
     "bench": ("commands.bench", "frame times and image error, no window needed"),
     "chart": ("charts.chart", "what each shortcut saves in time and costs in the picture"),
     "stability": (

@@ -84,6 +84,7 @@ LIGHT = [
     ("export", "a.ply", "--out", "light/a.spz"),
     ("compare", "a.ply", "b.ply", *SIZE),
     ("render", "a.ply", "--out", "light/pictures", *SIZE),
+    ("film", "a.ply", "--seconds", "0.1", "--out", "light/film.gif", *SIZE),
     ("simulate", "touch.scene.json", "--seconds", "0.1", "--out", "light/run"),
 ]  # fmt: skip
 

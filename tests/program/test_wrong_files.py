@@ -15,6 +15,8 @@ COMMANDS = {
     "info": ("info", "FILE"), "lint": ("lint", "FILE"), "bench": ("bench", "FILE"),
     "view": ("view", "FILE"), "chart": ("chart", "FILE"), "cameras": ("cameras", "FILE"),
     "render": ("render", "FILE", "--out", "OUT"),
+    "film": ("film", "FILE", "--out", "OUT"),
+    "path": ("film", "good.ply", "--cameras", "FILE", "--out", "OUT"),
     "export": ("export", "FILE", "--out", "OUT/a.ply"),
     "compare": ("compare", "good.ply", "FILE"),
     "camera": ("render", "good.ply", "--camera", "FILE", "--out", "OUT"),

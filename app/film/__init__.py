@@ -1,0 +1,1 @@
+"""Films of scenes: the command, its frames, what they become."""
