@@ -1,14 +1,12 @@
 """launch.py style: a new stop in a finished scene, all others as they were; or one out of it."""
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-from shapeshift.app.command_line import EXPERT, POSITIONAL, REGIONS, Opt
-from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.opening import open_model
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
+from shapeshift.app.training.style_options import Options
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,68 +15,6 @@ if TYPE_CHECKING:
     from shapeshift.training.styles.add_style import NewStyle
 
 INTERRUPTED = 130  # exit code
-
-
-@dataclass(frozen=True)
-class Options(ReadingOptions):
-    """Put a new stop into a finished scene: a shape by rule, a style of pictures, or both.
-
-    Every other stop stays as it was.  It takes seconds to two minutes and needs no photos.
-    """
-
-    scene: Annotated[Path, POSITIONAL]
-    """The package to start from; it is not changed."""
-    out: Path
-    """The package to write: NAME.shift or a folder."""
-    name: str = ""
-    """What the new stop is called.  Default: after its shape or its pictures."""
-    shape: Literal["", "fur", "blocks", "bubbles", "points", "melt", "explode", "strokes"] = ""
-    """What becomes of the splats, by a rule; a few seconds."""
-    network: Path | None = None
-    """An ONNX file of a feed-forward style network: it paints views of the scene, from which the
-    colours are learned."""
-    weights: Annotated[str, Opt(metavar="N=W,...")] = ""
-    """Which of the styles that the network knows, by numbers from 0, and how much of each: 3, or
-    3=0.5,12=0.5."""
-    image: Path | None = None
-    """A style picture, 16 to 4096 pixels a side, for a network that takes its code."""
-    encoder: Path | None = None
-    """The ONNX file that makes the code of --image for --network."""
-    pictures: Path | None = None
-    """A folder of pictures of the scene that any other program has painted, one for each of
-    --cameras, named as these or in their order."""
-    cameras: Path | None = None
-    """A file of cameras from which the scene is looked at.  Default: a dome of --views about it."""
-    from_: Annotated[str, Opt(metavar="STOP")] = ""
-    """The stop that the new one starts from.  Default: the first."""
-    after: Annotated[str, Opt(metavar="STOP")] = ""
-    """The stop that it comes after on the slider.  Default: the last."""
-    strength: float = 1.0
-    """How far from the stop that it starts from to the full style, 0 to 1."""
-    region: Annotated[tuple[str, ...], REGIONS] = ()
-    """Change only what lies here: sphere:x,y,z:radius box:x,y,z:hx,hy,hz half:x,y,z:nx,ny,nz,
-    label:NAME of an object, painted:FILE.scene.json.  Several add up.  Default: everything."""
-    keep: Annotated[tuple[str, ...], REGIONS] = ()
-    """Leave what lies here as it is, in the words of --region."""
-    remove: Annotated[str, Opt(metavar="STOP")] = ""
-    """Take this stop out instead, with all that it alone had."""
-    steps: int = 400
-    """Steps of training towards pictures, 1 to 100,000."""
-    sheet: Path | None = None
-    """A PNG to write: views of the stop that it starts from above those of the new one."""
-    seed: int = 0
-    """Seed of all random numbers: the same seed gives the same bytes."""
-    overwrite: bool = False
-    """Replace an earlier file of --out; never the scene that is read."""
-    views: Annotated[int, EXPERT] = 48
-    """How many views the dome has, 1 to 500."""
-    size: Annotated[int, EXPERT] = 384
-    """Pixels of the longer side of these views, 32 to 640."""
-    pace: Annotated[bool, EXPERT] = True
-    """Measure how fast the picture changes on the ways to the new stop, so that equal ways of the
-    slider are equal changes; --no-pace: leave that out."""
-    device: Annotated[Literal["cpu", "gpu"] | None, EXPERT] = None
-    """Kind of OpenCL device that must be used.  Default: the fastest that there is."""
 
 
 def run(options: Options) -> int:
@@ -137,8 +73,10 @@ def remove(options: Options, model: "AnchorModel") -> int:
     from shapeshift.runtime_models.stops.remove_stop import remove_stop
     from shapeshift.training.styles.add_style import as_list
 
-    made = remove_stop(model, options.remove)
-    notes = [note for note in as_list(model.provenance.get("styles")) if note != options.remove]
+    word = options.remove.casefold()
+    name = next((s.name for s in model.stops if s.name.casefold() == word), options.remove)
+    made = remove_stop(model, name)
+    notes = [note for note in as_list(model.provenance.get("styles")) if note != name]
     provenance = {k: v for k, v in model.provenance.items() if k != "styles"}
     made = replace(made, provenance=provenance | ({"styles": notes} if notes else {}))
     finish(options, model, made)

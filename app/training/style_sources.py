@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.errors import UsageError
+from shapeshift.app.training.style_options import Options
 from shapeshift.runtime_models.model import AnchorModel
 
 if TYPE_CHECKING:
-    from shapeshift.app.training.style import Options
     from shapeshift.scene.pose import View
     from shapeshift.training.styles.style_pictures import StylePictures
 
@@ -16,7 +16,7 @@ MOST_STYLES = 64  # of a blend
 NAMES = 24  # letters of a name that comes from a file's
 
 
-def usual_name(options: "Options") -> str:
+def usual_name(options: Options) -> str:
     """What a stop is called that was given no name."""
     file = options.image or options.network or options.pictures
     words = [options.shape.capitalize()] if options.shape else []
@@ -27,7 +27,7 @@ def usual_name(options: "Options") -> str:
 
 
 def pictures_and_views(
-    options: "Options", model: AnchorModel
+    options: Options, model: AnchorModel
 ) -> "tuple[StylePictures | None, list[View]]":
     """Who paints the stop, None where a shape alone is asked for, and the views that are painted.
 
@@ -48,7 +48,7 @@ def pictures_and_views(
     return network_of(options), views
 
 
-def read_cameras(options: "Options", path: Path):
+def read_cameras(options: Options, path: Path):
     """The CameraList of a file.  Raises BadFile, and UsageError for too many."""
     from shapeshift.app.camera_files import camera_reading
     from shapeshift.app.terminal import say
@@ -62,7 +62,7 @@ def read_cameras(options: "Options", path: Path):
     return cameras
 
 
-def network_of(options: "Options") -> "StylePictures":
+def network_of(options: Options) -> "StylePictures":
     """The network that --network names, with its style."""
     from shapeshift.training.styles.image_network import ImageNetwork, encode_style
     from shapeshift.training.styles.picture_files import read_picture

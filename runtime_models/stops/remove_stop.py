@@ -24,7 +24,21 @@ def remove_stop(model: AnchorModel, name: str) -> AnchorModel:
     stay = tuple(replace(stop, x=places[stop.name]) for stop in model.stops if stop.name != name)
     model = place_stops(model, stay, list(places))
     networks = {head: without_shut_units(model, head) for head in HEADS}
+    model = replace(model, networks=networks)
+    networks = {head: without_unread_control(model, head) for head in HEADS}
     return without_unread_features(replace(model, networks=networks))
+
+
+def without_unread_control(model: AnchorModel, head: str) -> Mlp:
+    """A network without x, where all that was left of its weights is 0: it had none before."""
+    mlp = model.networks[head]
+    if "control" not in mlp.inputs or len(mlp.inputs) == 1:
+        return mlp
+    parts = split_columns(model, head)
+    if parts.pop("control").any():
+        return mlp
+    first = np.hstack(list(parts.values())).astype(np.float32)
+    return replace(mlp, inputs=tuple(parts), weights=(first, *mlp.weights[1:]))
 
 
 def without_shut_units(model: AnchorModel, head: str) -> Mlp:

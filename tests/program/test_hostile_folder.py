@@ -107,6 +107,7 @@ HEAVY = [
     ("stability", "a.ply", "--out", "heavy/stability", "--cases", "counts", *SIZE),
     ("colliders", "hulls.scene.json", "--out", "heavy/made.scene.json"),  # CoACD, on its own
     ("eval", "light/a.shift", "capture"),
+    ("style", "light/a.shift", "--shape", "fur", "--out", "heavy/style.shift"),
     ("fit", "capture", "--out", "heavy/fit.shift", "--iterations", "2",
      "--final-iterations", "2", "--seeds", "2"),
     ("table", "capture", "--out", "heavy/table", "--iterations", "2",
@@ -133,7 +134,7 @@ def test_heavy_commands_do_neither(folder, capture, tmp_path, words, request):
     more = {}
     if words[:1] == ("view",):
         more = {"DISPLAY": request.getfixturevalue("display")}
-    if words[:1] == ("eval",):
+    if words[:1] in (("eval",), ("style",)):
         run(folder, tmp_path, ("train", "capture", "--out", "light/a.shift", "--iterations", "2"))
     run(folder, tmp_path, words, **more)
 

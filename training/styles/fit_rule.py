@@ -129,21 +129,31 @@ def raw_outputs(
         scales = scales / sizes
         inverse = np.repeat(model.frames.wxyz, k, axis=0) * [1, -1, -1, -1]
         wxyz = product(inverse, wxyz)
-    own = rotated_as(shown.wxyz, asked.wxyz)
     wxyz = np.where(wxyz[:, :1] < 0, -wxyz, wxyz)  # of two that turn alike, the same everywhere
-    turned = np.where(own[:, None], base["rotation"].reshape(-1, 4), wxyz)
     gain = {head: model.networks[head].gain for head in ("offset", "scale")}
     color = np.clip(asked.color.astype(np.float64), DARK, 1 - DARK)
-    opacity = np.arctanh(np.clip(asked.opacity.astype(np.float64), -FAR, FAR))
-    absent = (shown.opacity < 0) & (asked.opacity < 0)
     raw = {
         "offset": np.arctanh(np.clip(offset / gain["offset"], -FAR, FAR)),
         "scale": np.clip(np.log(np.maximum(scales / gain["scale"], 1e-9)), *SCALE_CLIP),
-        "rotation": turned,
-        "opacity": np.where(absent, base["opacity"].reshape(-1), opacity),
+        "rotation": wxyz,
+        "opacity": np.arctanh(np.clip(asked.opacity.astype(np.float64), -FAR, FAR)),
         "color": np.log(color / (1 - color)),
     }
-    return {head: table.reshape(count, -1) for head, table in raw.items()}
+    stays = {
+        "offset": asked.means == shown.means,
+        "scale": asked.scales == shown.scales,
+        "rotation": rotated_as(shown.wxyz, asked.wxyz)[:, None],
+        "opacity": (asked.opacity == shown.opacity) | ((asked.opacity < 0) & (shown.opacity < 0)),
+        "color": asked.color == shown.color,
+    }
+    return {
+        head: np.where(
+            np.broadcast_to(stays[head], raw[head].shape).reshape(count, -1),
+            base[head],
+            raw[head].reshape(count, -1),
+        )
+        for head in HEADS
+    }
 
 
 def rotated_as(one: np.ndarray, other: np.ndarray) -> np.ndarray:
