@@ -15,7 +15,7 @@ from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile
 from shapeshift.runtime_models.stops.insert_stop import NewUnits, add_units
 from shapeshift.training.export import ACTIVATION
 from shapeshift.training.heads.gaussians import SCALE_CLIP, Gaussians
-from shapeshift.training.heads.networks import HeadLayout, padded
+from shapeshift.training.heads.networks import HeadLayout, Layers, padded
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.settings import SHORT, check_numbers
 from shapeshift.training.step import TrainingStep
@@ -74,7 +74,7 @@ class StopTrainer:
         features[:, :known] = model.features
         fresh = rng.normal(size=(len(features), settings.features)) * FEATURE_SPREAD
         features[:, known : layout.features] = fresh
-        networks = {}
+        networks: dict[str, Layers] = {}
         for head, out in zip(HEADS, layout.outs, strict=True):
             inputs = len(layout.first_rows(head))
             first = rng.uniform(-1, 1, (settings.units, inputs)) / np.sqrt(inputs)
@@ -82,7 +82,7 @@ class StopTrainer:
             networks[head] = (first, bias, np.zeros((out, settings.units)), np.zeros(out))
         values = {"weights": layout.pack(networks), "anchors": model.anchors, "features": features}
         rates = parameter_rates(layout, SHORT, 1.0)
-        trained = {
+        trained: dict[str, Layers] = {
             head: tuple(
                 np.full(array.shape, head in settings.heads and part != 3)
                 for part, array in enumerate(arrays)
