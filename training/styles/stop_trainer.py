@@ -57,10 +57,9 @@ class StopTrainer:
         self.device, self.source, self.settings = device, model, settings
         self.stop, self.inside = stop, inside
         attributes = () if model.frames is None else ("frame",)
-        self.view_dependent = "direction" in model.networks["color"].inputs
         self.layout = HeadLayout(
             model.splats_per_anchor, model.features.shape[1] + settings.features, settings.units,
-            1, HEADS, self.view_dependent, attributes,
+            1, HEADS, False, attributes,
         )  # fmt: skip
         self.adam = Adam(device, *self.begin())
         self.step = StopStep(device, model, stop, self.layout, self.adam, inside)
@@ -105,11 +104,10 @@ class StopTrainer:
     def units(self) -> dict[str, NewUnits]:
         """What each trained head has learned."""
         arrays = self.layout.unpack(self.device.download(self.adam["weights"]))
-        found, wide = {}, self.layout.features
+        found = {}
         for head in self.settings.heads:
             first, bias, out, _ = arrays[head]
-            sees = "direction" in self.layout.parts_of(head)
-            found[head] = NewUnits(first[:, :wide], first[:, wide:] if sees else None, bias, out)
+            found[head] = NewUnits(first, bias, out)
         return found
 
     def finished(self) -> AnchorModel:
