@@ -3,8 +3,8 @@
 Two steps, both algebra on the weights.  `insert_stop` gives the stops new places; the new one shows
 what its source shows.  `add_units` puts hidden units beside those of the networks, which the new
 stop has alone: their control columns hold -gate at every old stop and 0 at the new one, so behind
-ReLU they are off there, whatever they have learned.  The gate is above what any anchor gives them
-from any side: no hope but a bound.  Blends of old stops stay shut, too, being weighted means.
+ReLU they are off there, whatever they have learned.  The gate is above what any anchor gives them:
+no hope but a bound.  Blends of old stops stay shut, too, being weighted means.
 """
 
 from dataclasses import dataclass, replace
@@ -39,11 +39,11 @@ class NewUnits:
     """What a stop adds to a network: M hidden units beside the old ones.
 
     Its outputs, before their activation, are those of the source stop
-    + out @ relu(feature @ features + direction @ direction + bias).
+    + out @ relu(feature @ features + bias).  They see no direction: what a style adds is the same
+    from everywhere (with it, strokes differ a tenth more between views, and fit no better).
     """
 
     feature: np.ndarray  # (M, F + E) weights of all features, old and new
-    direction: np.ndarray | None  # (M, 3), of a colour network that sees the eye
     bias: np.ndarray  # (M,)
     out: np.ndarray  # (k * size, M)
 
@@ -168,7 +168,7 @@ def widened(
     blocks = {
         "feature": feature,
         "control": -np.outer(gate, shut),
-        "direction": np.zeros((count, 3)) if units.direction is None else units.direction,
+        "direction": np.zeros((count, 3)),
     }
     first = np.vstack([mlp.weights[0], np.hstack([blocks[part] for part in mlp.inputs])])
     weights, biases = [first], [np.concatenate([mlp.biases[0], units.bias])]
@@ -204,12 +204,11 @@ def gates(
     units: NewUnits, model: AnchorModel, outside: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weights (M, F') of all features, those that shut the units outside among them, and (M,) gates
-    above the largest sum that any anchor gives a unit, whatever the direction to the eye.
+    above the largest sum that any anchor gives a unit.
     """
     weights = units.feature.astype(np.float64)
     known = model.features[:, : weights.shape[1]].astype(np.float64)
-    reach = 0.0 if units.direction is None else np.linalg.norm(units.direction, axis=1)
-    sums = known @ weights.T + units.bias + reach  # (A, M)
+    sums = known @ weights.T + units.bias  # (A, M)
     if outside is None:
         return weights, above(sums)
     weights = np.hstack([weights, -above(sums[outside])[:, None]])

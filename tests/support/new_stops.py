@@ -46,9 +46,6 @@ def wild_stop(
     wide = model.features.shape[1] + more
     units = {}
     for head in HEADS:
-        seen = rng.normal(size=(count, 3)) * 2 if head == "color" else None
         out = rng.normal(size=(made.networks[head].width_out, count))
-        units[head] = NewUnits(
-            rng.normal(size=(count, wide)) * 2, seen, rng.normal(size=count), out
-        )
+        units[head] = NewUnits(rng.normal(size=(count, wide)) * 2, rng.normal(size=count), out)
     return add_units(made, "Wild", rng.normal(size=(len(model.anchors), more)), units, inside)

@@ -49,10 +49,7 @@ def with_rule(
     """
     refuse_unusual(model)
     place = next(each.x for each in model.stops if each.name == stop)
-    layout = HeadLayout(
-        model.splats_per_anchor, control=1, fixed=HEADS,
-        view_dependent="direction" in model.networks["color"].inputs,
-    )  # fmt: skip
+    layout = HeadLayout(model.splats_per_anchor, control=1, fixed=HEADS, view_dependent=False)
     outputs = SourceOutputs(model, stop, layout)
     near = surroundings(model)
     wished = {head: np.zeros((len(model.anchors), outputs.at[head][1])) for head in HEADS}
@@ -183,12 +180,10 @@ def fitted(
         old, handed = copied[head], np.zeros((2 * more, known.shape[1]))
         handed[:, model.features.shape[1] :] = np.vstack([np.eye(more), -np.eye(more)])
         wide = np.hstack([old.feature, np.zeros((len(old.feature), more))])
-        both = NewUnits(
-            np.vstack([wide, handed]), None, np.concatenate([old.bias, np.zeros(2 * more)]),
-            np.zeros((0, 0)),
-        )  # fmt: skip
+        bias = np.concatenate([old.bias, np.zeros(2 * more)])
+        both = NewUnits(np.vstack([wide, handed]), bias, np.zeros((0, 0)))
         out = least_squares(hidden_values(both, known), wished[head], weights)
-        units[head] = NewUnits(both.feature, None, both.bias, out)
+        units[head] = NewUnits(both.feature, both.bias, out)
     return features, units
 
 
@@ -206,7 +201,7 @@ def copied_units(model: AnchorModel, head: str, place: float) -> NewUnits:
         opens = (model.features @ feature.T + bias).max(axis=0) > 0
         feature, bias = feature[opens], bias[opens]
     one = np.zeros((1, width))
-    return NewUnits(np.vstack([feature, one]), None, np.append(bias, 1.0), np.zeros((0, 0)))
+    return NewUnits(np.vstack([feature, one]), np.append(bias, 1.0), np.zeros((0, 0)))
 
 
 def hidden_values(units: NewUnits, features: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile
 from shapeshift.runtime_models.stops.insert_stop import NewUnits, add_units
 from shapeshift.training.export import ACTIVATION
 from shapeshift.training.heads.gaussians import SCALE_CLIP, Gaussians
-from shapeshift.training.heads.networks import HeadLayout, padded
+from shapeshift.training.heads.networks import HeadLayout, Layers, padded
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.settings import SHORT, check_numbers
 from shapeshift.training.step import TrainingStep
@@ -57,10 +57,9 @@ class StopTrainer:
         self.device, self.source, self.settings = device, model, settings
         self.stop, self.inside = stop, inside
         attributes = () if model.frames is None else ("frame",)
-        self.view_dependent = "direction" in model.networks["color"].inputs
         self.layout = HeadLayout(
             model.splats_per_anchor, model.features.shape[1] + settings.features, settings.units,
-            1, HEADS, self.view_dependent, attributes,
+            1, HEADS, False, attributes,
         )  # fmt: skip
         self.adam = Adam(device, *self.begin())
         self.step = StopStep(device, model, stop, self.layout, self.adam, inside)
@@ -74,7 +73,7 @@ class StopTrainer:
         features[:, :known] = model.features
         fresh = rng.normal(size=(len(features), settings.features)) * FEATURE_SPREAD
         features[:, known : layout.features] = fresh
-        networks = {}
+        networks: dict[str, Layers] = {}
         for head, out in zip(HEADS, layout.outs, strict=True):
             inputs = len(layout.first_rows(head))
             first = rng.uniform(-1, 1, (settings.units, inputs)) / np.sqrt(inputs)
@@ -82,7 +81,7 @@ class StopTrainer:
             networks[head] = (first, bias, np.zeros((out, settings.units)), np.zeros(out))
         values = {"weights": layout.pack(networks), "anchors": model.anchors, "features": features}
         rates = parameter_rates(layout, SHORT, 1.0)
-        trained = {
+        trained: dict[str, Layers] = {
             head: tuple(
                 np.full(array.shape, head in settings.heads and part != 3)
                 for part, array in enumerate(arrays)
@@ -105,11 +104,10 @@ class StopTrainer:
     def units(self) -> dict[str, NewUnits]:
         """What each trained head has learned."""
         arrays = self.layout.unpack(self.device.download(self.adam["weights"]))
-        found, wide = {}, self.layout.features
+        found = {}
         for head in self.settings.heads:
             first, bias, out, _ = arrays[head]
-            sees = "direction" in self.layout.parts_of(head)
-            found[head] = NewUnits(first[:, :wide], first[:, wide:] if sees else None, bias, out)
+            found[head] = NewUnits(first, bias, out)
         return found
 
     def finished(self) -> AnchorModel:

@@ -78,7 +78,7 @@ def look(trainer: StopTrainer, number: int, view: View, background: Color) -> St
     coverage = 1 - device.download(drawing.frame.transmittance)
     depth = device.download(drawing.depth_frame.metres) / np.maximum(coverage, 1e-6)
     if trainer.inside is not None:
-        coverage = region_coverage(trainer, drawing.splats, view)
+        coverage = region_coverage(trainer, trainer.inside, drawing.splats, view)
     return StyleView(number, view, picture, coverage, depth, picture)
 
 
@@ -94,10 +94,12 @@ def picture_of(device, drawing) -> np.ndarray:
     return np.ascontiguousarray(device.download(drawing.frame.image).transpose(1, 2, 0))
 
 
-def region_coverage(trainer: StopTrainer, splats: Gaussians, view: View) -> np.ndarray:
+def region_coverage(
+    trainer: StopTrainer, inside: np.ndarray, splats: Gaussians, view: View
+) -> np.ndarray:
     """(H, W) 0..1: how much of each pixel comes from splats that may change."""
     each = trainer.layout.splats * 3
-    white = np.repeat(trainer.inside.astype(np.float32), each).reshape(-1, 3)
+    white = np.repeat(inside.astype(np.float32), each).reshape(-1, 3)
     fields = splats.fields()[:4]
     marked = Gaussians(*fields, trainer.device.upload(white))
     drawing = draw_splats(trainer.device, marked, view, BLACK)

@@ -87,6 +87,15 @@ def test_blends_of_old_stops_stay_shut_too():
         assert_same(model, wild, way, way)
 
 
+def test_the_way_to_the_new_stop_leads_past_no_other():
+    """It shows what a scene shows that has none but these two."""
+    wild = wild_stop(framed_model())
+    two = remove_stop(remove_stop(wild, "Thermal"), "Opened")
+    for share in (0.05, 0.3, 0.7, 0.95):
+        way = StopWeights((("RGB", 1 - share), ("Wild", share)))
+        assert_same(wild, two, way, way, atol=5e-5)  # gates of some 100, in float32
+
+
 @pytest.mark.parametrize("inside", [1, 60, 119, 120])
 def test_outside_a_region_the_new_stop_is_its_source(inside, tmp_path):
     model = framed_model()
