@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 LINE_EVERY_S = 60.0
+PERIOD = "SHAPESHIFT_LINE_EVERY_S"  # in the environment: another one, for a program that reads them
 
 
 class Work(Protocol):
@@ -74,7 +75,7 @@ def lines(command: str) -> Iterator[None]:
     over, began = threading.Event(), time.monotonic()
 
     def report() -> None:
-        while not over.wait(LINE_EVERY_S):
+        while not over.wait(line_period_s()):
             words = next(filter(None, (work.words() for work in reversed(_under_way))), "at work")
             minutes = (time.monotonic() - began) / 60
             try:
@@ -89,6 +90,15 @@ def lines(command: str) -> Iterator[None]:
     finally:
         over.set()
         thread.join()
+
+
+def line_period_s() -> float:
+    """Seconds from one line to the next."""
+    try:
+        period = float(os.environ.get(PERIOD, ""))
+    except ValueError:
+        return LINE_EVERY_S
+    return period if 0.01 <= period <= LINE_EVERY_S else LINE_EVERY_S
 
 
 def is_terminal(stream) -> bool:

@@ -202,7 +202,7 @@ class SplatLayers:
         """What a control means."""
         return StopBlend(self.stops)
 
-    def with_rows(self, rows: np.ndarray) -> "SplatLayers":
+    def with_rows(self, rows: np.ndarray | slice) -> "SplatLayers":
         """These splats alone, in their order."""
         return replace(
             self,

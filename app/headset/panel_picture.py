@@ -9,6 +9,7 @@ from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import Box, clean_texts, listing_items
+from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.vr.panel.plane import PanelPlane, Pointing
 
@@ -46,6 +47,7 @@ class PanelPicture:
             io.display_framebuffer_scale = imgui.ImVec2(density, density)
             theme.apply(UI_SCALE, density, keys=False)
             self._renderer = ModernGLRenderer(wnd=None, ctx=ctx, display_size=PANEL.size)
+        self.textures = Textures(ctx, self._renderer)
 
     @contextmanager
     def _current(self) -> Iterator[None]:
@@ -95,6 +97,7 @@ class PanelPicture:
             io.add_mouse_wheel_event(0.0, notches)
 
     def release(self) -> None:
+        self.textures.release()
         with self._current():
             self._renderer.shutdown()
         imgui.destroy_context(self._context)

@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 from shapeshift.app.editor.panels.messages_panel import draw_note
 from shapeshift.app.editor.panels.panel import Section, draw_sections
 from shapeshift.app.editor.panels.scale_bar import has_scale
+from shapeshift.app.editor.panels.sections.gallery_panel import draw_gallery
 from shapeshift.app.editor.panels.sections.look_panel import draw_look
 from shapeshift.app.editor.panels.sections.objects_panel import draw_object_list
 from shapeshift.app.editor.panels.sections.parts_panel import draw_parts
@@ -16,6 +17,7 @@ from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.panels.slider import track_ends
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.arrange import steer_by_hand
+from shapeshift.app.editor.state.film.gallery import Gallery
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.track import ON_STOP, shown_stop
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
@@ -63,6 +65,7 @@ class WristMenu:
         self._held: dict[str, str | None] = {}
         room = RoomActions(self._recentre, self._resize, lambda: actions.leave("from the panel"))
         self._foot = Foot(room)
+        self.gallery = Gallery(state.editor)
         self._sections = self._make_sections(room)
         self._key: tuple = ()  # what the picture was drawn of
         self._unsettled = 0
@@ -87,6 +90,7 @@ class WristMenu:
             ),
             Section("Touch", lambda scale: draw_touch(state.touch, scale, False), open_first=True),
             Section("Stops", lambda scale: draw_stops(editor, scale)),
+            Section("Gallery", self._draw_gallery, shown=lambda: bool(editor.movable)),
             Section("Look", lambda scale: draw_look(editor, scale)),
             Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
@@ -97,6 +101,7 @@ class WristMenu:
         """What hands do to the panel; the frame with what it leaves of them."""
         self._frame, self._seconds = frame, seconds
         self._follow_hands()
+        self.gallery.each_frame()
         carried = self.carried = carry(self.carried, frame, seconds)
         if carried.open:
             notches = self._push_sticks(frame, seconds)
@@ -158,7 +163,7 @@ class WristMenu:
             tuple(state.touch.reactions), editor.shown_scene.show, editor.shown_scene.lit is None,
             state.parts.on, state.parts.count, state.parts.factor,
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
-            self._foot.sure_s > 0, editor.messages.note,
+            self._foot.sure_s > 0, editor.messages.note, self.gallery.shown,
             state.figures if self._figures_seen else None,
         )  # fmt: skip
 
@@ -182,6 +187,9 @@ class WristMenu:
             imgui.push_style_color(imgui.Col_.window_bg, imgui.ImVec4(*theme.RAISED, 1))
             draw_note(note, Vec(width / 2, height / 2), 0.94 * width)
             imgui.pop_style_color()
+
+    def _draw_gallery(self, scale: float) -> None:
+        draw_gallery(self.gallery, self.picture.textures, scale)
 
     def _draw_figures(self, _: float) -> None:
         self._figures_seen = True

@@ -198,6 +198,7 @@ class HistoryStep:
     together: str = ""  # edits in a row with the same word are one step: a drag
     regions: tuple = ()  # edited apart from the file, until it is saved
     bytes: int = 0  # that this step alone keeps
+    film: object = None  # the keys of a film, edited apart from the file, too
 
 
 @dataclass(frozen=True)
@@ -228,28 +229,37 @@ class History:
     def redoes(self) -> str:
         return self.steps[self.at + 1].what if self.at + 1 < len(self.steps) else ""
 
+    @property
+    def film(self) -> object:
+        return self.steps[self.at].film
+
     def record(
         self, file: SceneFile, what: str, together: str = "", regions: tuple | None = None,
-        more_bytes: int = 0,
+        more_bytes: int = 0, film: object = None,
     ) -> "History":  # fmt: skip
-        """After another edit of the file or of the regions; what had been undone is forgotten."""
+        """After another edit of the file, the regions or a film; what was undone is forgotten."""
         regions = self.regions if regions is None else regions
-        if file is self.file and regions == self.regions:
+        film = self.film if film is None else film
+        if file is self.file and regions == self.regions and film == self.film:
             return self
         now = self.steps[self.at]
         keep = self.at if together and now.together == together else self.at + 1
-        steps = (*self.steps[:keep], HistoryStep(file, what, together, regions, more_bytes))
+        step = HistoryStep(file, what, together, regions, more_bytes, film)
+        steps = (*self.steps[:keep], step)
         steps = steps[-MOST_STEPS - 1 :]
         while len(steps) > 2 and sum(step.bytes for step in steps) > MOST_BYTES:
             steps = steps[1:]
         return History(steps, len(steps) - 1)
 
-    def amend(self, file: SceneFile, regions: tuple | None = None) -> "History":
+    def amend(
+        self, file: SceneFile, regions: tuple | None = None, film: object = None
+    ) -> "History":
         """What holds now is another, but no edit of its own: a slider has moved."""
         regions = self.regions if regions is None else regions
-        if file is self.file and regions == self.regions:
+        film = self.film if film is None else film
+        if file is self.file and regions == self.regions and film == self.film:
             return self
-        now = replace(self.steps[self.at], file=file, regions=regions)
+        now = replace(self.steps[self.at], file=file, regions=regions, film=film)
         return replace(self, steps=(*self.steps[: self.at], now, *self.steps[self.at + 1 :]))
 
     def rest(self) -> "History":

@@ -17,6 +17,7 @@ KEY = re.compile(
     r"\s*(?P<word>\S.*?)@(?P<at>[0-9]{1,9}(?:\.[0-9]*)?|\.[0-9]+)(?P<unit>s|%|)(?=\s|$)"
 )
 MOST_KEYS = 1000
+REST = 0.25  # of the time of a way: how long a slide stands at its ends
 SECONDS, PERCENT = "s", "%"
 
 
@@ -48,6 +49,32 @@ class StylePath:
                 beta = ease((at - start.at) / (end.at - start.at))
                 return self.blend.between(start.control, end.control, beta)
         return self.keys[-1].control
+
+
+@dataclass
+class AutoSlide:
+    """A style path that is walked again and again, there and back, as long as somebody looks."""
+
+    path: StylePath
+    period_s: float  # of a round
+    seconds: float = 0.0  # since it began
+
+    @staticmethod
+    def between(start: Control, end: Control, blend: StopBlend, leg_s: float) -> "AutoSlide":
+        """From one control to another in `leg_s` seconds, a rest, and the same way back."""
+        rest_s = REST * leg_s
+        times = (0.0, leg_s, leg_s + rest_s, 2 * leg_s + rest_s)
+        keys = (StyleKey(c, t) for c, t in zip((start, end, end, start), times, strict=True))
+        return AutoSlide(StylePath(tuple(keys), blend), 2 * (leg_s + rest_s))
+
+    @property
+    def control(self) -> Control:
+        return self.path.control(self.seconds % self.period_s)
+
+    @property
+    def over(self) -> bool:
+        """It goes on until a hand takes over."""
+        return False
 
 
 @dataclass(frozen=True)

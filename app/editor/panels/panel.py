@@ -13,8 +13,8 @@ from shapeshift.app.editor.state.layout import Layout
 Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.
 ORDER = (
-    "Scale", "Room", "Touch", "Stops", "Look", "Camera", "Objects", "Parts", "Regions",
-    "Export", "Performance",
+    "Scale", "Room", "Touch", "Stops", "Look", "Gallery", "Camera", "Film", "Objects", "Parts",
+    "Regions", "Export", "Performance",
 )  # fmt: skip
 
 
@@ -65,11 +65,22 @@ def draw_panel(
     _title(title, actions, ui_scale)
     for draw in top:
         draw(ui_scale)
-    draw_sections(sections, ui_scale)
+    _scrolling(sections, low, ui_scale)
     _foot(actions, ui_scale)
     box = theme.window_box()
     imgui.end()
     return box
+
+
+def _scrolling(sections: list[Section], low: float, ui_scale: float) -> None:
+    """The sections, which scroll where they reach below `low`: the foot stays in sight."""
+    style = imgui.get_style()
+    foot = imgui.get_frame_height() + 2 * style.item_spacing.y + 2 + style.window_padding.y
+    room = low - imgui.get_cursor_screen_pos().y - foot
+    imgui.set_next_window_size_constraints(Vec(0, 0), Vec(float("inf"), max(room, 1.0)))
+    imgui.begin_child("##sections", Vec(0, 0), imgui.ChildFlags_.auto_resize_y)
+    draw_sections(sections, ui_scale)
+    imgui.end_child()
 
 
 def draw_sections(sections: list[Section], ui_scale: float) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.film.timeline import FilmKeys
 from shapeshift.app.editor.state.track import next_stop, stepped
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_weights import Control
@@ -52,6 +53,8 @@ def go_back(state: EditorState, history: History) -> None:
     """Goes to a step that has been before, with every x as it is now."""
     now = state.edited.history
     turn_to(state, history.amend(edits.with_x_of(history.file, now.file)))
+    if isinstance(history.film, FilmKeys) and history.film != state.timeline.keys:
+        state.timeline.restore(history.film)
     if history.regions != now.regions:
         state.regions.restore(history.regions)
         for index, obj in enumerate(state.scene.objects):

@@ -13,6 +13,7 @@ from shapeshift.app.editor.state.bodies import Bodies
 from shapeshift.app.editor.state.camera.first_look import FirstLook
 from shapeshift.app.editor.state.files.edited_file import EditedFile, edited_from_scene
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.film.timeline import Timeline
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.regions import Regions
 from shapeshift.app.editor.state.scene_objects import origin_of, scene_of, stood_as, with_palette
@@ -30,6 +31,7 @@ from shapeshift.scene.cameras.framing import (
 from shapeshift.scene.control import SHIFT_S, Shift, Sweep
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import SceneItem, named_stops
+from shapeshift.scene.film.style_path import AutoSlide
 from shapeshift.scene.pick import Hit, Picker
 from shapeshift.scene.pose import Pose, View, perspective
 from shapeshift.scene.scene import Scene, SceneObject
@@ -60,7 +62,9 @@ class EditorState:
         self.split = SplitState()
         self.first_look = FirstLook()
         self.sweeps: list[Sweep] = []
-        self.shifts: dict[int, Shift] = {}  # of objects on their way to a stop, by their index
+        # Of objects on their way to a stop, or there and back by themselves, by their index:
+        self.shifts: dict[int, Shift | AutoSlide] = {}
+        self.timeline = Timeline()  # of the film that is made here
         self.settings = RenderSettings(background=DARK)
         self.palette = AS_FILED
         self.regions = Regions()
@@ -96,6 +100,7 @@ class EditorState:
     def show(self, scene: Scene, edited: EditedFile | None = None) -> None:
         """Takes a scene over and frames it."""
         self.scene, self.chosen, self.shifts = scene, "", {}
+        self.timeline.forget()
         self.split.on, self.split.name = False, ""
         self.edited = edited or edited_from_scene(scene, self.sources)
         self.bodies.forget()
@@ -116,11 +121,13 @@ class EditorState:
     def keep_regions(self) -> None:
         """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
         self.edited.amend_regions(self.regions)
+        self.edited.record_film(self.timeline)
         self.edited.saved_regions = self.regions.kept
 
     def record_regions(self) -> None:
-        """What was done to the regions since the last call is a step of the history."""
+        """What was done to the regions and the film since the last call is a step of history."""
         self.edited.record_regions(self.regions)
+        self.edited.record_film(self.timeline)
 
     def reframe(self) -> None:
         """Where the middle of all is now, and how far it reaches."""
@@ -347,7 +354,8 @@ class EditorState:
 
     @property
     def playing(self) -> bool:
-        return bool(self.shifts) or any(sweep.playing for sweep in self.sweeps)
+        sweeping = any(sweep.playing for sweep in self.sweeps)
+        return bool(self.shifts) or sweeping or self.timeline.playing
 
     def advance(self, seconds: float) -> None:
         """Lets playing sweeps and shifts go on; a slider moved by hand meanwhile is where a sweep

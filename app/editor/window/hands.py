@@ -57,7 +57,7 @@ class InputActions:
                 self.press_key(event)
             case Press() | Drag() | Release() if self.works_on_regions(event):
                 pass
-            case Drag() if viewpoint.steps.at_camera:
+            case Drag() if viewpoint.steps.at_camera or viewpoint.flown is not None:
                 viewpoint.leave_camera()
                 self.handle_event(event)
             case Drag(button="middle") | Drag(button="right") if self.pans(event):

@@ -33,6 +33,7 @@ from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.adding import Adding
 from shapeshift.app.editor.window.files import Files, OpenActions
+from shapeshift.app.editor.window.film.films import attach_films
 from shapeshift.app.editor.window.gizmo import Gizmo
 from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
@@ -92,6 +93,8 @@ class Viewer:
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
+        films = folders.pictures.parent / "films"
+        self.films = attach_films(window, state, self.viewpoint, self.hooks, films)
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
         self._add_sections()

@@ -13,6 +13,7 @@ from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
+from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.app.editor.state.user.settings import default_text_size
 from shapeshift.app.editor.window.monitor import grow_window, monitor_height
 from shapeshift.app.paths import plain
@@ -120,6 +121,7 @@ class Window:
         theme.apply(self.ui_scale, self._window.pixel_ratio)
         self._restyle = False  # the next frame's type has another size
         self._overlay = ModernGLRenderer(wnd=None, ctx=self.ctx, display_size=self.logical_size)
+        self.textures = Textures(self.ctx, self._overlay)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
         self.popup_open = False  # a list or a box is open, and the next click is for it
         self._raw: list[Event] = []

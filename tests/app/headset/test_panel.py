@@ -1,5 +1,6 @@
 """The headset's panel: ImGui in a texture, pointed at with a ray.  What each item does."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -215,10 +216,11 @@ def test_sections_of_the_desktop_do_here_what_they_do_there(wearer):
     assert wearer.x("lamp") == 1.0
     wearer.press("Stops")
     wearer.unfold("Objects")
-    wearer.press("seen")  # of the first object
-    assert not wearer.editor.scene.objects[0].visible
-    assert not wearer.state.world.objects["table"].drawn.visible, "the world has heard of it"
     wearer.scroll()
+    before = {obj.name for obj in wearer.editor.scene.objects if obj.visible}
+    wearer.press("seen")  # of the first object in sight
+    (hidden,) = before - {obj.name for obj in wearer.editor.scene.objects if obj.visible}
+    assert not wearer.state.world.objects[hidden].drawn.visible, "the world has heard of it"
     wearer.press("leg")
     assert wearer.shown == "leg"
     wearer.scroll(1.0)
@@ -289,3 +291,36 @@ def test_few_and_many_stops_and_letters_that_the_font_has_not(picture, stops):
     for label, box in picture.boxes.items():
         left, top, right, low = box
         assert 0 <= left < right <= PANEL.size[0] and 0 <= top < low <= PANEL.size[1], label
+
+
+def test_the_gallery_is_the_desktop_s(cube):
+    """Two stops are picked with the ray, slid between and left to slide; pictures come by a thread
+    of their own.
+    """
+    gallery = cube.menu.gallery
+    cube.unfold("Gallery")
+    end = time.monotonic() + 30
+    while len(gallery.thumbnails.pictures) < 4 and time.monotonic() < end:
+        cube.act()
+        time.sleep(0.01)
+    assert len(gallery.thumbnails.pictures) == 4
+    cube.wait()
+    cube.press("ice")
+    cube.press("fire")
+    assert gallery.picked == ("ice", "fire") and cube.x("cube") == 0.5
+    cube.scroll()
+    left, top, right, low = cube.menu.picture.boxes["way"]
+    middle = ((left + right) / 2, (top + low) / 2)
+    for trigger in (0.0, 1.0, 1.0, 0.0):
+        cube.point(middle, trigger)
+    assert gallery.part == pytest.approx(0.5, abs=0.03)
+    weights = cube.editor.scene.objects[0].model.blend.weights(cube.editor.scene.objects[0].x)
+    np.testing.assert_allclose(weights, [0, 0.5, 0.5, 0], atol=0.03)
+    cube.press("Slide")
+    assert gallery.sliding
+    before = cube.editor.scene.objects[0].x
+    cube.wait(40)
+    assert cube.editor.scene.objects[0].x != before
+    cube.press("Stop")
+    assert not gallery.sliding
+    gallery.thumbnails.close()

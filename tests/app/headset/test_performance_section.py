@@ -51,7 +51,9 @@ def test_the_panel_is_drawn_for_figures_only_while_they_are_in_sight(wearer, mon
     wearer.state.figures = FIGURES
     wearer.wait(SETTLED)
     assert not drawn, "the section is folded at first"
-    wearer.unfold("Performance")
+    wearer.unfold()
+    wearer.scroll()
+    wearer.press("Performance")
     wearer.scroll()
     wearer.wait(2 * SETTLED)
     drawn.clear()

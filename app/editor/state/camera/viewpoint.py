@@ -13,7 +13,7 @@ from shapeshift.app.editor.state.camera.camera import (
     fov_y_of,
 )
 from shapeshift.app.editor.state.camera.kept_views import KeptViews
-from shapeshift.app.editor.state.camera.stepping import Steps
+from shapeshift.app.editor.state.camera.stepping import Steps, fitted
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import CameraList, moved
@@ -39,6 +39,7 @@ class Viewpoint:
         self.camera = self._first_camera()
         self.steps = Steps()
         self.kept = KeptViews(folder)
+        self.flown: View | None = None  # of a film that is looked at; moving freely leaves it
         self.seen = False  # whether a frame has shown anything from here
 
     def _first_camera(self) -> EditorCamera:
@@ -55,18 +56,23 @@ class Viewpoint:
         """The state has another scene."""
         self.camera = self._first_camera()
         self.steps.leave()
+        self.flown = None
 
     # ---- what is seen
 
     def view(self) -> View:
         """What the window shows: a camera that was stepped to, or what the hand has turned to."""
         view = self.camera.view(self._size(), tuple(self.free))
+        if self.flown is not None:
+            return fitted(self.flown, view.size, tuple(self.free))
         if self.steps.at_camera:
             return self.steps.view(view.size, tuple(self.free), view.near, view.far)
         return view
 
     def plain_view(self) -> View:
         """The same without what the overlay covers: a camera as filed, or centred."""
+        if self.flown is not None:
+            return self.flown
         if self.steps.at_camera and not self.steps.moving:
             return self.steps.stood_at
         return self.camera.view(self.free_size())
@@ -93,7 +99,7 @@ class Viewpoint:
 
     def refit(self, size: tuple[int, int]) -> None:
         """The free part has another size: what no hand has moved is fitted into it."""
-        if self.steps.at_camera:
+        if self.steps.at_camera or self.flown is not None:
             return
         if self.camera.framed == FIRST and self._state.first_look.home is None:
             self.camera.come_home(self._state.first_view(size))
@@ -105,11 +111,17 @@ class Viewpoint:
 
     def leave_camera(self) -> None:
         """From the camera that was stepped to, where it stands, to moving freely."""
-        if self.steps.at_camera:
+        if self.steps.at_camera or self.flown is not None:
             view, (_, top, _, bottom) = self.view(), self.free
             height = (view.tangents[3] - view.tangents[2]) * (bottom - top) / view.size[1]
             self.camera.stand(view.world_from_eye, 2 * float(np.arctan(height / 2)))
             self.steps.leave()
+            self.flown = None
+
+    def fly(self, view: View) -> None:
+        """Looks at a frame of a film, until somebody moves."""
+        self.steps.leave()
+        self.flown = view
 
     def look_from(self, side: str) -> None:
         """From one of camera.py's DIRECTIONS."""
@@ -132,7 +144,7 @@ class Viewpoint:
 
     def follow_cameras(self, cameras: CameraList | None, stand: bool) -> None:
         """Other cameras to step through; to the first of them at once where one is to `stand`."""
-        now = self.view()
+        now, self.flown = self.view(), None
         self.steps.set_cameras(cameras)
         if stand and cameras is not None:
             self.steps.go_to(0, now if self.seen else None)
@@ -141,7 +153,8 @@ class Viewpoint:
     def step_to_camera(self, by: int) -> None:
         """To the next (1) or the previous (-1), with a word on what its file leaves out."""
         steps = self.steps
-        if not steps.step(by, self.view()):
+        now, self.flown = self.view(), None
+        if not steps.step(by, now):
             self._state.say("There are no cameras to step through; drop a file of them here.")
         elif steps.untold:
             self._state.say("\n".join(steps.untold))

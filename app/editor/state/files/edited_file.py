@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.film.timeline import Timeline
 from shapeshift.app.editor.state.parts.piece import Piece
 from shapeshift.app.editor.state.regions import Regions
 from shapeshift.app.paths import file_name
@@ -83,6 +84,16 @@ class EditedFile:
             self.file, regions.did, regions.together, regions.kept, regions.bytes
         )
         regions.did = ""
+
+    def record_film(self, timeline: Timeline) -> None:
+        """Makes what was done to the keys of the film a step of the history."""
+        if not timeline.did:
+            self.history = self.history.amend(self.file, film=timeline.keys)
+            return
+        self.history = self.history.record(
+            self.file, timeline.did, timeline.together, film=timeline.keys
+        )
+        timeline.did = ""
 
     def amend_regions(self, regions: Regions) -> None:
         """Takes regions over that nobody's hand has changed: their objects have."""

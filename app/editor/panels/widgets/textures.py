@@ -1,0 +1,33 @@
+"""Pictures in a panel: arrays on the GPU under numbers that ImGui knows."""
+
+import moderngl
+import numpy as np
+from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
+
+
+class Textures:
+    """Those of one ImGui context; each is uploaded once and kept until its name has another."""
+
+    def __init__(self, ctx: moderngl.Context, overlay: ModernGLRenderer) -> None:
+        self._ctx, self._overlay = ctx, overlay
+        self._kept: dict[str, tuple[np.ndarray, moderngl.Texture]] = {}
+
+    def number(self, name: str, picture: np.ndarray) -> int:
+        """ImGui's number of a picture (H, W, 3) uint8; `name` has one at a time."""
+        kept = self._kept.get(name)
+        if kept is not None and kept[0] is picture:
+            return kept[1].glo
+        if kept is not None:
+            self._overlay.remove_texture(kept[1])
+            kept[1].release()
+        height, width = picture.shape[:2]
+        texture = self._ctx.texture((width, height), 3, picture.tobytes(), alignment=1)
+        self._overlay.register_texture(texture)
+        self._kept[name] = (picture, texture)
+        return texture.glo
+
+    def release(self) -> None:
+        for _, texture in self._kept.values():
+            self._overlay.remove_texture(texture)
+            texture.release()
+        self._kept.clear()

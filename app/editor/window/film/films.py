@@ -1,0 +1,77 @@
+"""Films in the window: the sections Film and Gallery, and files of paths that are dropped."""
+
+from pathlib import Path
+
+from shapeshift.app.editor.panels.panel import Section
+from shapeshift.app.editor.panels.sections.film_panel import FilmPanel, draw_film_edge
+from shapeshift.app.editor.panels.sections.gallery_panel import draw_gallery
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.film.gallery import Gallery
+from shapeshift.app.editor.state.film.preview import Preview
+from shapeshift.app.editor.state.film.rendering import Rendering, origin_on_disk
+from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.app.editor.window.window import Drop, Event, Window
+from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.film.film_file import is_film_file, read_film_file
+
+
+class Films:
+    """The parts of films that a viewer has."""
+
+    def __init__(
+        self, window: Window, state: EditorState, viewpoint: Viewpoint, folder: Path
+    ) -> None:
+        self._state = state
+        self.preview = Preview(state, viewpoint)
+        self.rendering = Rendering(state, folder)
+        self.gallery = Gallery(state)
+        self.panel = FilmPanel(state, viewpoint, self.preview, self.rendering)
+        self._textures = window.textures
+
+    def draw_gallery(self, ui_scale: float) -> None:
+        draw_gallery(self.gallery, self._textures, ui_scale)
+
+    def each_frame(self) -> bool:
+        """What plays, is drawn or is waited for; True while there is such."""
+        playing = self.preview.each_frame()
+        return any([playing, self.rendering.poll(), self.gallery.each_frame()])
+
+    def handle_event(self, event: Event) -> bool:
+        """True for a film that is dropped."""
+        if not isinstance(event, Drop) or len(event.paths) != 1:
+            return False
+        if not is_film_file(event.paths[0]):
+            return False
+        self.open(event.paths[0])
+        return True
+
+    def open(self, path: Path) -> None:
+        """Takes the keys of a film file over; it can be undone."""
+        state = self._state
+        try:
+            film = read_film_file(path)
+            state.timeline.take_over(film, origin_on_disk(state))
+        except (BadFile, UsageError, OSError) as error:
+            state.problem = str(error)
+        else:
+            state.say(f"The keys of {path.name} are in the section Film.")
+
+
+def attach_films(
+    window: Window, state: EditorState, viewpoint: Viewpoint, hooks: Hooks, folder: Path
+) -> Films:
+    """Adds both sections to a viewer."""
+    films = Films(window, state, viewpoint, folder)
+    several = lambda: bool(state.movable)  # noqa: E731
+    hooks.sections += [
+        Section("Gallery", films.draw_gallery, shown=several),
+        Section("Film", films.panel.draw),
+    ]
+    hooks.each_frame.append(films.each_frame)
+    hooks.event_handlers.append(films.handle_event)
+    hooks.marks.append(lambda scale: draw_film_edge(state, viewpoint, scale))
+    hooks.opened.append(films.gallery.forget)
+    hooks.status.append(films.rendering.status)
+    return films
