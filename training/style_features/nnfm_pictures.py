@@ -9,21 +9,47 @@ from shapeshift.training.style_features.pixel_descent import DescentSettings, Pi
 from shapeshift.training.style_features.vgg_style import StyleTerms, VggStyle
 from shapeshift.training.styles.style_pictures import StyleView
 
+SHOWN = 0.02  # coverage from which on a pixel belongs to what is looked at
+MARGIN = 8  # pixels about it
+ROUND = 32  # sides of a part are multiples of it: every size wants a network of its own
+
 
 class VggPictureLoss:
-    """A PictureLoss: distance to the style's features, and to what the source stop shows."""
+    """A PictureLoss: distance to the style's features, and to what the source stop shows.
+
+    Only the part of a picture in which the scene is goes through the network.
+    """
 
     def __init__(self, style: VggStyle) -> None:
         self.style = style
         self.contents: dict[int, dict[str, np.ndarray]] = {}  # of views, as float16
 
     def __call__(self, picture: np.ndarray, view: StyleView) -> tuple[float, np.ndarray]:
-        if view.number not in self.contents:
-            content = self.style.content_of(np.clip(view.source, 0, 1))
-            self.contents[view.number] = {n: f.astype(np.float16) for n, f in content.items()}
-        kept = {n: f.astype(np.float32) for n, f in self.contents[view.number].items()}
-        losses, gradient = self.style(picture, kept)
+        part = covered_part(view.coverage)
+        gradient = np.zeros(picture.shape, np.float32)
+        losses, gradient[part] = self.style(picture[part], self._content(view, part))
         return self.style.weighted(losses), gradient
+
+    def _content(self, view: StyleView, part: tuple[slice, slice]) -> dict[str, np.ndarray]:
+        if view.number not in self.contents:
+            content = self.style.content_of(np.clip(view.source[part], 0, 1))
+            self.contents[view.number] = {n: f.astype(np.float16) for n, f in content.items()}
+        return {n: f.astype(np.float32) for n, f in self.contents[view.number].items()}
+
+
+def covered_part(coverage: np.ndarray) -> tuple[slice, slice]:
+    """The rows and columns of a picture that show something; the whole where nothing is shown."""
+    found = []
+    for axis, side in enumerate(coverage.shape):
+        there = np.flatnonzero((coverage > SHOWN).any(axis=1 - axis))
+        if not len(there):
+            return slice(0, coverage.shape[0]), slice(0, coverage.shape[1])
+        length = there[-1] + 1 - there[0] + 2 * MARGIN
+        length = min(-(-length // ROUND) * ROUND, side)
+        first = (there[0] + there[-1] + 1 - length) // 2
+        first = min(max(first, 0), side - length)
+        found.append(slice(int(first), int(first + length)))
+    return found[0], found[1]
 
 
 def nnfm_pictures(

@@ -38,7 +38,7 @@ class DescentSettings:
 
 
 class PixelDescent:
-    """A StylePictures of any PictureLoss; `colors` (H, W, 3): a picture whose colours come first."""
+    """A StylePictures of any PictureLoss; `colors` (..., 3): the style's, which come first."""
 
     def __init__(
         self,
@@ -64,18 +64,32 @@ class PixelDescent:
         return [self._descend(view) for view in views]
 
     def _descend(self, view: StyleView) -> np.ndarray:
+        """The best picture of some steps, each half as far as before after one that was too far."""
         picture = np.clip(view.shown, 0, 1).astype(np.float32)
         covered = view.coverage[..., None]
-        share = max(float(covered.mean()), 1e-3)  # the mean square is over the covered pixels
-        values = []
-        for _ in range(self.settings.descents):
+        rate, best = self.settings.rate, (np.inf, picture, picture)  # value, picture, direction
+        first = 0.0
+        for i in range(self.settings.descents):
             value, gradient = self.loss(picture, view)
-            values.append(value)
-            gradient = covered * gradient
-            size = np.sqrt(np.mean(gradient**2) / share) + 1e-12
-            picture = np.clip(picture - self.settings.rate / size * gradient, 0, 1)
-        self.values.append((values[0], values[-1]))
+            first = value if i == 0 else first
+            if value < best[0]:
+                best = value, picture, direction(covered * gradient, view.coverage)
+            else:
+                rate /= 2
+            picture = np.clip(best[1] - rate * best[2], 0, 1)
+        self.values.append((first, best[0]))
         return picture
+
+
+def direction(gradient: np.ndarray, coverage: np.ndarray) -> np.ndarray:
+    """A gradient (H, W, 3) with the root mean square 1 over what is covered.
+
+    The root of each number is taken: else a few pixels go far, at the rim, and all others nowhere.
+    """
+    evened = np.sign(gradient) * np.sqrt(np.abs(gradient))
+    share = max(float(coverage.mean()), 1e-3)
+    size = np.sqrt(np.mean(evened**2) / share)
+    return (evened / max(float(size), 1e-12)).astype(np.float32)
 
 
 def transfer_to(views: Sequence[StyleView], style: np.ndarray) -> ColorTransfer | None:

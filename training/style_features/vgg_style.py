@@ -49,7 +49,7 @@ class VggStyle:
         self.path, self.terms = path, terms or StyleTerms()
         self.input, self.names = vgg_layers(path, self.terms.layers)
         self.features = lru_cache(2)(self._open_features)  # by (width, height)
-        self.gradients = lru_cache(2)(self._open_gradients)
+        self.gradients = lru_cache(12)(self._open_gradients)
         self.wanted = self._wanted_of(style, seed)
 
     def _wanted_of(self, style: Sequence[np.ndarray], seed: int) -> dict[str, np.ndarray]:
