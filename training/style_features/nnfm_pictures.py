@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.training.style_features.pixel_descent import DescentSettings, PixelDescent
+from shapeshift.training.style_features.pixel_descent import DescentSettings, PixelDescent, Slope
 from shapeshift.training.style_features.vgg_style import StyleTerms, VggStyle
 from shapeshift.training.styles.style_pictures import StyleView
 
@@ -24,11 +24,16 @@ class VggPictureLoss:
         self.style = style
         self.contents: dict[int, dict[str, np.ndarray]] = {}  # of views, as float16
 
-    def __call__(self, picture: np.ndarray, view: StyleView) -> tuple[float, np.ndarray]:
+    def at(self, view: StyleView) -> Slope:
         part = covered_part(view.coverage)
-        gradient = np.zeros(picture.shape, np.float32)
-        losses, gradient[part] = self.style(picture[part], self._content(view, part))
-        return self.style.weighted(losses), gradient
+        content = self._content(view, part)
+
+        def slope(picture: np.ndarray) -> tuple[float, np.ndarray]:
+            gradient = np.zeros(picture.shape, np.float32)
+            losses, gradient[part] = self.style(picture[part], content)
+            return self.style.weighted(losses), gradient
+
+        return slope
 
     def _content(self, view: StyleView, part: tuple[slice, slice]) -> dict[str, np.ndarray]:
         if view.number not in self.contents:

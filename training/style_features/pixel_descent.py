@@ -5,7 +5,7 @@ disagree about: what they agree on stays.  Measured against the gradient of the 
 straight into the splats, which moved them next to nowhere: docs/styles.md, "From a picture".
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,11 +18,14 @@ INSIDE = 0.9  # coverage of a pixel whose colour is the scene's own
 FEWEST = 16  # pixels, of which a covariance can be told
 
 
+Slope = Callable[[np.ndarray], tuple[float, np.ndarray]]
+
+
 class PictureLoss(Protocol):
     """A loss of one view's picture that is small where the picture is in the style."""
 
-    def __call__(self, picture: np.ndarray, view: StyleView) -> tuple[float, np.ndarray]:
-        """Its value and its gradient (H, W, 3) by the picture (H, W, 3), display sRGB."""
+    def at(self, view: StyleView) -> Slope:
+        """For one descent: the value and the gradient (H, W, 3) by a picture (H, W, 3)."""
         ...
 
 
@@ -68,9 +71,9 @@ class PixelDescent:
         picture = np.clip(view.shown, 0, 1).astype(np.float32)
         covered = view.coverage[..., None]
         rate, best = self.settings.rate, (np.inf, picture, picture)  # value, picture, direction
-        first = 0.0
+        slope, first = self.loss.at(view), 0.0
         for i in range(self.settings.descents):
-            value, gradient = self.loss(picture, view)
+            value, gradient = slope(picture)
             first = value if i == 0 else first
             if value < best[0]:
                 best = value, picture, direction(covered * gradient, view.coverage)

@@ -1,5 +1,7 @@
 """Colours of a style, and pictures by turns of descent on their pixels."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -48,7 +50,11 @@ def view_of(number, shown, coverage=None, source=None):
 
 def squared(wanted):
     """A PictureLoss whose best picture is known."""
-    return lambda picture, view: (float(((picture - wanted) ** 2).sum()), 2 * (picture - wanted))
+
+    def slope(picture):
+        return float(((picture - wanted) ** 2).sum()), 2 * (picture - wanted)
+
+    return SimpleNamespace(at=lambda view: slope)
 
 
 def test_descent_reaches_a_known_picture_and_never_goes_up():

@@ -116,7 +116,7 @@ def test_only_the_covered_part_has_a_gradient(vgg):
     shown = picture(2, 80, 96)
     view = StyleView(0, None, shown, coverage, coverage, shown)
     loss = VggPictureLoss(style)
-    value, gradient = loss(shown, view)
+    value, gradient = loss.at(view)(shown)
     rows, columns = covered_part(coverage)
     outside = gradient.copy()
     outside[rows, columns] = 0
