@@ -29,7 +29,7 @@ def stained_glass(size: int = 256, seed: int = 0) -> np.ndarray:
     return np.clip(color[nearest[..., 0]] * lead * grain, 0, 1).astype(np.float32)
 
 
-def brush_strokes(size: int = 256, seed: int = 0) -> np.ndarray:
+def swirl(size: int = 256, seed: int = 0) -> np.ndarray:
     """(size, size, 3) float32: short strokes of blue and gold that follow a swirl."""
     rng = np.random.default_rng(seed)
     image, unit = Image.new("RGB", (size, size), (20, 40, 90)), size / 256
@@ -65,6 +65,6 @@ def ink_hatching(size: int = 256, seed: int = 0) -> np.ndarray:
 
 MADE_STYLES: dict[str, Callable[[int, int], np.ndarray]] = {
     "glass": stained_glass,
-    "strokes": brush_strokes,
+    "swirl": swirl,
     "ink": ink_hatching,
 }

@@ -101,7 +101,7 @@ def test_views_that_show_nothing_have_no_colors_to_move():
 
 
 def test_turns_are_as_asked_and_the_same_seed_makes_the_same_pictures(tmp_path):
-    vgg, style = tiny_vgg(tmp_path / "vgg.onnx"), MADE_STYLES["strokes"](32, 0)
+    vgg, style = tiny_vgg(tmp_path / "vgg.onnx"), MADE_STYLES["swirl"](32, 0)
     settings = DescentSettings(views=2, steps=7)
     runs = []
     for _ in range(2):
