@@ -6,6 +6,7 @@ from shapeshift.app.opening import open_model
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
+from shapeshift.app.training.style_looks import check_looks, views_and_size, with_named_style
 from shapeshift.app.training.style_options import Options
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def run(options: Options) -> int:
     from shapeshift.training.styles.add_style import refuse_plain
 
     check_options(options)
+    options = with_named_style(options)
     check_output(options.out, [options.scene], options.overwrite)
     check_writable(options.out)
     refuse_foreign(options.out)
@@ -41,6 +43,7 @@ def check_options(options: Options) -> None:
 
     asked = {
         "--shape": options.shape, "--network": options.network, "--pictures": options.pictures,
+        "--image": options.image, "--text": options.text,
     }  # fmt: skip
     given = [name for name, value in asked.items() if value]
     if options.remove and (given or options.name):
@@ -53,16 +56,13 @@ def check_options(options: Options) -> None:
         raise UsageError("--network and --pictures both paint the stop; leave one of them out.")
     if options.pictures and not options.cameras:
         raise UsageError("--pictures needs --cameras, the file that says where each was taken.")
-    if (options.image is None) != (options.encoder is None) or (
-        options.image and not options.network
-    ):
-        raise UsageError("--image, --encoder and --network go together; give all three, or none.")
+    check_looks(options)
     if options.weights and not options.network:
         raise UsageError("--weights are of a network's styles; add --network, or leave them out.")
-    if not (1 <= options.views <= 500 and 32 <= options.size <= 640):
+    views, size = views_and_size(options)
+    if not (1 <= views <= 500 and 32 <= size <= 640):
         raise UsageError(
-            f"--views is {options.views} and --size {options.size}; 1 to 500 and 32 to 640 are "
-            "wanted."
+            f"--views is {views} and --size {size}; 1 to 500 and 32 to 640 are wanted."
         )
 
 

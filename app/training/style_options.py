@@ -30,8 +30,19 @@ class Options(ReadingOptions):
     """Which of the styles that the network knows, by numbers from 0, and how much of each: 3, or
     3=0.5,12=0.5.  Default: those of a network that knows one style."""
     image: Path | None = None
-    """A style picture, 16 to 4096 pixels a side, for a network that takes its code.  Default:
-    none."""
+    """A style picture, 16 to 4096 pixels a side, or one of this program's own: glass, swirl, ink.
+    It needs --vgg, or --clip-model, or a --network that takes its code.  Default: none."""
+    text: str = ""
+    """The style in words.  With --clip-model any words do; without they choose among the shapes and
+    pictures of this program: hairy, molten wax, a pen drawing.  Default: none."""
+    vgg: Path | None = None
+    """An ONNX file of VGG16's first layers, by which --image gives its strokes and colours.
+    Default: none."""
+    clip_model: Path | None = None
+    """A folder of a CLIP as exporters write one, by which --text or --image gives its meaning:
+    vision_model.onnx, text_model.onnx, tokenizer.json, preprocessor_config.json.  Default: none."""
+    quality: Literal["full", "preview"] = "full"
+    """preview: the colours of --image by --vgg without training, in seconds."""
     encoder: Path | None = None
     """The ONNX file that makes the code of --image for --network.  Default: none."""
     pictures: Path | None = None
@@ -61,10 +72,13 @@ class Options(ReadingOptions):
     """Seed of all random numbers: the same seed gives the same bytes."""
     overwrite: bool = False
     """Replace an earlier file of --out; never the scene that is read."""
-    views: Annotated[int, EXPERT] = 48
-    """How many views the dome has, 1 to 500."""
-    size: Annotated[int, EXPERT] = 384
-    """Pixels of the longer side of these views, 32 to 640."""
+    views: Annotated[int | None, EXPERT] = None
+    """How many views the dome has, 1 to 500.  Default: 48; of --vgg and --clip-model 24."""
+    size: Annotated[int | None, EXPERT] = None
+    """Pixels of the longer side of these views, 32 to 640.  Default: 384; of --vgg and
+    --clip-model 256."""
+    patches: Annotated[int, EXPERT] = 4
+    """Into how many patches a view is cut for --clip-model, 1 to 64; 1: the whole alone."""
     pace: Annotated[bool, EXPERT] = True
     """Measure how fast the picture changes on the ways to the new stop, so that equal ways of the
     slider are equal changes; --no-pace: leave that out."""

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.errors import UsageError
+from shapeshift.app.training.style_looks import looks_of, views_and_size
 from shapeshift.app.training.style_options import Options
 from shapeshift.runtime_models.model import AnchorModel
 
@@ -20,7 +21,9 @@ def usual_name(options: Options) -> str:
     """What a stop is called that was given no name."""
     file = options.image or options.network or options.pictures
     words = [options.shape.capitalize()] if options.shape else []
-    if file is not None:
+    if options.text:
+        words.append(" ".join(options.text.split())[:NAMES].strip() or "style")
+    elif file is not None:
         words.append(file.stem[:NAMES].strip() or "style")
     name = " ".join(words)
     return name[:1].upper() + name[1:]
@@ -36,16 +39,18 @@ def pictures_and_views(
     from shapeshift.training.styles.picture_files import PictureFiles, files_for
     from shapeshift.training.styles.style_views import dome_views, resized_views
 
-    if options.network is None and options.pictures is None:
+    looks = looks_of(options)
+    if looks is None and options.network is None and options.pictures is None:
         return None, []
+    count, longest = views_and_size(options)
     if options.cameras is None:
-        size = options.size, round(options.size * 3 / 4)
-        return network_of(options), dome_views(model, options.views, size)
+        size = longest, round(longest * 3 / 4)
+        return looks or network_of(options), dome_views(model, count, size)
     cameras = read_cameras(options, options.cameras)
-    views = resized_views(cameras.views, options.size)
+    views = resized_views(cameras.views, longest)
     if options.pictures is not None:
         return PictureFiles(files_for(options.pictures, cameras.names)), views
-    return network_of(options), views
+    return looks or network_of(options), views
 
 
 def read_cameras(options: Options, path: Path):

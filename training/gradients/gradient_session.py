@@ -30,14 +30,18 @@ class GradientSession:
         graph.outputs = [*values, gradient]
         graph.keep_only(graph.outputs)
         self.outputs = list(graph.outputs)
-        onnxruntime = load_onnxruntime()
-        options = onnxruntime.SessionOptions()
-        options.log_severity_level, options.intra_op_num_threads = 3, threads
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        self.session = open_checked(graph.model().SerializeToString(), graph.name, options)
+        self.session = open_graph(graph, threads)
 
     def __call__(self, given: Mapping[str, np.ndarray]) -> tuple[dict[str, float], np.ndarray]:
         """The losses by their names, unweighted, and the gradient of the weighted sum."""
         *losses, gradient = self.session.run(self.outputs, dict(given))
         found = {n: float(np.ravel(v)[0]) for n, v in zip(self.losses, losses, strict=True)}
         return found, gradient
+
+
+def open_graph(graph: OnnxGraph, threads: int = 0):
+    """A session of a graph.  threads: 0 for one a core; they sleep between the runs."""
+    options = load_onnxruntime().SessionOptions()
+    options.log_severity_level, options.intra_op_num_threads = 3, threads
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    return open_checked(graph.model().SerializeToString(), graph.name, options)

@@ -151,7 +151,7 @@ REFUSED = {
     "weights alone": (("--shape", "fur", "--weights", "3"), "add --network"),
     "pictures alone": (("--pictures", "."), "--pictures needs --cameras"),
     "both": (("--network", "a", "--pictures", "b"), "both paint the stop"),
-    "a picture alone": (("--shape", "fur", "--image", "a.png"), "go together"),
+    "a picture alone": (("--shape", "fur", "--image", "a.png"), "--image needs --vgg"),
     "in and out": (("--shape", "fur", "--remove", "RGB"), "--remove takes a stop out"),
     "out of an unknown": (("--remove", "X"), "no stop 'X'; it has RGB, Thermal, Opened"),
     "many views": (("--shape", "fur", "--views", "501"), "--views is 501"),

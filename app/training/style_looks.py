@@ -1,0 +1,129 @@
+"""Looks from a style picture or from words, as the options of `style` say them."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapeshift.app.errors import UsageError
+from shapeshift.app.training.style_options import Options
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from shapeshift.training.styles.style_pictures import StylePictures
+
+MADE_SIDE = 256  # pixels of a picture of our own
+LONGEST_SIDE = 384  # pixels to which a style picture is made smaller: strokes of some ten pixels
+
+
+def check_looks(options: Options) -> None:
+    """Raises UsageError for options of pictures and words that do not go together."""
+    by_code = options.image is not None and options.network is not None
+    if by_code != (options.encoder is not None):
+        raise UsageError(
+            "--encoder makes the code of --image for --network; give all three, or not the encoder."
+        )
+    if options.image and not (options.network or options.vgg or options.clip_model):
+        raise UsageError(
+            "--image needs --vgg, an ONNX file of VGG16, for its strokes and colours, or "
+            "--clip-model for what it means."
+        )
+    if options.text and options.image:
+        raise UsageError("--text and --image both say the style; leave one of them out.")
+    if options.vgg and options.clip_model:
+        raise UsageError("--vgg and --clip-model are two ways; leave one of them out.")
+    if options.clip_model and not (options.text or options.image):
+        raise UsageError("--clip-model needs --text or --image, which say the style.")
+    painters = [name for name, given in (("--network", options.network),
+                                         ("--pictures", options.pictures)) if given]  # fmt: skip
+    if painters and (options.text or options.vgg or options.clip_model):
+        raise UsageError(f"{painters[0]} paints the stop already; leave out --text, --vgg and "
+                         "--clip-model, or it.")  # fmt: skip
+    if options.vgg and not (options.image or options.text):
+        raise UsageError("--vgg needs --image, the style picture.")
+    if options.quality == "preview" and not options.vgg:
+        raise UsageError("--quality preview is of --image and --vgg; give both.")
+    if not 1 <= options.patches <= 64:
+        raise UsageError(f"--patches is {options.patches}; 1 to 64 are wanted.")
+
+
+def views_and_size(options: Options) -> tuple[int, int]:
+    """How many views are painted, and the pixels of their longer side."""
+    features = bool(options.vgg or options.clip_model)  # whose gradients take most of the time
+    views = (24 if features else 48) if options.views is None else options.views
+    return views, (256 if features else 384) if options.size is None else options.size
+
+
+def with_named_style(options: Options) -> Options:
+    """Words without a model that reads them: the shape or the picture of ours that they name.
+
+    Raises BadFile where they name none, UsageError where a shape was given beside one.
+    """
+    from shapeshift.app.terminal import say
+    from shapeshift.training.style_features.named_styles import find_style
+
+    if not options.text or options.clip_model:
+        return options
+    found = find_style(options.text)
+    if found.kind == "shape" and options.shape:
+        raise UsageError(
+            f"--text '{options.text[:40]}' is the shape {found.name}, and --shape is "
+            f"{options.shape}; leave one of them out."
+        )
+    if found.kind == "shape" and options.vgg:
+        raise UsageError(
+            f"--text '{options.text[:40]}' is the shape {found.name}; leave out --vgg."
+        )
+    if found.kind == "picture" and not options.vgg:
+        raise UsageError(
+            f"--text '{options.text[:40]}' is the picture {found.name}; give --vgg, an ONNX file "
+            "of VGG16, or --clip-model."
+        )
+    say(f"'{options.text[:60]}' is the {found.kind} {found.name} of this program.")
+    if found.kind == "shape":
+        return replace(options, text="", shape=found.name)
+    return replace(options, text="", image=Path(found.name))
+
+
+def style_picture(path: Path) -> "np.ndarray":
+    """(H, W, 3) float32 of a file, or of a picture of our own by its name.  Raises BadFile."""
+    from shapeshift.training.style_features.made_styles import MADE_STYLES
+    from shapeshift.training.styles.image_network import resized
+    from shapeshift.training.styles.picture_files import LEAST_PX, read_picture
+
+    if not path.exists() and str(path) in MADE_STYLES:
+        return MADE_STYLES[str(path)](MADE_SIDE, 0)
+    picture = read_picture(path)
+    factor = LONGEST_SIDE / max(picture.shape[:2])
+    if factor >= 1:
+        return picture
+    width, height = (max(round(side * factor), LEAST_PX) for side in picture.shape[1::-1])
+    return resized(picture, (width, height))
+
+
+def looks_of(options: Options) -> "StylePictures | None":
+    """Who paints the stop by features of VGG16 or CLIP; None where nothing asks for that.
+
+    Raises BadFile.
+    """
+    if options.quality == "preview" or not (options.vgg or options.clip_model):
+        return None
+    if options.clip_model is None:
+        from shapeshift.training.style_features.nnfm_pictures import nnfm_pictures
+
+        assert options.vgg is not None and options.image is not None, "checked before"
+        return nnfm_pictures(options.vgg, [style_picture(options.image)], seed=options.seed)
+    from shapeshift.training.style_features.clip_model import ClipModel
+    from shapeshift.training.style_features.clip_patches import PatchSettings
+    from shapeshift.training.style_features.clip_pictures import (
+        clip_pictures,
+        picture_direction,
+        text_direction,
+    )
+
+    clip = ClipModel(options.clip_model)
+    if options.image is not None:
+        towards = picture_direction(clip, style_picture(options.image))
+    else:
+        towards = text_direction(clip, options.text)
+    return clip_pictures(clip, towards, PatchSettings(options.patches), options.seed)
