@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from shapeshift.app.errors import UsageError
-from shapeshift.app.training.style_options import Options
+from shapeshift.app.training.style_options import Options, Shape
 
 if TYPE_CHECKING:
     import numpy as np
@@ -81,7 +81,7 @@ def with_named_style(options: Options) -> Options:
         )
     say(f"'{options.text[:60]}' is the {found.kind} {found.name} of this program.")
     if found.kind == "shape":
-        return replace(options, text="", shape=found.name)
+        return replace(options, text="", shape=cast(Shape, found.name))
     return replace(options, text="", image=Path(found.name))
 
 

@@ -104,7 +104,7 @@ class VggStyle:
         return sum(weights[n] * value for n, value in losses.items()) / len(self.names)
 
     def _read(self, size: tuple[int, int]) -> OnnxGraph:
-        sizes = {self.input: (1, 3, size[1], size[0])}
+        sizes: dict[str, tuple[int, ...]] = {self.input: (1, 3, size[1], size[0])}
         return read_network(self.path, sizes, list(self.names.values()))
 
     def _open_features(self, size: tuple[int, int]):
