@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from shapeshift.app.command_line import EXPERT, POSITIONAL, REGIONS, Opt
 from shapeshift.app.opening import ReadingOptions
 
-
 Shape = Literal["", "fur", "blocks", "bubbles", "points", "melt", "explode", "strokes"]
 
 
