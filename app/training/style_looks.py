@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training.style_options import Options
@@ -81,7 +81,7 @@ def with_named_style(options: Options) -> Options:
         )
     say(f"'{options.text[:60]}' is the {found.kind} {found.name} of this program.")
     if found.kind == "shape":
-        return replace(options, text="", shape=found.name)
+        return replace(options, text="", shape=cast(Any, found.name))
     return replace(options, text="", image=Path(found.name))
 
 
@@ -91,8 +91,8 @@ def style_picture(path: Path) -> "np.ndarray":
     from shapeshift.training.styles.image_network import resized
     from shapeshift.training.styles.picture_files import LEAST_PX, read_picture
 
-    if not path.exists() and str(path) in MADE_STYLES:
-        return MADE_STYLES[str(path)](MADE_SIDE, 0)
+    if not path.exists() and path.name in MADE_STYLES:  # the program makes paths absolute
+        return MADE_STYLES[path.name](MADE_SIDE, 0)
     picture = read_picture(path)
     factor = LONGEST_SIDE / max(picture.shape[:2])
     if factor >= 1:
