@@ -1,6 +1,6 @@
 """VGG16's features of every splat of a scene, carried from the views that see it (3SGS 2.1)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +13,14 @@ from shapeshift.scene.pose import View
 from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.evaluation.evaluate import ModelRenderer
 from shapeshift.training.style_features.vgg_features import VggFeatures
+from shapeshift.training.styles.style_views import dome_views
 
 LAYERS = (("relu2_1", 2), ("relu3_1", 4))  # and how many pixels a side each place of them has
 NUMBERS = 32  # of a splat, as in the paper: of 384 they keep some 85 % of the variance
 NEIGHBOURS = 8  # of a splat, itself among them
 SEEN = 0.05  # opacity of a splat that is looked for in the views
 NEAR = 0.015  # of the depth: that far behind what is seen, a splat still is
+VIEWS, VIEW_SIZE = 12, (320, 240)
 FITTED = 6000  # splats whose features tell the principal axes
 
 
@@ -36,9 +38,15 @@ class SplatFeatures:
     deviation: np.ndarray  # (C,)
 
 
+def scene_views(model: AnchorModel) -> list[View]:
+    """From where the splats of a scene are looked at: 12 views, in which next to all are seen."""
+    return dome_views(model, VIEWS, VIEW_SIZE)
+
+
 def carry_features(
-    device, model: AnchorModel, x: float, vgg: Path, views: Sequence[View], behind: Color
-) -> SplatFeatures:
+    device, model: AnchorModel, x: float, vgg: Path, views: Sequence[View], behind: Color,
+    progress: Callable[[str, float], None] | None = None,
+) -> SplatFeatures:  # fmt: skip
     """Of the stop at x: the mean of what the views see at each splat, none where it is hidden.
 
     The affine map of 3SGS from 32 numbers to all is the principal axes, in closed form.  Raises
@@ -50,7 +58,9 @@ def carry_features(
     alive = np.flatnonzero(opacity.ravel() > SEEN)
     total, count = None, np.zeros(len(alive), np.int32)
     colors = np.zeros((len(alive), 3))
-    for view in views:
+    for i, view in enumerate(views):
+        if progress:
+            progress("features of the splats", i / len(views))
         picture, depth = drawn(device, renderer, view, behind)
         u, v, seen = visible(means[alive], view, depth)
         maps = network(picture)

@@ -4,7 +4,8 @@
 style, and the splats have one colour from everywhere, so there is nothing that could flicker.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -34,9 +35,9 @@ class StyleFeatures:
     deviations: np.ndarray  # (C,)
 
 
-def style_features(vgg: VggFeatures, picture: np.ndarray, scene: SplatFeatures) -> StyleFeatures:
-    """Of a picture (H, W, 3), at the places of the last layer."""
-    maps = vgg(picture)
+def style_features(vgg: Path, picture: np.ndarray, scene: SplatFeatures) -> StyleFeatures:
+    """Of a picture (H, W, 3), at the places of the last layer.  Raises BadFile."""
+    maps = VggFeatures(vgg, tuple(name for name, _ in LAYERS))(picture)
     last, pixels = LAYERS[-1]
     height, width = maps[last].shape[1:]
     down, across = (np.mgrid[:height, :width].reshape(2, -1) + 0.5) * pixels
@@ -86,8 +87,6 @@ def all_colors(scene: SplatFeatures, colors: np.ndarray) -> np.ndarray:
 
 def preview_rule(scene: SplatFeatures, style: StyleFeatures, seed: int = 0) -> Rule:
     """The colours as a rule for splats, so that a stop learns them without pictures."""
-    from dataclasses import replace
-
     colors = all_colors(scene, styled_colors(scene, style, seed=seed))
 
     def recolored(splats: Splats, near: Surroundings) -> Splats:
