@@ -86,6 +86,7 @@ def remove(options: Options, model: "AnchorModel") -> int:
 def add(options: Options, model: "AnchorModel") -> int:
     """Puts a stop into the scene."""
     from shapeshift.app.opening import progress_after
+    from shapeshift.app.training.style_looks import preview_of
     from shapeshift.app.training.style_region import anchors_inside
     from shapeshift.app.training.style_sources import pictures_and_views
     from shapeshift.rasterizer.device import open_device
@@ -94,9 +95,11 @@ def add(options: Options, model: "AnchorModel") -> int:
     style = style_of(options, model)
     inside = anchors_inside(model, options.region, options.keep)
     pictures, views = pictures_and_views(options, model)
-    device = None if pictures is None else open_device(options.device)
+    preview = options.quality == "preview"
+    device = open_device(options.device) if preview or pictures is not None else None
     with progress_after(0.0) as progress:
-        made = add_style(device, model, style, pictures, views, inside, progress)
+        recolor = preview_of(options, device, model, style.source, progress) if preview else None
+        made = add_style(device, model, style, pictures, views, inside, progress, recolor)
     finish(options, model, made, style, inside)
     return 0
 

@@ -1,5 +1,6 @@
 """Looks from a style picture or from words, as the options of `style` say them."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -10,7 +11,9 @@ from shapeshift.app.training.style_options import Options, Shape
 if TYPE_CHECKING:
     import numpy as np
 
+    from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.training.styles.style_pictures import StylePictures
+    from shapeshift.training.styles.style_rules import Rule
 
 MADE_SIDE = 256  # pixels of a picture of our own
 LONGEST_SIDE = 384  # pixels to which a style picture is made smaller: strokes of some ten pixels
@@ -91,8 +94,8 @@ def style_picture(path: Path) -> "np.ndarray":
     from shapeshift.training.styles.image_network import resized
     from shapeshift.training.styles.picture_files import LEAST_PX, read_picture
 
-    if not path.exists() and str(path) in MADE_STYLES:
-        return MADE_STYLES[str(path)](MADE_SIDE, 0)
+    if not path.exists() and path.name in MADE_STYLES:  # the program makes paths absolute
+        return MADE_STYLES[path.name](MADE_SIDE, 0)
     picture = read_picture(path)
     factor = LONGEST_SIDE / max(picture.shape[:2])
     if factor >= 1:
@@ -127,3 +130,24 @@ def looks_of(options: Options) -> "StylePictures | None":
     else:
         towards = text_direction(clip, options.text)
     return clip_pictures(clip, towards, PatchSettings(options.patches), options.seed)
+
+
+def preview_of(
+    options: Options,
+    device,
+    model: "AnchorModel",
+    source: str,
+    progress: Callable[[str, float], None],
+) -> "Rule":
+    """The colours of --image without training, as a rule for splats.  Raises BadFile."""
+    from shapeshift.scene.cameras.framing import default_background
+    from shapeshift.training.style_features.splat_features import carry_features, scene_views
+    from shapeshift.training.style_features.zero_shot import preview_rule, style_features
+    from shapeshift.training.styles.add_style import BEHIND
+
+    assert options.vgg is not None and options.image is not None, "checked before"
+    picture = style_picture(options.image)
+    x = next(stop.x for stop in model.stops if stop.name == source)
+    behind = default_background(model, BEHIND)
+    scene = carry_features(device, model, x, options.vgg, scene_views(model), behind, progress)
+    return preview_rule(scene, style_features(options.vgg, picture, scene), options.seed)

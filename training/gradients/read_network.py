@@ -1,7 +1,7 @@
 """An ONNX network from a file, for inputs of fixed sizes: checked, pruned, its constants folded."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ SUBGRAPHS = ("If", "Loop", "Scan", "SequenceMap")
 
 
 def read_network(
-    path: Path, sizes: dict[str, tuple[int, ...]], outputs: Sequence[str]
+    path: Path, sizes: Mapping[str, tuple[int, ...]], outputs: Sequence[str]
 ) -> OnnxGraph:
     """The part of a network that gives the named values, for inputs of these sizes.
 
@@ -71,7 +71,7 @@ def parse_model(data: bytes, name: str, account: Account):
     return model
 
 
-def graph_of(model, name: str, sizes: dict[str, tuple[int, ...]]) -> OnnxGraph:
+def graph_of(model, name: str, sizes: Mapping[str, tuple[int, ...]]) -> OnnxGraph:
     """A model's graph with its inputs at these sizes.  Raises BadFile."""
     opset = max((o.version for o in model.opset_import if o.domain in ("", "ai.onnx")), default=0)
     if not LEAST_OPSET <= opset <= MOST_OPSET:
@@ -97,7 +97,7 @@ def graph_of(model, name: str, sizes: dict[str, tuple[int, ...]]) -> OnnxGraph:
     return graph
 
 
-def input_of(value, name: str, sizes: dict[str, tuple[int, ...]]) -> tuple[int, tuple[int, ...]]:
+def input_of(value, name: str, sizes: Mapping[str, tuple[int, ...]]) -> tuple[int, tuple[int, ...]]:
     """Type and shape of one input, its free dimensions fixed.  Raises BadFile."""
     tensor = value.type.tensor_type
     if value.name not in sizes:

@@ -7,15 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.model import BadFile
-from shapeshift.training.evaluation.vgg_distance import MEAN_BGR
-from shapeshift.training.gradients.gradient_session import GradientSession, open_graph
+from shapeshift.training.gradients.gradient_session import GradientSession
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
-from shapeshift.training.gradients.read_network import read_network
 from shapeshift.training.style_features import style_losses
-from shapeshift.training.style_features.vgg_layers import vgg_layers
+from shapeshift.training.style_features.vgg_features import VggFeatures, as_input
 
-LEAST_SIDE = 16  # pixels: two halvings leave four
 MOST_STYLE_FEATURES = 2048  # of a layer that NNFM looks at, picked by the seed
 LAYERS = ("relu3_1",)  # ARF's block: strokes of some ten pixels
 
@@ -45,16 +41,15 @@ class VggStyle:
         terms: StyleTerms | None = None,
         seed: int = 0,
     ) -> None:
-        """style: pictures (H, W, 3) display sRGB 0..1, of LEAST_SIDE at least.  Raises BadFile."""
-        self.path, self.terms = path, terms or StyleTerms()
-        self.input, self.names = vgg_layers(path, self.terms.layers)
-        self.features = lru_cache(2)(self._open_features)  # by (width, height)
+        """style: pictures (H, W, 3) display sRGB 0..1, 16 pixels a side or more.  BadFile."""
+        self.terms = terms or StyleTerms()
+        self.vgg = VggFeatures(path, self.terms.layers)
         self.gradients = lru_cache(12)(self._open_gradients)
         self.wanted = self._wanted_of(style, seed)
 
     def _wanted_of(self, style: Sequence[np.ndarray], seed: int) -> dict[str, np.ndarray]:
         """What the losses compare with, by the names of the graph's inputs."""
-        each = [self.features_of(picture) for picture in style]
+        each = [matrices(self.vgg(picture)) for picture in style]
         rng, found = np.random.default_rng(seed), {}
         for layer in self.terms.layers:
             features = np.concatenate([of[layer] for of in each], axis=1)  # (C, N)
@@ -68,57 +63,35 @@ class VggStyle:
                 found[f"gram.{layer}"] = style_losses.gram_of(features)
         return found
 
-    def features_of(self, picture: np.ndarray) -> dict[str, np.ndarray]:
-        """(C, N) of every layer, of a picture (H, W, 3).  Raises BadFile for too small ones."""
-        height, width = picture.shape[:2]
-        if not min(width, height) >= LEAST_SIDE:
-            raise BadFile(
-                f"pictures of {width}x{height} pixels are too small for VGG16, which needs "
-                f"{LEAST_SIDE} a side; make them larger."
-            )
-        session = self.features((width, height))
-        values = session.run(list(self.names.values()), {self.input: as_input(picture)})
-        return {
-            layer: np.ascontiguousarray(value[0].reshape(value.shape[1], -1))
-            for layer, value in zip(self.names, values, strict=True)
-        }
-
     def content_of(self, photo: np.ndarray) -> dict[str, np.ndarray]:
         """What the content loss compares with; nothing where there is none."""
         if not self.terms.content:
             return {}
-        return {f"photo.{layer}": f for layer, f in self.features_of(photo).items()}
+        return {f"photo.{layer}": f for layer, f in matrices(self.vgg(photo)).items()}
 
     def __call__(
         self, picture: np.ndarray, content: dict[str, np.ndarray] | None = None
     ) -> tuple[dict[str, float], np.ndarray]:
         """The losses of a picture (H, W, 3) by `loss.layer`, and the gradient (H, W, 3) of all."""
         session = self.gradients((picture.shape[1], picture.shape[0]))
-        given = {self.input: as_input(picture), **self.wanted, **(content or {})}
+        given = {self.vgg.input: as_input(picture), **self.wanted, **(content or {})}
         losses, gradient = session(given)
         return losses, np.ascontiguousarray(255 * gradient[0].transpose(1, 2, 0)[..., ::-1])
 
     def weighted(self, losses: dict[str, float]) -> float:
         """The sum of which the gradient is."""
         weights = {name: getattr(self.terms, name.partition(".")[0]) for name in losses}
-        return sum(weights[n] * value for n, value in losses.items()) / len(self.names)
-
-    def _read(self, size: tuple[int, int]) -> OnnxGraph:
-        sizes: dict[str, tuple[int, ...]] = {self.input: (1, 3, size[1], size[0])}
-        return read_network(self.path, sizes, list(self.names.values()))
-
-    def _open_features(self, size: tuple[int, int]):
-        return open_graph(self._read(size))
+        return sum(weights[n] * value for n, value in losses.items()) / len(self.vgg.names)
 
     def _open_gradients(self, size: tuple[int, int]) -> GradientSession:
-        graph, losses = self._read(size), {}
-        for layer, name in self.names.items():
+        graph, losses = self.vgg.read(size), {}
+        for layer, name in self.vgg.names.items():
             _, channels, height, width = graph.shape(name)
             features = graph.reshape(name, (channels, height * width))
             graph.shapes[features] = channels, height * width
             for loss, weight, value in self._add_losses(graph, layer, features):
-                losses[f"{loss}.{layer}"] = value, weight / len(self.names)
-        return GradientSession(graph, losses, self.input)
+                losses[f"{loss}.{layer}"] = value, weight / len(self.vgg.names)
+        return GradientSession(graph, losses, self.vgg.input)
 
     def _add_losses(self, graph: OnnxGraph, layer: str, features: str):
         """(name, weight, value) of every loss of one layer."""
@@ -140,7 +113,6 @@ class VggStyle:
             yield "content", terms.content, style_losses.add_content(graph, features, photo)
 
 
-def as_input(picture: np.ndarray) -> np.ndarray:
-    """(1, 3, H, W) as VGG16 takes it, of (H, W, 3) display sRGB 0..1."""
-    values = 255 * picture[..., ::-1] - MEAN_BGR
-    return np.ascontiguousarray(values.transpose(2, 0, 1)[None], np.float32)
+def matrices(maps: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """(C, N) of every layer's (C, h, w)."""
+    return {layer: np.ascontiguousarray(m.reshape(len(m), -1)) for layer, m in maps.items()}

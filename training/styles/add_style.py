@@ -13,7 +13,7 @@ from shapeshift.training.evaluation.evaluate import ModelRenderer
 from shapeshift.training.styles.fit_rule import RuleSettings, with_rule
 from shapeshift.training.styles.stop_trainer import StopSettings, StopTrainer
 from shapeshift.training.styles.style_pictures import StylePictures
-from shapeshift.training.styles.style_rules import RULES
+from shapeshift.training.styles.style_rules import RULES, Rule
 from shapeshift.training.styles.style_views import dome_views
 from shapeshift.training.styles.train_stop import PictureRun, train_on_pictures
 
@@ -66,20 +66,23 @@ def add_style(
     views: Sequence[View] = (),
     inside: np.ndarray | None = None,
     progress: Progress | None = None,
+    recolor: Rule | None = None,
 ) -> AnchorModel:
     """The model with one stop more; all others show what they showed.
 
     pictures: what colours it, as seen from the views; device: what trains, needed with pictures
-    alone.  inside (A,) bool: the anchors that may change.  Raises BadFile, one sentence.
+    alone.  inside (A,) bool: the anchors that may change.  recolor: a rule for colours beside that
+    of the shape, as a preview is.  Raises BadFile, one sentence.
     """
-    if pictures is None and not style.rule:
+    if pictures is None and recolor is None and not style.rule:
         raise BadFile("a new stop needs a shape or pictures; give one of them.")
     report = progress or (lambda what, done: None)
     made = insert_stop(model, style.name, style.source, style.after)
-    if style.rule:
-        report(f"shape: {style.rule}", 0.0)
+    rules = [RULES[style.rule]] if style.rule else []
+    for rule in [*rules, *([recolor] if recolor else [])]:
+        report(f"shape: {style.rule}" if rule is not recolor else "colours", 0.0)
         settings = RuleSettings(strength=style.strength)
-        made = with_rule(made, style.name, RULES[style.rule], settings, inside)
+        made = with_rule(made, style.name, rule, settings, inside)
     if pictures is not None:
         trainer = StopTrainer(device, made, style.name, StopSettings(seed=style.seed), inside)
         run = PictureRun(style.steps, style.strength, default_background(model, BEHIND))

@@ -71,6 +71,18 @@ def test_a_picture_of_our_own_and_the_same_bytes_again(folder, tmp_path, style, 
     assert (tmp_path / "out.shift").read_bytes() == first
 
 
+def test_a_preview_has_the_pictures_colors_without_training(folder, tmp_path, style, device):
+    words = ("--image", "blue.png", "--vgg", "vgg.onnx", "--quality", "preview")
+    assert style(*words, "--region", "half:0,0,0:1,0,0") == 0
+    before, new, same = colors(folder, tmp_path)
+    np.testing.assert_allclose(same, before, atol=2e-5)
+    model = read_package(folder / "scene.shift")
+    inside = np.repeat(anchors_inside(model, ("half:0,0,0:1,0,0",), ()), model.splats_per_anchor)
+    shown = inside & (evaluate(model, 0.0, EYE).opacity > 0.1)
+    assert (new[shown, 2] - new[shown, 0]).mean() > 0.4  # the picture: 0.63
+    np.testing.assert_allclose(new[~inside], before[~inside], atol=1e-4)
+
+
 def test_words_turn_a_region_red_and_nothing_else(folder, tmp_path, style, device, capsys):
     """Equations 10 to 13 on a made CLIP that knows colours."""
     region = ("--region", "half:0,0,0:1,0,0")

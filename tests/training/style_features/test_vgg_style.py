@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.style_features.nnfm_pictures import VggPictureLoss, covered_part
-from shapeshift.training.style_features.vgg_layers import vgg_layers
+from shapeshift.training.style_features.vgg_features import vgg_layers
 from shapeshift.training.style_features.vgg_style import StyleTerms, VggStyle
 from shapeshift.training.styles.style_pictures import StyleView
 from tests.support.training.onnx_files import tiny_vgg, vision_transformer, write_model
