@@ -36,6 +36,7 @@ def pictures_and_views(
 
     Raises UsageError and BadFile.
     """
+    from shapeshift.training.styles.carried_pictures import CarriedPictures
     from shapeshift.training.styles.picture_files import PictureFiles, files_for
     from shapeshift.training.styles.style_views import dome_views, resized_views
 
@@ -45,12 +46,14 @@ def pictures_and_views(
     count, longest = views_and_size(options)
     if options.cameras is None:
         size = longest, round(longest * 3 / 4)
-        return looks or network_of(options), dome_views(model, count, size)
+        views = dome_views(model, count, size)
+        return looks or CarriedPictures(network_of(options)), views
     cameras = read_cameras(options, options.cameras)
     views = resized_views(cameras.views, longest)
     if options.pictures is not None:
-        return PictureFiles(files_for(options.pictures, cameras.names)), views
-    return looks or network_of(options), views
+        files = files_for(options.pictures, cameras.names)
+        return CarriedPictures(PictureFiles(files)), views
+    return looks or CarriedPictures(network_of(options)), views
 
 
 def read_cameras(options: Options, path: Path):
