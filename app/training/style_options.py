@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 from shapeshift.app.command_line import EXPERT, POSITIONAL, REGIONS, Opt
 from shapeshift.app.opening import ReadingOptions
 
+Shape = Literal["", "fur", "blocks", "bubbles", "points", "melt", "explode", "strokes"]
+
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
@@ -21,7 +23,7 @@ class Options(ReadingOptions):
     """The package to write: NAME.shift or a folder."""
     name: str = ""
     """What the new stop is called.  Default: after its shape or its pictures."""
-    shape: Literal["", "fur", "blocks", "bubbles", "points", "melt", "explode", "strokes"] = ""
+    shape: Shape = ""
     """What becomes of the splats, by a rule; a few seconds.  Default: they stay."""
     network: Path | None = None
     """An ONNX file of a feed-forward style network: it paints views of the scene, from which the
