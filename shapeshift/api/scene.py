@@ -214,6 +214,10 @@ class Scene(OpenedScene):
         shape: "Shape" = "",
         network: PathText | None = None,
         weights: Mapping[int, float] | None = None,
+        image: PathText | None = None,
+        text: str = "",
+        vgg: PathText | None = None,
+        clip_model: PathText | None = None,
         paint: "Paint | None" = None,
         pictures: PathText | None = None,
         cameras: PathText | None = None,
@@ -223,8 +227,8 @@ class Scene(OpenedScene):
         region: Sequence[str] = (),
         keep: Sequence[str] = (),
         steps: int = 400,
-        views: int = 48,
-        size: int = 384,
+        views: int | None = None,
+        size: int | None = None,
         seed: int = 0,
         pace: bool = True,
         device: Literal["cpu", "gpu"] | None = None,
@@ -234,9 +238,9 @@ class Scene(OpenedScene):
 
         shape: fur, blocks, bubbles, points, melt, explode or strokes, a rule for the splats.
         Colours come from one of network (an ONNX file of a style network, `weights` of its styles
-        by number), paint (a function of a picture (H, W, 3) in 0..1 that gives another) or pictures
-        (a folder, one for each of cameras).  source: the stop that it starts from, after: the one
-        that it comes after.  strength 0..1.  region, keep: as of `style --region`.  views, size: of
+        by number), image with vgg, image or text with clip_model, paint (a function of a picture
+        (H, W, 3) in 0..1 that gives another) or pictures (a folder, one for each of cameras).
+        source: the stop that it starts from, after: the one that it comes after.  strength 0..1.  region, keep: as of `style --region`.  views, size: of
         the dome that is painted.  pace: measure how evenly the slider moves.  progress: called with
         (what, part 0..1).  Raises BadFile, UsageError, NoDevice.
 
@@ -248,7 +252,8 @@ class Scene(OpenedScene):
 
         options = Options(
             scene=self.path or Path("scene"), out=Path(), name=name, shape=shape,
-            network=path_of(network), pictures=path_of(pictures), cameras=path_of(cameras),
+            network=path_of(network), image=path_of(image), text=text, vgg=path_of(vgg),
+            clip_model=path_of(clip_model), pictures=path_of(pictures), cameras=path_of(cameras),
             from_=source, after=after, strength=strength, region=tuple(region), keep=tuple(keep),
             steps=steps, views=views, size=size, seed=seed, device=device,
         )  # fmt: skip

@@ -60,10 +60,12 @@ def add_style(
     words = ",".join(f"{n}={w}" for n, w in (weights or {}).items())
     options = replace(options, weights=words)
     try:
+        if options.text and options.clip_model is None:
+            raise UsageError("text needs clip_model, the folder of a CLIP, or take shape.")
         if paint is None:
             check_options(options)
-        elif options.network or options.pictures:
-            raise UsageError("paint makes the pictures; leave out network and pictures.")
+        elif options.network or options.pictures or options.image or options.text:
+            raise UsageError("paint makes the pictures; leave the other ways to make them out.")
         style = style_of(options, model)
         inside = anchors_inside(model, options.region, options.keep)
         pictures, views = pictures_and_views(options, model, painted=paint is not None)

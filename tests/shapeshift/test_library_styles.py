@@ -50,7 +50,8 @@ def test_a_function_paints_a_region(scene, device):
     ({}, "a new stop needs one of shape, network, pictures"),
     ({"shape": "fur", "source": "X"}, "from is 'X'"),
     ({"paint": lambda picture: picture[:2]}, "gave an array of shape"),
-    ({"paint": lambda picture: picture, "network": "a.onnx"}, "leave out network"),
+    ({"paint": lambda picture: picture, "network": "a.onnx"}, "leave the other ways"),
+    ({"text": "hairy"}, "text needs clip_model"),
     ({"shape": "fur", "strength": 2.0}, "strength is 2.0"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(scene, asked, wanted):
