@@ -240,9 +240,10 @@ class Scene(OpenedScene):
         Colours come from one of network (an ONNX file of a style network, `weights` of its styles
         by number), image with vgg, image or text with clip_model, paint (a function of a picture
         (H, W, 3) in 0..1 that gives another) or pictures (a folder, one for each of cameras).
-        source: the stop that it starts from, after: the one that it comes after.  strength 0..1.  region, keep: as of `style --region`.  views, size: of
-        the dome that is painted.  pace: measure how evenly the slider moves.  progress: called with
-        (what, part 0..1).  Raises BadFile, UsageError, NoDevice.
+        source: the stop that it starts from, after: the one that it comes after.  strength 0..1.
+        region, keep: as of `style --region`.  views, size: of the dome that is painted.  pace:
+        measure how evenly the slider moves.  progress: called with (what, part 0..1).  Raises
+        BadFile, UsageError, NoDevice.
 
             furry = scene.add_style("Fur", shape="fur", after="RGB")
             furry.save("furry.shift"); furry.render("Fur")
