@@ -252,11 +252,10 @@ def x_words(parts: list) -> str:
 
 def export_package(options: Options, opened: list) -> int:
     """Writes a model of anchors and networks whole; nothing else can become one."""
-    import numpy as np
 
     from shapeshift.app.errors import UsageError
     from shapeshift.runtime_models.model import AnchorModel
-    from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.runtime_models.package.write_package import EXACT, write_package
 
     asked = {
         "--x": options.x, "--select": options.select, "--only": options.only,
@@ -287,8 +286,6 @@ def export_package(options: Options, opened: list) -> int:
         model = labelled_anchors(
             model, label_of(model, options.label, opened[0].scene.objects[0].name)
         )
-    features = model.features
-    halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed
-    size = write_package(model, options.out, "float16" if halves else "float32")
+    size = write_package(model, options.out, EXACT)
     say(f"{full(options.out)}: {size:,} bytes, every x.")
     return 0

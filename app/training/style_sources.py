@@ -30,27 +30,31 @@ def usual_name(options: Options) -> str:
 
 
 def pictures_and_views(
-    options: Options, model: AnchorModel
+    options: Options, model: AnchorModel, painted: bool = False
 ) -> "tuple[StylePictures | None, list[View]]":
     """Who paints the stop, None where a shape alone is asked for, and the views that are painted.
 
-    Raises UsageError and BadFile.
+    painted: the caller has a painter of its own.  Raises UsageError and BadFile.
     """
+    from shapeshift.training.styles.carried_pictures import CarriedPictures
     from shapeshift.training.styles.picture_files import PictureFiles, files_for
     from shapeshift.training.styles.style_views import dome_views, resized_views
 
     looks = looks_of(options)
-    if looks is None and options.network is None and options.pictures is None:
+    if not (painted or looks or options.network or options.pictures):
         return None, []
     count, longest = views_and_size(options)
+    names: tuple[str, ...] = ()
     if options.cameras is None:
-        size = longest, round(longest * 3 / 4)
-        return looks or network_of(options), dome_views(model, count, size)
-    cameras = read_cameras(options, options.cameras)
-    views = resized_views(cameras.views, longest)
+        views = dome_views(model, count, (longest, round(longest * 3 / 4)))
+    else:
+        cameras = read_cameras(options, options.cameras)
+        views, names = resized_views(cameras.views, longest), cameras.names
+    if painted:
+        return None, views
     if options.pictures is not None:
-        return PictureFiles(files_for(options.pictures, cameras.names)), views
-    return looks or network_of(options), views
+        return CarriedPictures(PictureFiles(files_for(options.pictures, names))), views
+    return looks or CarriedPictures(network_of(options)), views
 
 
 def read_cameras(options: Options, path: Path):

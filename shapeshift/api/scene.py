@@ -1,7 +1,8 @@
 """A scene as a library has it: opened once, never changed; every edit gives another one."""
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from shapeshift.api.arguments import Camera, Output, PathText, Size, X
 from shapeshift.api.edit import layers_of
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
     from shapeshift.api.measure import Measured
     from shapeshift.api.picture import Picture
     from shapeshift.api.render import Context, Drawing
+    from shapeshift.api.style import Paint
     from shapeshift.api.write import Exported
+    from shapeshift.app.training.style_options import Shape
     from shapeshift.decomposition.masks.specs import ObjectSpec
     from shapeshift.renderer.settings import RenderSettings
 
@@ -201,6 +204,72 @@ class Scene(OpenedScene):
 
         words = (capture, out, objects, masks, segmenter, photos, complete, overwrite, progress)
         return Scene(*segment(self, *words))
+
+    # ---- stops
+
+    def add_style(
+        self,
+        name: str,
+        *,
+        shape: "Shape" = "",
+        network: PathText | None = None,
+        weights: Mapping[int, float] | None = None,
+        image: PathText | None = None,
+        text: str = "",
+        vgg: PathText | None = None,
+        clip_model: PathText | None = None,
+        paint: "Paint | None" = None,
+        pictures: PathText | None = None,
+        cameras: PathText | None = None,
+        source: str = "",
+        after: str = "",
+        strength: float = 1.0,
+        region: Sequence[str] = (),
+        keep: Sequence[str] = (),
+        steps: int = 400,
+        views: int | None = None,
+        size: int | None = None,
+        seed: int = 0,
+        pace: bool = True,
+        device: Literal["cpu", "gpu"] | None = None,
+        progress: "Callable[[str, float], None] | None" = None,
+    ) -> "Scene":
+        """The scene with one stop more; every other stop shows what it showed (docs/styles.md).
+
+        shape: fur, blocks, bubbles, points, melt, explode or strokes, a rule for the splats.
+        Colours come from one of network (an ONNX file of a style network, `weights` of its styles
+        by number), image with vgg, image or text with clip_model, paint (a function of a picture
+        (H, W, 3) in 0..1 that gives another) or pictures (a folder, one for each of cameras).
+        source: the stop that it starts from, after: the one that it comes after.  strength 0..1.
+        region, keep: as of `style --region`.  views, size: of the dome that is painted.  pace:
+        measure how evenly the slider moves.  progress: called with (what, part 0..1).  Raises
+        BadFile, UsageError, NoDevice.
+
+            furry = scene.add_style("Fur", shape="fur", after="RGB")
+            furry.save("furry.shift"); furry.render("Fur")
+        """
+        from shapeshift.api.style import add_style, path_of
+        from shapeshift.app.training.style_options import Options
+
+        options = Options(
+            scene=self.path or Path("scene"), out=Path(), name=name, shape=shape,
+            network=path_of(network), image=path_of(image), text=text, vgg=path_of(vgg),
+            clip_model=path_of(clip_model), pictures=path_of(pictures), cameras=path_of(cameras),
+            from_=source, after=after, strength=strength, region=tuple(region), keep=tuple(keep),
+            steps=steps, views=views, size=size, seed=seed, device=device,
+        )  # fmt: skip
+        return Scene.from_model(add_style(self, options, weights, paint, pace, progress))
+
+    def without_stop(self, name: str) -> "Scene":
+        """The scene without one of its stops, and without what that one alone had.
+
+        Raises BadFile.
+
+            plain = furry.without_stop("Fur")
+        """
+        from shapeshift.api.style import without_stop
+
+        return Scene.from_model(without_stop(self, name))
 
     # ---- files and figures
 

@@ -96,7 +96,7 @@ def save(
 ) -> Exported:
     """What Scene.save does; label: of the anchors of that object alone."""
     from shapeshift.app.commands.exported import label_of
-    from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.runtime_models.package.write_package import EXACT, write_package
     from shapeshift.runtime_models.parts import labelled_anchors
 
     path = plain(str(path))
@@ -115,8 +115,7 @@ def save(
     if label is not None:
         name = subject.scene.objects[0].name
         model = labelled_anchors(model, label_of(model, label, name))
-    halves = np.array_equal(model.features.astype(np.float16), model.features)
-    size = write_package(model, path, "float16" if halves else "float32")
+    size = write_package(model, path, EXACT)
     return Exported(path, size, model.splat_count)
 
 

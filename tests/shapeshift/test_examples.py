@@ -27,6 +27,7 @@ LEAVES = {
     "08_film_frames.py": ["08_film/0000.png", "08_film/0003.png"],
     "09_edit_splats.py": ["09_faded.png", "09_wide.png", "09_both.png"],
     "10_full_speed.py": [],
+    "12_styles.py": ["12_fur.png", "12_print.png", "12_styles.shift"],
     "11_objects.py": ["11_room.scene.json", "11_without.png", "11_warm.png", "11_fallen.png"],
 }
 
@@ -47,7 +48,7 @@ def test_every_example_is_known_and_told_of():
     assert all(f"`{path.name}`" in told for path in FOLDER.iterdir() if path.suffix != ".md")
 
 
-LONG = {"11_objects.py"}  # half a minute of a core
+LONG = {"11_objects.py", "12_styles.py"}  # half a minute of a core each
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ class ImageNetwork:
         found = found[: size[1], : size[0]]
         if not np.isfinite(found).all():
             raise BadFile(f"{self.path} gives NaN or Inf for a picture of the scene.")
-        return resized(np.clip(found, 0, 1), (width, height))
+        return np.clip(resized(np.clip(found, 0, 1), (width, height)), 0, 1)
 
     def run(self, image: np.ndarray, scale: float) -> np.ndarray:
         """(H', W', 3) what the network gives for (H, W, 3), in its own values."""
