@@ -15,7 +15,7 @@ from shapeshift.runtime_models.package.write_package import write_package
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "examples"
-SHORT = {"06_train.py": ["1"], "08_film_frames.py": ["4"]}  # seconds, frames
+SHORT = {"06_train.py": ["1"], "08_film_frames.py": ["4"], "12_film.py": ["1"]}  # seconds, frames
 LEAVES = {
     "01_load_and_render.py": ["01_workshop.png", "01_depth.png"],
     "02_slide.py": ["02_slide.png"],
@@ -28,6 +28,7 @@ LEAVES = {
     "09_edit_splats.py": ["09_faded.png", "09_wide.png", "09_both.png"],
     "10_full_speed.py": [],
     "11_objects.py": ["11_room.scene.json", "11_without.png", "11_warm.png", "11_fallen.png"],
+    "12_film.py": ["12_film.webp", "12_frames/00000.png", "12_frames/depth/00001.png"],
 }
 
 
