@@ -117,7 +117,7 @@ def make(
     form, numbers = form_of(options, plan), numbers_of(options, len(plan.places))
     done = [0]
 
-    def tell(what: str) -> None:
+    def report(what: str) -> None:
         done[0] += 1
         progress(what, done[0] / len(numbers))
 
@@ -126,11 +126,11 @@ def make(
         with open_renderer(options.context, options.drawing, lambda said: None) as (renderer, _):
             background = options.background or document.background
             renderer.settings = replace(renderer.settings, background=background)
-            draw_frames(renderer, plan, numbers, folder, form, lambda number: tell("drawing"))
+            draw_frames(renderer, plan, numbers, folder, form, lambda number: report("drawing"))
         if is_video(options.out):
             done[0], fps = 0, exact_fps(clock.fps) / options.every
             frames: Sequence[Path] = [folder.frame(number) for number in numbers]
-            write_video(options.out, frames, fps, codec, lambda number: tell("encoding"))
+            write_video(options.out, frames, fps, codec, lambda number: report("encoding"))
     return options.out
 
 
