@@ -296,6 +296,7 @@ def numbers_of(options: Options, count: int) -> list[int]:
 
 def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameFolder") -> None:
     """Makes the folder of frames ready.  Raises UsageError."""
+    from shapeshift.app.drawing import make_folder
     from shapeshift.app.film.frame_folder import film_key, frame_facts
     from shapeshift.scene.film.film_file import write_film_file
 
@@ -308,6 +309,8 @@ def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameF
     key = film_key(plan, options.scene, drawing | {"reading": reading})
     rows = [frame_facts(plan, frame) for frame in range(len(plan.places))]
     facts = {"frames": len(rows), "fps": plan.clock.fps} | drawing | {"rows": rows}
+    for path in filter(None, (options.poster, options.save_path)):
+        make_folder(path.parent)
     folder.begin(key, facts, options.overwrite)
     if options.save_path is not None:
         from shapeshift.app.film.film_plan import film_of

@@ -41,7 +41,7 @@ class FrameFolder:
         return [n for n in numbers if not all(path.is_file() for path in self.files(n))]
 
     def begin(self, key: str, facts: dict, overwrite: bool) -> None:
-        """Makes it ready for frames of the film with this key; those of another one go.
+        """Makes it ready for frames of the film with this key ("": of none); those of another go.
 
         Raises UsageError where something lies there that is not of this film, unless it is
         frames of ours and `overwrite`.
@@ -50,8 +50,7 @@ class FrameFolder:
         for name in self.streams:
             make_folder(self.path / name)
         legend = self.path / LEGEND
-        known = saved_object(legend, MOST_BYTES).get("key") == key
-        if not known:
+        if not key or saved_object(legend, MOST_BYTES).get("key") != key:
             self._clear(overwrite)
         text = json.dumps({"key": key} | facts, indent=1, ensure_ascii=False) + "\n"
         write_whole(legend, text.encode())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from imgui_bundle import imgui
 
@@ -18,6 +19,7 @@ from shapeshift.app.editor.panels.slider import track_ends
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.arrange import steer_by_hand
 from shapeshift.app.editor.state.film.gallery import Gallery
+from shapeshift.app.editor.state.film.style_work import StyleWork
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.track import ON_STOP, shown_stop
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
@@ -31,6 +33,7 @@ from shapeshift.app.headset.room_section import (
     draw_scale,
 )
 from shapeshift.app.headset.xr_user import XrState
+from shapeshift.app.paths import WorkFolders
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.stance import resized
 from shapeshift.vr.panel.carried import Carried, carry, left_over
@@ -66,6 +69,7 @@ class WristMenu:
         room = RoomActions(self._recentre, self._resize, lambda: actions.leave("from the panel"))
         self._foot = Foot(room)
         self.gallery = Gallery(state.editor)
+        self.styles = StyleWork(state.editor, WorkFolders.of().scenes, self._say_where)
         self._sections = self._make_sections(room)
         self._key: tuple = ()  # what the picture was drawn of
         self._unsettled = 0
@@ -90,7 +94,7 @@ class WristMenu:
             ),
             Section("Touch", lambda scale: draw_touch(state.touch, scale, False), open_first=True),
             Section("Stops", lambda scale: draw_stops(editor, scale)),
-            Section("Gallery", self._draw_gallery, shown=lambda: bool(editor.movable)),
+            Section("Gallery", self._draw_gallery, shown=lambda: bool(editor.scene.objects)),
             Section("Look", lambda scale: draw_look(editor, scale)),
             Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
@@ -102,6 +106,7 @@ class WristMenu:
         self._frame, self._seconds = frame, seconds
         self._follow_hands()
         self.gallery.each_frame()
+        self.styles.poll()
         carried = self.carried = carry(self.carried, frame, seconds)
         if carried.open:
             notches = self._push_sticks(frame, seconds)
@@ -163,7 +168,7 @@ class WristMenu:
             tuple(state.touch.reactions), editor.shown_scene.show, editor.shown_scene.lit is None,
             state.parts.on, state.parts.count, state.parts.factor,
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
-            self._foot.sure_s > 0, editor.messages.note, self.gallery.shown,
+            self._foot.sure_s > 0, editor.messages.note, self.gallery.shown, self.styles.progress,
             state.figures if self._figures_seen else None,
         )  # fmt: skip
 
@@ -189,7 +194,11 @@ class WristMenu:
             imgui.pop_style_color()
 
     def _draw_gallery(self, scale: float) -> None:
-        draw_gallery(self.gallery, self.picture.textures, scale)
+        draw_gallery(self.gallery, self.styles, self.picture.textures, scale)
+
+    def _say_where(self, path: Path) -> None:
+        """Another scene is no part of this session: it is there for the next one."""
+        self._state.editor.say(f"It is in {path}; open it in the next session.", seconds=10)
 
     def _draw_figures(self, _: float) -> None:
         self._figures_seen = True

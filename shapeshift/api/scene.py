@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from shapeshift.api.arguments import Camera, Output, PathText, Size, X
+from shapeshift.api.arguments import Camera, Output, PathText, Progress, Size, X
 from shapeshift.api.edit import layers_of
 from shapeshift.api.opened import OpenedScene
 from shapeshift.app.document import Document
@@ -14,6 +14,8 @@ from shapeshift.scene.pose import View
 from shapeshift.scene.selectors.selector import Selector
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from shapeshift.api.measure import Measured
     from shapeshift.api.picture import Picture
     from shapeshift.api.render import Context, Drawing
@@ -166,6 +168,37 @@ class Scene(OpenedScene):
         views = choose_views(self, camera, count, size)  # what cannot be is refused now
         scenes = [self.at(each) for each in spread(x, len(views))]
         return (each.render(None, view, **how) for each, view in zip(scenes, views, strict=True))
+
+    def film(
+        self,
+        out: PathText,
+        style_path: str = "",
+        *,
+        cameras: Camera = "auto",
+        seconds: float | None = None,
+        fps: float | None = None,
+        size: Size | None = None,
+        progress: Progress | None = None,
+        **how: Any,
+    ) -> "Path":
+        """A flight through the scene while it goes from stop to stop, written to `out`: .mp4 or
+        .webm (both want PyAV), .webp, .gif, or a folder of numbered pictures; gives its path.
+
+        style_path: what is shown when, "RGB@0 Thermal@3s Opened@6s", in seconds or in % of the
+        camera's way; between two keys the blend is 3SGS's beta_t, straight from one to the other.
+        cameras: auto (those that lie with the scene's file, else once around it), orbit, a file or
+        folder of cameras, a NAME.film.json, a CameraList, or Views.  seconds: 10 unless a file of a
+        path says another, fps: 30, size: 1280x720.  progress: called with (what, part done).
+        how: smooth, ease, hold, streams, stereo, supersample, every, codec, background, depth_unit,
+        overwrite, drawing and context, as options of the command (docs/film.md).
+
+        The same scene gives the same frames to the byte.  Raises UsageError, BadFile.
+
+            scene.film("tour.webp", "RGB@0 Opened@4s", seconds=5, fps=12, size=(320, 180))
+        """
+        from shapeshift.api.film import film
+
+        return film(self, out, cameras, style_path, (seconds, fps), size, progress, how)
 
     # ---- objects
 

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.package.write_package import write_package
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "examples"
-SHORT = {"06_train.py": ["1"], "08_film_frames.py": ["4"]}  # seconds, frames
+SHORT = {"06_train.py": ["1"], "08_film_frames.py": ["4"], "13_film.py": ["1"]}  # seconds, frames
 LEAVES = {
     "01_load_and_render.py": ["01_workshop.png", "01_depth.png"],
     "02_slide.py": ["02_slide.png"],
@@ -29,6 +29,7 @@ LEAVES = {
     "10_full_speed.py": [],
     "12_styles.py": ["12_fur.png", "12_print.png", "12_styles.shift"],
     "11_objects.py": ["11_room.scene.json", "11_without.png", "11_warm.png", "11_fallen.png"],
+    "13_film.py": ["13_film.webp", "12_frames/00000.png", "12_frames/depth/00001.png"],
 }
 
 

@@ -93,8 +93,8 @@ class Viewer:
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
-        films = folders.pictures.parent / "films"
-        self.films = attach_films(window, state, self.viewpoint, self.hooks, films)
+        more = (self.hooks, folders, self.open_soon)
+        self.films = attach_films(window, state, self.viewpoint, *more)
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
         self._add_sections()

@@ -3,9 +3,10 @@
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import choice, labelled_slider, slider, tip
 from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.app.editor.state.film.gallery import SIZE, Gallery
+from shapeshift.app.editor.state.film.style_work import SHAPES, StyleWork
 
 Vec = imgui.ImVec2
 COLUMNS = 3
@@ -13,12 +14,19 @@ FRAME = 2.0  # logical pixels about a picked picture
 FASTEST_S, SLOWEST_S = 0.5, 20.0
 
 
-def draw_gallery(gallery: Gallery, textures: Textures, ui_scale: float) -> None:
-    """The pictures, the slider between the two that are picked, there and back by itself."""
+def draw_gallery(gallery: Gallery, styles: StyleWork, textures: Textures, ui_scale: float) -> None:
+    """The pictures, the way between the two that are picked, styles to add and to take out."""
     gallery.seen = True
-    if gallery.index is None:
-        imgui.text_disabled("There is one stop: nothing to pick.")
-        return
+    _pictures(gallery, textures, ui_scale)
+    if len(gallery.picked) == 2:
+        _way(gallery, ui_scale)
+    elif len(gallery.stops) > 1:
+        imgui.text_disabled("Pick two to go from one to the other.")
+    if gallery.stops:
+        _styles(gallery, styles, ui_scale)
+
+
+def _pictures(gallery: Gallery, textures: Textures, ui_scale: float) -> None:
     gap = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - gap * (COLUMNS - 1)) / COLUMNS
     for number, stop in enumerate(gallery.stops):
@@ -28,9 +36,11 @@ def draw_gallery(gallery: Gallery, textures: Textures, ui_scale: float) -> None:
         if _picture(gallery, textures, number, width, ui_scale):
             gallery.pick(stop.name)
         imgui.end_group()
-    if len(gallery.picked) < 2:
-        imgui.text_disabled("Pick two to go from one to the other.")
-        return
+
+
+def _way(gallery: Gallery, ui_scale: float) -> None:
+    """The slider between two stops, and there and back by itself."""
+    gap = imgui.get_style().item_spacing.x
     imgui.push_item_width(-1)
     start, end = gallery.picked
     moved, part = labelled_slider("way", gallery.part, 0.0, 1.0, f"{start} to {end}")
@@ -50,6 +60,39 @@ def draw_gallery(gallery: Gallery, textures: Textures, ui_scale: float) -> None:
         gallery.leg_s = leg_s
     tip("How long a way takes.", ui_scale)
     imgui.pop_item_width()
+
+
+def _styles(gallery: Gallery, styles: StyleWork, ui_scale: float) -> None:
+    """A shape to add, the picked stop to take out; or how far that is."""
+    if styles.running:
+        words, part = styles.progress
+        imgui.progress_bar(part, Vec(-1, 0), words)
+        if imgui.button("Cancel", Vec(-1, 0)):
+            styles.cancel()
+        tip("Nothing is left of it.", ui_scale)
+        return
+    gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
+    imgui.push_item_width((room - gap) / 2)
+    styles.shape = choice("shape", styles.shape, SHAPES, SHAPES)
+    tip("What becomes of the splats at the new stop, by a rule.", ui_scale)
+    imgui.pop_item_width()
+    imgui.same_line()
+    source = gallery.picked[-1] if gallery.picked else gallery.stops[0].name
+    if imgui.button("Add style", Vec(-1, 0)):
+        styles.add(source)
+    tip(
+        f"A new stop that starts from {source}, in a new file, seconds to minutes; all other stops "
+        "stay as they are.",
+        ui_scale,
+    )
+    imgui.push_item_width(-1)
+    styles.strength = slider("strength", styles.strength, 0.1, 1.0, "strength: %.2f")
+    tip("How far the new stop is from the one that it starts from.", ui_scale)
+    imgui.pop_item_width()
+    if gallery.picked and len(gallery.stops) > 1:
+        if imgui.button(f"Take out {source}###take out", Vec(-1, 0)):
+            styles.remove(source)
+        tip("The stop that was picked last, in a new file; this one stays.", ui_scale)
 
 
 def _picture(

@@ -42,8 +42,10 @@ class Gallery:
 
     @property
     def index(self) -> int | None:
-        """The object whose stops are shown; None: none has two."""
-        return self._state.sliders[0] if self._state.sliders else None
+        """The object whose stops are shown; None: nothing is open."""
+        if self._state.sliders:
+            return self._state.sliders[0]
+        return 0 if self._state.scene.objects else None
 
     @property
     def stops(self) -> tuple[Stop, ...]:

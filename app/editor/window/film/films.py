@@ -1,5 +1,6 @@
 """Films in the window: the sections Film and Gallery, and files of paths that are dropped."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from shapeshift.app.editor.panels.panel import Section
@@ -10,9 +11,11 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.film.gallery import Gallery
 from shapeshift.app.editor.state.film.preview import Preview
 from shapeshift.app.editor.state.film.rendering import Rendering, origin_on_disk
+from shapeshift.app.editor.state.film.style_work import StyleWork
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.window import Drop, Event, Window
 from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import WorkFolders
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.film.film_file import is_film_file, read_film_file
 
@@ -21,9 +24,12 @@ class Films:
     """The parts of films that a viewer has."""
 
     def __init__(
-        self, window: Window, state: EditorState, viewpoint: Viewpoint, folder: Path
-    ) -> None:
+        self, window: Window, state: EditorState, viewpoint: Viewpoint, folders: WorkFolders,
+        open_soon: Callable[[tuple[Path, ...]], None],
+    ) -> None:  # fmt: skip
         self._state = state
+        folder = folders.pictures.parent / "films"
+        self.styles = StyleWork(state, folders.scenes, lambda path: open_soon((path,)))
         self.preview = Preview(state, viewpoint)
         self.rendering = Rendering(state, folder)
         self.gallery = Gallery(state)
@@ -31,12 +37,13 @@ class Films:
         self._textures = window.textures
 
     def draw_gallery(self, ui_scale: float) -> None:
-        draw_gallery(self.gallery, self._textures, ui_scale)
+        draw_gallery(self.gallery, self.styles, self._textures, ui_scale)
 
     def each_frame(self) -> bool:
         """What plays, is drawn or is waited for; True while there is such."""
         playing = self.preview.each_frame()
-        return any([playing, self.rendering.poll(), self.gallery.each_frame()])
+        children = [self.rendering.poll(), self.styles.poll()]
+        return any([playing, *children, self.gallery.each_frame()])
 
     def handle_event(self, event: Event) -> bool:
         """True for a film that is dropped."""
@@ -60,18 +67,18 @@ class Films:
 
 
 def attach_films(
-    window: Window, state: EditorState, viewpoint: Viewpoint, hooks: Hooks, folder: Path
-) -> Films:
-    """Adds both sections to a viewer."""
-    films = Films(window, state, viewpoint, folder)
-    several = lambda: bool(state.movable)  # noqa: E731
+    window: Window, state: EditorState, viewpoint: Viewpoint, hooks: Hooks, folders: WorkFolders,
+    open_soon: Callable[[tuple[Path, ...]], None],
+) -> Films:  # fmt: skip
+    """Adds both sections to a viewer; `open_soon` opens what was made."""
+    films = Films(window, state, viewpoint, folders, open_soon)
     hooks.sections += [
-        Section("Gallery", films.draw_gallery, shown=several),
+        Section("Gallery", films.draw_gallery, shown=lambda: bool(state.scene.objects)),
         Section("Film", films.panel.draw),
     ]
     hooks.each_frame.append(films.each_frame)
     hooks.event_handlers.append(films.handle_event)
     hooks.marks.append(lambda scale: draw_film_edge(state, viewpoint, scale))
     hooks.opened.append(films.gallery.forget)
-    hooks.status.append(films.rendering.status)
+    hooks.status += [films.rendering.status, films.styles.status]
     return films

@@ -1,0 +1,126 @@
+"""Styles from the gallery: the command that is started, what is shown of it, and its end."""
+
+import time
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.film import style_work
+from shapeshift.app.editor.state.film.style_work import SHAPES, StyleWork
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.read_scene import read_model
+from tests.support.three_stops import three_stop_package
+
+
+class StandIn:
+    """A child that ends as it is told to."""
+
+    started: ClassVar[list] = []
+
+    def __init__(self, words) -> None:
+        self.words = list(words)
+        self.started.append(self)
+        self.progress, self.said, self.code = ("shape: fur, 40%", 0.4), "", None
+        self.cancelled = False
+
+    def cancel(self) -> None:
+        self.cancelled, self.code = True, -15
+
+    def problem(self) -> str:
+        return "" if self.code == 0 else self.said
+
+
+@pytest.fixture
+def child(monkeypatch):
+    monkeypatch.setattr(style_work, "ProgramChild", StandIn)
+    monkeypatch.setattr(StandIn, "started", [])
+    return StandIn.started
+
+
+@pytest.fixture
+def work(tmp_path):
+    """The gallery's work on a package that lies on the disk, and what was shown of it."""
+    state = EditorState(read_model)
+    state.open([three_stop_package(tmp_path / "three.shift")])
+    shown: list[Path] = []
+    work = StyleWork(state, tmp_path / "scenes", shown.append)
+    return state, work, shown
+
+
+def test_the_command_is_the_program_s_own(work, child, tmp_path):
+    state, styles, shown = work
+    styles.shape, styles.strength = "melt", 0.5
+    styles.add("Opened")
+    out = tmp_path / "scenes" / "three-melt-001.shift"
+    assert child[0].words == [
+        "style", str(tmp_path / "three.shift"), "--out", str(out), "--shape", "melt",
+        "--name", "Melt", "--from", "Opened", "--after", "Opened", "--strength", "0.5",
+    ]  # fmt: skip
+    assert styles.running and styles.poll() and styles.status() == "style 40%"
+    styles.cancel()
+    assert styles.poll() and not styles.running and not shown
+    assert "nothing was written" in state.messages.note and not state.problem
+
+
+def test_a_refusal_is_said_and_a_success_shown(work, child):
+    state, styles, shown = work
+    styles.remove("Thermal")
+    assert child[0].words[-2:] == ["--remove", "Thermal"]
+    assert styles.progress == ("shape: fur, 40%", 0.4)
+    child[0].said, child[0].code = "the stop stays.", 2
+    styles.poll()
+    assert not styles.running and "the stop stays" in state.problem and not shown
+    styles.remove("Thermal")
+    child[1].code = 0
+    styles.poll()
+    assert [path.name for path in shown] == ["three-without-001.shift"]
+
+
+def test_a_name_that_is_taken_gets_a_number(work):
+    _, styles, _ = work
+    styles.shape = "fur"
+    assert styles.name() == "Fur"
+    from dataclasses import replace
+
+    from shapeshift.runtime_models.model import Stop
+
+    state = work[0]
+    model = state.scene.objects[0].model
+    state.replace_model(0, replace(model, stops=(Stop("FUR", 0.0), *model.stops[1:])))
+    assert styles.name() == "Fur 2"
+
+
+def test_what_is_not_saved_or_not_alone_is_refused(work, child):
+    state, styles, _ = work
+    state.add_region("sphere")
+    state.record_regions()
+    styles.add("RGB")
+    assert "save it first" in state.problem and not child and not styles.running
+
+
+def test_shapes_are_the_command_s():
+    assert "fur" in SHAPES and "" not in SHAPES and len(SHAPES) >= 7
+
+
+@pytest.mark.slow
+def test_a_stop_comes_and_goes(work):
+    """The real command: four stops, then three again."""
+    state, styles, shown = work
+    styles.shape = "points"
+    styles.add("RGB")
+    wait_for(styles)
+    assert not state.problem
+    assert [s.name for s in read_package(shown[0]).stops] == ["RGB", "Points", "Thermal", "Opened"]
+    state.open([shown[0]])
+    styles.remove("Points")
+    wait_for(styles)
+    assert [s.name for s in read_package(shown[1]).stops] == ["RGB", "Thermal", "Opened"]
+
+
+def wait_for(styles: StyleWork) -> None:
+    end = time.monotonic() + 300
+    while styles.poll() and styles.running:
+        assert time.monotonic() < end
+        time.sleep(0.05)
