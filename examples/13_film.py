@@ -17,6 +17,6 @@ film = scene.film(
 print(film, film.stat().st_size, "bytes")
 
 # The same flight as numbered pictures, and how far away everything is in each.
-frames = scene.film("out/12_frames", path, cameras="orbit", seconds=seconds, fps=2, size=(320, 180),
+frames = scene.film("out/13_frames", path, cameras="orbit", seconds=seconds, fps=2, size=(320, 180),
                     streams=("depth",), overwrite=True)  # fmt: skip
 print(sorted(p.name for p in frames.glob("*.png"))[:3], (frames / "depth").is_dir())

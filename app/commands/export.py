@@ -11,6 +11,7 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 
 PACKAGE = ".shift"
+PAGES = (".html", ".zip")
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,8 @@ class Options(ReadingOptions):
     objects of a scene file where that puts them."""
     out: Path
     """The file to write; its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat,
-    .usdz (.usd, .usda, .usdc), or our package, .shift or a folder (a name without an ending)."""
+    .usdz (.usd, .usda, .usdc), our package, .shift or a folder (a name without an ending), or a
+    page for any browser: .html, one file, or .zip, a folder for a server."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
     stop, and in a scene file what it says for each object."""
@@ -49,6 +51,10 @@ class Options(ReadingOptions):
     eye: Annotated[str, Opt(expert=True, metavar="X,Y,Z")] = ""
     """Metres: from where a scene is seen whose shape depends on that (Scaffold-GS).  Default: the
     first view."""
+    web: bool = False
+    """Into a folder: a page for a server, which shows a coarse scene first; no package."""
+    exact: Annotated[bool, EXPERT] = False
+    """Of a page: its tables as float32 instead of 8 to 24 bits; about twice as large."""
     encoding: Annotated[Literal["kept", "stops"], EXPERT] = "kept"
     """Of a package; stops: the control encoding is written anew, a unit for each stop, so that
     programs which know of no blends of stops meet no jump between them either."""
@@ -66,12 +72,15 @@ def run(options: Options) -> int:
     scenes = choose_scenes(options)
     if not 0 <= options.sh_degree <= 3:
         raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
-    package = is_folder(options.out) or options.out.suffix.lower() == PACKAGE
+    page = options.web or options.out.suffix.lower() in PAGES
+    package = not page and (is_folder(options.out) or options.out.suffix.lower() == PACKAGE)
     if options.encoding != "kept" and not package:
         raise UsageError("--encoding is of packages; name --out NAME.shift, or leave it out.")
-    if not package:
+    if not package and not page:
         writer_of(options.out)  # before the scene is read
     check_output(options.out, options.scenes, options.overwrite)
+    if page:
+        return export_as_page(options, scenes)
     eye = parse_eye(options.eye)
     opened = [open_scene(path, options) for path in scenes]
     models = [obj.model for scene in opened for obj in scene.scene.objects]
@@ -288,4 +297,39 @@ def export_package(options: Options, opened: list) -> int:
         )
     size = write_package(model, options.out, EXACT)
     say(f"{full(options.out)}: {size:,} bytes, every x.")
+    return 0
+
+
+def export_as_page(options: Options, scenes: tuple[Path, ...]) -> int:
+    """A page for browsers: one scene or scene file, every x."""
+    from dataclasses import replace
+
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.pace import with_pace
+    from shapeshift.app.page.export_page import export_page
+    from shapeshift.app.page.page_scene import PageSettings
+    from shapeshift.runtime_models.model import AnchorModel
+    from shapeshift.scene.scene import Scene
+
+    asked = {"--select": options.select, "--only": options.only, "--eye": options.eye,
+             "--label": options.label}  # fmt: skip
+    if given := [name for name, value in asked.items() if value]:
+        raise UsageError(
+            f"a page shows a scene whole; leave {given[0]} out, or export that part first."
+        )
+    if len(scenes) != 1:
+        raise UsageError("a page shows one scene or scene file; name one.")
+    document = open_scene(scenes[0], options)
+    if options.x:
+        document = document.placed(options.x)
+    if options.pace and not document.file:
+        (obj,) = document.scene.objects
+        if isinstance(obj.model, AnchorModel):
+            document = replace(document, scene=Scene((replace(obj, model=with_pace(obj.model)),)))
+    title = scenes[0].name.removesuffix(".scene.json").rsplit(".", 1)[0]
+    settings = PageSettings(title, exact=options.exact)
+    with progress_after(PATIENCE_S) as progress:
+        size = export_page(document, options.out, settings, progress)
+    splats = sum(obj.model.splat_count for obj in document.scene.objects)
+    say(f"{full(options.out)}: {splats:,} splats, every x, {size:,} bytes.")
     return 0

@@ -1,0 +1,80 @@
+"""The page itself: the modules of web/ and a scene, as one file or as a folder for a server."""
+
+import base64
+import hashlib
+import html
+import re
+import zlib
+from pathlib import Path
+
+from shapeshift.app.page.squeeze import squeeze
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.web.limits import LARGEST_FILE
+
+WEB = Path(__file__).resolve().parents[2] / "web"
+# Each after what it imports; a test compares with the imports.
+MODULES = ("conventions", "poses", "gl", "container", "stops", "false_colors", "arena", "networks",
+           "pack", "shade", "decode", "models", "project", "resolve", "sort", "splat", "renderer",
+           "camera", "control", "grab", "link", "panel", "page")  # fmt: skip
+IMPORT = re.compile(r"^import \{[^}]*\} from \"\./\w+\.js\";\n", re.M)
+SCRIPT = '<script type="module" src="page.js"></script>'
+
+
+def one_script() -> str:
+    """All modules as one, without comments and indents."""
+    texts = (IMPORT.sub("", (WEB / f"{name}.js").read_text("utf-8")) for name in MODULES)
+    return squeeze(re.sub(r"^export ", "", "\n".join(texts), flags=re.M))
+
+
+def digest(text: str) -> str:
+    """What a policy allows a script or style by."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def page_text(title: str, scene: bytes | None) -> str:
+    """The page, which may run and load only what is in it; scene None: it lies beside the page."""
+    text, script = (WEB / "index.html").read_text("utf-8"), one_script()
+    style = re.search(r"<style>(.*?)</style>", text, re.S)
+    if style is None or SCRIPT not in text or "</script" in script:
+        raise ValueError("web/index.html is not the page that export_page knows")
+    small = re.sub(r"\n\s*", "\n", style[1])
+    policy = (
+        f"default-src 'none'; script-src {digest(script)} blob:; worker-src blob:; "
+        f"style-src {digest(small)}; img-src data:; base-uri 'none'; form-action 'none'"
+        + ("" if scene else "; connect-src 'self'")
+    )
+    data = ""
+    if scene is not None:
+        packed = base64.b64encode(zlib.compress(scene, 9)).decode()
+        kind = 'type="application/octet-stream"'
+        data = f'<script id="scene-data" {kind} data-bytes="{len(scene)}">{packed}</script>\n'
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+    for old, new in (
+        (style[1], small),
+        ("<!--policy-->", meta),
+        ("<title>Shapeshift</title>", f"<title>{html.escape(title)}</title>"),
+        (SCRIPT, f'{data}<script type="module">{script}</script>'),
+    ):
+        text = text.replace(old, new, 1)
+    return text
+
+
+def one_file(title: str, scene: bytes, name: str) -> bytes:
+    """A page that holds its scene.  Raises BadFile where it would be too large."""
+    page = page_text(title, scene).encode()
+    if len(page) > LARGEST_FILE:
+        raise BadFile(
+            f"{name} would have {len(page):,} bytes, and browsers open at most some "
+            f"{LARGEST_FILE:,} in one file well; write a folder or a .zip for a server "
+            "(--web --out FOLDER), or keep fewer splats (--max-splats)."
+        )
+    return page
+
+
+def folder_files(title: str, scene: bytes, coarse: bytes) -> dict[str, bytes]:
+    """name -> bytes, for a server: the page, the scene, and a coarse one that is shown first."""
+    return {
+        "index.html": page_text(title, None).encode(),
+        "coarse.bin": zlib.compress(coarse, 9),
+        "scene.bin": zlib.compress(scene, 9),
+    }

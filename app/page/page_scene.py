@@ -1,0 +1,188 @@
+"""A document as the bytes that a web page reads."""
+
+import base64
+import io
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shapeshift.app.document import Document
+from shapeshift.renderer.colors.palette import PALETTES, over_background, palette_colors
+from shapeshift.renderer.gl.target import brightest
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
+from shapeshift.runtime_models.web.limits import MOST_SPLATS
+from shapeshift.runtime_models.web.web_model import control_entry, describe_model
+from shapeshift.runtime_models.web.write_container import Container
+from shapeshift.scene.cameras.framing import model_points
+from shapeshift.scene.document.scene_file import SceneItem, named_stops
+from shapeshift.scene.scene import Scene, SceneObject
+
+FRAMED = (1280, 720)  # the page stands back where it is narrower
+PICTURE = (160, 90)  # pixels of a stop's picture
+QUALITY = 60  # of its WebP: about 2 kB
+MOST_PICTURES = 9  # of the stops that keys reach
+COARSE = 8  # a coarse scene has every so many-th anchor
+BOX = (1.0, 99.0)  # percentiles of an object's points that its bounding box holds
+Progress = Callable[[str, float], None]  # what is done, and how much of it, 0..1
+
+
+@dataclass(frozen=True)
+class PageSettings:
+    """How a scene is stored for a page."""
+
+    title: str
+    exact: bool = False  # float32 instead of codes
+    pictures: bool = True  # of the stops
+
+
+def page_scene(document: Document, settings: PageSettings, progress: Progress) -> bytes:
+    """The whole scene.  Raises BadFile for what a page cannot show."""
+    refuse(document)
+    out = Container(settings.exact)
+    pictures = stop_pictures(document, progress) if settings.pictures else {}
+    return out.pack(described(out, document, settings, pictures, every=1))
+
+
+def coarse_scene(document: Document, settings: PageSettings) -> bytes:
+    """A sample of every COARSE-th anchor with larger splats: what a page shows while it loads."""
+    out = Container(settings.exact)
+    return out.pack(described(out, document, settings, {}, COARSE))
+
+
+def refuse(document: Document) -> None:
+    """BadFile, one sentence, for what no page can show."""
+    objects = document.scene.objects
+    splats = sum(obj.model.splat_count for obj in objects)
+    if splats > MOST_SPLATS:
+        raise BadFile(
+            f"the scene has {splats:,} splats in all objects; a page shows at most {MOST_SPLATS:,}."
+        )
+    for obj in objects:
+        if obj.selectors:
+            raise BadFile(
+                f"object '{obj.name}' has regions with an x of their own, which a page cannot show "
+                "yet; remove them, or export it baked (--out scene.ply)."
+            )
+        if follows_eye(obj.model):
+            describe_model(Container(), obj.model)  # says why
+
+
+def described(
+    out: Container, document: Document, settings: PageSettings, pictures: dict[float, str],
+    every: int,
+) -> dict:  # fmt: skip
+    """The table of contents."""
+    models = list(document.models)
+    number = {id(model): i for i, model in enumerate(models)}
+    view = document.view(FRAMED)
+    eye, axes = view.world_from_eye.position, view.world_from_eye.matrix()
+    centre, radius = document.bounds()
+    ahead = max(float((centre - eye) @ -axes[:3, 2]), 0.1 * radius)
+    items = {item.name: item for item in document.file.all_items} if document.file else {}
+    entries = [
+        describe_model(out, sample(model, every), every**0.5 if every > 1 else 1.0)
+        for model in models
+    ]
+    return {
+        "title": settings.title,
+        "background": [float(c) for c in document.background],
+        "brightest": brightest_of(models),
+        "radius": float(radius),
+        "view": {"eye": eye.tolist(), "target": (eye - ahead * axes[:3, 2]).tolist(),
+                 "fovY": 2 * float(np.arctan(view.tangents[3]))},
+        "gravity": document.file.gravity_m_s2 if document.file else 9.81,
+        "floorY": document.floor_y,
+        "models": entries,
+        "objects": [
+            object_entry(obj, items.get(obj.name), number[id(obj.model)], pictures)
+            for obj in document.scene.objects
+        ],
+        "palettes": palettes_of(out, models),
+    }  # fmt: skip
+
+
+def brightest_of(models: list[Model]) -> float | None:
+    """The largest display value of any colour; None: nothing bounds it."""
+    most = brightest(models)
+    return most if math.isfinite(most) else None
+
+
+def sample(model: Model, every: int) -> Model:
+    """Every so many-th anchor or splat."""
+    if every == 1:
+        return model
+    if isinstance(model, AnchorModel):
+        return model.with_anchors(np.arange(0, len(model.anchors), every))
+    rows = np.arange(0, model.splat_count, every)
+    return model.with_rows(rows)  # type: ignore[union-attr]  # refuse() lets no other kind pass
+
+
+def palettes_of(out: Container, models: list[Model]) -> dict:
+    """All of them, where a stop has one: a page can choose."""
+    if not any(stop.kind == "thermal" and stop.palette for m in models for stop in m.stops):
+        return {}
+    for model in models:
+        for stop in model.stops:
+            if stop.palette:
+                palette_colors(stop.palette)  # an unknown one is refused
+    return {name: out.add_table("a palette", palette_colors(name)) for name in PALETTES}
+
+
+def object_entry(
+    obj: SceneObject, item: SceneItem | None, model: int, pictures: dict[float, str]
+) -> dict:
+    """One object: where it stands, its x, the stops of its slider, its body."""
+    middle, half = bounding_box(obj.model)
+    stops = named_stops(item, obj.model) if item else obj.model.stops
+    states = [{"name": stop.name, "x": float(stop.x)} for stop in stops]
+    for state in states:
+        if not item and state["x"] in pictures:
+            state["picture"] = pictures[state["x"]]
+    touched = item is not None and item.collider is not None
+    room = item is not None and obj.label == 0
+    return {
+        "name": obj.name, "model": model,
+        "position": [float(v) for v in obj.world_from_object.position],
+        "wxyz": [float(v) for v in obj.world_from_object.wxyz],
+        "x": control_entry(obj.model, obj.x), "visible": obj.visible,
+        "centre": middle.tolist(), "half": half.tolist(), "radius": float(np.linalg.norm(half)),
+        "movable": touched and not room and not item.static, "solid": touched,
+        "restitution": item.restitution if item else 0.0, "states": states,
+    }  # fmt: skip
+
+
+def bounding_box(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Middle (3,) and half sides (3,) in the object's frame, metres, of what can be seen."""
+    points, opacity = model_points(model)
+    finite = np.isfinite(points).all(axis=1)
+    seen = finite & (opacity > 0.1)
+    points = points[seen if seen.any() else finite].astype(np.float64)
+    low, high = np.percentile(points, BOX, axis=0) if len(points) else (np.zeros(3), np.zeros(3))
+    return (low + high) / 2, (high - low) / 2
+
+
+def stop_pictures(document: Document, progress: Progress) -> dict[float, str]:
+    """x -> data address of a small WebP of every stop, of one model alone."""
+    if document.file or len(document.scene.objects) != 1:
+        return {}
+    from PIL import Image
+
+    stops = [stop.x for stop in document.scene.objects[0].model.stops][:MOST_PICTURES]
+    found = {}
+    with Renderer(None, sort="numpy") as renderer:
+        for number, x in enumerate(stops):
+            progress("drawing pictures of the stops", number / (len(stops) + 1))
+            objects = tuple(replace(obj, x=x) for obj in document.scene.objects)
+            renderer.update(Scene(objects))
+            renderer.draw([document.view(PICTURE)])
+            picture = over_background(renderer.image(0), document.background)
+            bytes_ = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)
+            file = io.BytesIO()
+            Image.fromarray(bytes_).save(file, "WEBP", quality=QUALITY)
+            address = base64.b64encode(file.getvalue()).decode()
+            found[x] = f"data:image/webp;base64,{address}"
+    return found

@@ -1,0 +1,196 @@
+"""Models as a web page reads them: tables, networks cut for its shaders, stops and paces."""
+
+import numpy as np
+
+from shapeshift.runtime_models.model import (
+    SIZE_PER_SPLAT,
+    AnchorModel,
+    BadFile,
+    Mlp,
+    Model,
+    ScaffoldModel,
+    SplatLayers,
+)
+from shapeshift.runtime_models.stop_weights import Control, StopWeights
+from shapeshift.runtime_models.web.limits import (
+    COLOR_BITS,
+    FEATURE_BITS,
+    FRAME_BITS,
+    HARMONIC_BITS,
+    MOST_ANCHORS,
+    MOST_SPLATS,
+    MOST_WEIGHTS,
+    POSITION_STEP,
+)
+from shapeshift.runtime_models.web.write_container import Container
+
+LARGEST = float(np.finfo(np.float32).max)
+SMALLEST_SCALE = 1e-12  # metres: scales of plain splats are stored by their logarithm
+
+
+def describe_model(out: Container, model: Model, swell: float = 1.0) -> dict:
+    """The entry of a model in the table of contents; its arrays go into `out`.
+
+    swell: how much larger its splats are drawn, where it is a coarse sample.  Raises BadFile for
+    what a page cannot show.
+    """
+    if isinstance(model, ScaffoldModel):
+        raise BadFile(
+            "the splats of this model follow the eye (Scaffold-GS, Octree-GS), which a page cannot "
+            "do; export it as plain splats first (--out scene.ply), then those as a page."
+        )
+    check_counts(model)
+    shared = {"swell": float(swell), **describe_stops(model)}
+    if isinstance(model, AnchorModel):
+        return {**shared, **describe_anchors(out, model)}
+    return {**shared, **describe_layers(out, model)}
+
+
+def check_counts(model: AnchorModel | SplatLayers) -> None:
+    """BadFile, one sentence, for more than a page can hold, or nothing."""
+    anchors = len(model.anchors) if isinstance(model, AnchorModel) else model.splat_count
+    if not 0 < model.splat_count <= MOST_SPLATS or anchors > MOST_ANCHORS:
+        raise BadFile(
+            f"the scene has {model.splat_count:,} splats; a page shows 1 to {MOST_SPLATS:,}: "
+            "--max-splats keeps the most visible ones of plain splats."
+        )
+
+
+def describe_stops(model: AnchorModel | SplatLayers) -> dict:
+    """Stops, and the paces between them by their numbers."""
+    names = model.blend.names
+    stops = [
+        {"name": stop.name, "x": stop.x, "kind": stop.kind, "palette": stop.palette,
+         "valueRange": stop.value_range, "unit": stop.unit}
+        for stop in model.stops
+    ]  # fmt: skip
+    pace = [
+        {"start": names.index(p.start), "end": names.index(p.end), "blend": list(p.blend)}
+        for p in model.blend.pace
+        if p.start in names and p.end in names
+    ]
+    return {"stops": stops, "pace": pace, "direct": model.blend.direct}
+
+
+def control_entry(model: Model, x: Control) -> float | list[float]:
+    """A control: x, or the weights of all stops in their order."""
+    if isinstance(x, StopWeights):
+        return [float(weight) for weight in model.blend.weights(x)]
+    return float(x)
+
+
+def describe_anchors(out: Container, model: AnchorModel) -> dict:
+    features = padded(model.features)  # (A, 4 n)
+    entry = {
+        "kind": "anchors", "anchors": len(model.anchors), "perAnchor": model.splats_per_anchor,
+        "featureVecs": features.shape[1] // 4,
+        "encoding": {"d": model.encoding.d, "spacing": float(model.encoding.spacing),
+                     "sigma": float(model.encoding.sigma)},
+        "positions": add_positions(out, model.anchors),
+        "features": out.add_table("features", features, FEATURE_BITS),
+        "networks": {name: network(out, mlp, name, model) for name, mlp in model.networks.items()},
+    }  # fmt: skip
+    if model.frames is not None:
+        entry |= add_frames(out, model.frames.scales, model.frames.wxyz)
+    return entry
+
+
+def describe_layers(out: Container, model: SplatLayers) -> dict:
+    """Plain splats: one set a stop, weighed by x."""
+    count, coefficients, _ = model.sh.shape
+    flat = model.sh.reshape(count, -1)
+    entry = {
+        "kind": "layers", "anchors": count, "perAnchor": 1, "mode": model.mode,
+        "antialiased": model.antialiased, "coefficients": coefficients,
+        "positions": add_positions(out, model.means),
+        **add_frames(out, model.scales, model.wxyz),
+        "opacity": out.add_table("opacities", model.opacity[:, None], COLOR_BITS),
+        "layer": out.add(model.layer, "uint8"),
+        "sh": out.add_table("colours", flat[:, :3], COLOR_BITS),
+    }  # fmt: skip
+    if coefficients > 1:
+        entry["shRest"] = out.add_table("harmonics", flat[:, 3:], HARMONIC_BITS)
+    return entry
+
+
+def add_frames(out: Container, scales: np.ndarray, wxyz: np.ndarray) -> dict:
+    """Scales (N, 3) by their logarithm and quaternions (N, 4)."""
+    logs = np.log(np.maximum(scales.astype(np.float64), SMALLEST_SCALE))
+    return {
+        "scales": out.add_table("scales", logs, FRAME_BITS),
+        "wxyz": out.add_table("quaternions", wxyz, FRAME_BITS),
+    }
+
+
+def add_positions(out: Container, positions: np.ndarray) -> dict:
+    """Places (N, 3) in 16 bits, or in 24 where a few far ones would make those coarse."""
+    places = positions.astype(np.float64)
+    low, high = np.nanpercentile(places, (2, 98), axis=0)
+    radius = max(float(np.linalg.norm(high - low)) / 2, float(np.finfo(np.float32).tiny))
+    step = float((places.max(axis=0) - places.min(axis=0)).max()) / 65535
+    return out.add_table("positions", positions, 16 if step <= POSITION_STEP * radius else 24)
+
+
+def padded(table: np.ndarray) -> np.ndarray:
+    """(N, C) -> (N, next multiple of 4), zeros beyond C."""
+    width = 4 * max(1, -(-table.shape[1] // 4))
+    whole = np.zeros((len(table), width), np.float32)
+    whole[:, : table.shape[1]] = table
+    return whole
+
+
+def network(out: Container, mlp: Mlp, name: str, model: AnchorModel) -> dict:
+    """One network: layers in vectors of four, what Psi enters with apart, as the page adds it to
+    the first bias.
+    """
+    widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
+    part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
+    weights, biases = list(mlp.weights), list(mlp.biases)
+    weights[-1], biases[-1] = a_vector_a_splat(weights[-1], biases[-1], SIZE_PER_SPLAT[name])
+    first = weights[0]  # (outputs, inputs)
+    looks, control = "direction" in mlp.inputs, None
+    columns = [padded(as_features(first, part_of, widths["feature"]))]
+    if looks:
+        columns.append(padded(first[:, part_of == "direction"]))
+    if "control" in mlp.inputs:
+        control = out.add(padded(first[:, part_of == "control"].T).T)
+    weights[0] = np.concatenate(columns, axis=1)
+    layers, count = [], 0
+    for weight, bias in zip(weights, biases, strict=True):
+        table = vector_weights(weight)  # (outputs / 4, inputs, 4)
+        count += table.size
+        layers.append({"ins": table.shape[1] // 4, "outs": len(table), "weights": out.add(table),
+                       "bias": out.add(padded(bias[None]))})  # fmt: skip
+    if not (count <= MOST_WEIGHTS and len(layers) <= 4 and all(la["outs"] <= 64 for la in layers)):
+        raise BadFile(
+            f"the {name} network has {len(layers)} layers and {count:,} weights; a page runs at "
+            f"most 4 layers of 256 units and {MOST_WEIGHTS:,} weights: train with smaller ones."
+        )
+    low, high = mlp.clip or (-LARGEST, LARGEST)
+    return {"layers": layers, "control": control, "looks": looks, "head": mlp.head,
+            "clip": [float(low), float(high)], "gain": float(mlp.gain)}  # fmt: skip
+
+
+def as_features(first: np.ndarray, part_of: np.ndarray, width: int) -> np.ndarray:
+    """(outputs, F) what features enter the first layer with; zeros where they do not."""
+    if "feature" in part_of:
+        return first[:, part_of == "feature"]
+    return np.zeros((len(first), width), np.float32)
+
+
+def a_vector_a_splat(
+    weight: np.ndarray, bias: np.ndarray, size: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """A last layer whose rows are padded so that three numbers of a splat are a vector of four."""
+    if size != 3:
+        return weight, bias
+    count, inputs = len(bias) // size, weight.shape[1]
+    rows, row = np.zeros((count, 4, inputs), np.float32), np.zeros((count, 4), np.float32)
+    rows[:, :size], row[:, :size] = weight.reshape(count, size, inputs), bias.reshape(count, size)
+    return rows.reshape(4 * count, inputs), row.reshape(-1)
+
+
+def vector_weights(weight: np.ndarray) -> np.ndarray:
+    """(out, in) -> (out / 4, in, 4), zeros beyond both: what a shader adds up vector by vector."""
+    whole = padded(padded(weight).T).T  # both multiples of 4
+    return whole.reshape(-1, 4, whole.shape[1]).transpose(0, 2, 1)

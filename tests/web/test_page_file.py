@@ -1,0 +1,140 @@
+"""The page as a file: its modules, its policy, what it refuses."""
+
+import re
+import zipfile
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.web.page_scenes import paced_model, plain_splats
+
+from shapeshift.app.document import Document
+from shapeshift.app.errors import UsageError
+from shapeshift.app.page.conventions import conventions_text
+from shapeshift.app.page.export_page import export_page
+from shapeshift.app.page.page_file import MODULES, digest, one_file, one_script, page_text
+from shapeshift.app.page.page_scene import PageSettings, page_scene
+from shapeshift.runtime_models.model import BadFile, ScaffoldModel
+from shapeshift.scene.scene import Scene
+from shapeshift.scene.selectors.selector import Sphere
+
+ROOT = Path(__file__).resolve().parents[2]
+WEB = ROOT / "web"
+MOST_CODE = 80_000  # bytes of script, as a page has it
+PLAIN = PageSettings("a <scene> & more", pictures=False)
+
+
+def nothing(*_):
+    """No progress is shown."""
+
+
+def test_constants_are_those_of_python():
+    text = (WEB / "conventions.js").read_text()
+    assert text == conventions_text(), "run python3 tools/web/write_conventions.py"
+
+
+def test_each_module_comes_after_what_it_imports():
+    assert {path.stem for path in WEB.glob("*.js")} == set(MODULES)
+    for i, name in enumerate(MODULES):
+        text = (WEB / f"{name}.js").read_text()
+        for other in re.findall(r'^import .* from "\./(\w+)\.js";$', text, re.M):
+            assert other in MODULES[:i], f"{name}.js imports {other}.js, which comes later"
+        assert not re.findall(r"^import (?!\{.*\} from \"\./\w+\.js\";$).*", text, re.M), name
+
+
+def test_names_at_the_top_of_modules_are_unique():
+    """They share one scope in the page of one file."""
+    top = re.compile(
+        r"^(?:export )?(?:async )?(?:const|let|class|function\*?) (?!vec2|int)(\w+)", re.M
+    )
+    names = [name for path in WEB.glob("*.js") for name in top.findall(path.read_text())]
+    assert len(names) == len(set(names)), sorted({n for n in names if names.count(n) > 1})
+
+
+def test_the_code_is_small_and_asks_for_nothing_elsewhere():
+    script, page = one_script(), (WEB / "index.html").read_text()
+    assert len(script.encode()) <= MOST_CODE
+    assert not re.search(r"https?:|\beval\(|new Function|innerHTML|document\.write", script + page)
+    assert not re.search(r"\son\w+=|\sstyle=", page)  # the policy would refuse them
+
+
+def test_files_and_functions_stay_readable():
+    for path in WEB.glob("*.js"):
+        text = path.read_text()
+        assert len(text.splitlines()) <= 400 and text.startswith("// " + path.stem + ":"), path
+
+
+def test_the_policy_allows_what_is_in_the_page_and_no_more():
+    page = page_text("<title>", b"0" * 12)
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)[1]
+    script = re.search(r'<script type="module">(.*?)</script>', page, re.S)[1]
+    style = re.search(r"<style>(.*?)</style>", page, re.S)[1]
+    assert (
+        f"script-src {digest(script)} blob:;" in policy and f"style-src {digest(style)};" in policy
+    )
+    assert policy.startswith("default-src 'none'") and "connect-src" not in policy
+    assert "<title>&lt;title&gt;</title>" in page
+    assert "connect-src 'self'" in page_text("x", None)
+
+
+def test_the_same_scene_gives_the_same_bytes(tmp_path):
+    document = Document.of(paced_model(20))
+    for name in ("page.html", "page.zip"):
+        sizes = [export_page(document, tmp_path / name, PLAIN, nothing) for _ in range(2)]
+        first = (tmp_path / name).read_bytes()
+        export_page(document, tmp_path / f"again-{name}", PLAIN, nothing)
+        assert (tmp_path / f"again-{name}").read_bytes() == first and sizes == [len(first)] * 2
+
+
+def test_a_folder_and_a_zip_hold_the_page_and_a_coarse_scene(tmp_path):
+    document = Document.of(plain_splats(800))
+    export_page(document, tmp_path / "site", PLAIN, nothing)
+    export_page(document, tmp_path / "site.zip", PLAIN, nothing)
+    names = {"index.html", "coarse.bin", "scene.bin"}
+    assert {path.name for path in (tmp_path / "site").iterdir()} == names
+    with zipfile.ZipFile(tmp_path / "site.zip") as archive:
+        assert set(archive.namelist()) == names
+        assert archive.read("scene.bin") == (tmp_path / "site" / "scene.bin").read_bytes()
+    coarse = zlib.decompress((tmp_path / "site" / "coarse.bin").read_bytes())
+    whole = zlib.decompress((tmp_path / "site" / "scene.bin").read_bytes())
+    assert whole[:8] == coarse[:8] == b"SHIFTWEB" and len(coarse) < 0.25 * len(whole)
+
+
+def test_what_a_page_cannot_show_is_refused_in_a_sentence(tmp_path):
+    def said(document, error=BadFile, name="page.html"):
+        with pytest.raises(error) as refusal:
+            export_page(document, tmp_path / name, PLAIN, nothing)
+        assert str(refusal.value).endswith(".") and "\n" not in str(refusal.value)
+        assert not list(tmp_path.iterdir())
+        return str(refusal.value)
+
+    model = paced_model(20)
+    offsets = np.zeros((20, 5, 3), np.float32)
+    follows = ScaffoldModel(model.anchors, model.features, offsets, model.anchors, model.networks)
+    assert "follow the eye" in said(Document.of(follows))
+    whole = Document.of(model)
+    region = Sphere(centre=(0, 0, 0), radius=0.5, x=1.0)
+    (obj,) = whole.scene.objects
+    assert "regions" in said(Document(Scene((replace(obj, selectors=(region,)),))))
+    wide = paced_model(10, hidden=(400,))
+    assert "256 units" in said(Document.of(wide))
+    assert "folder or a .zip" in said(whole, UsageError, "page.ply")
+
+
+def test_a_page_too_large_for_one_file_is_refused(monkeypatch):
+    monkeypatch.setattr("shapeshift.app.page.page_file.LARGEST_FILE", 90_000)
+    scene = page_scene(Document.of(plain_splats(800)), PLAIN, nothing)
+    with pytest.raises(BadFile, match=r"big\.html would have .* folder or a \.zip"):
+        one_file("title", scene, "big.html")
+
+
+@pytest.mark.slow
+def test_the_page_of_the_demo_is_no_larger_than_its_package(tmp_path):
+    from shapeshift.runtime_models.read_scene import read_model
+
+    package = ROOT / "assets" / "workshop.shift"
+    document = Document.of(read_model(package))
+    size = export_page(document, tmp_path / "page.html", PageSettings("workshop"), nothing)
+    assert size <= package.stat().st_size

@@ -1,0 +1,138 @@
+"""What a page draws in a real browser, against the float64 reference."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.models import without_control, without_direction
+from support.web.page_pictures import at, decibels, drawn, expected, still, write_page
+from support.web.page_scenes import paced_model, plain_splats, several_objects
+
+from shapeshift.app.document import Document
+from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.metrics import psnr
+
+SIZE = (320, 180)
+# 8-bit rounding alone leaves 58.9 dB of evenly spread values; codes and float32 take the rest.
+LEAST_DB = 54
+WAY = StopWeights((("RGB", 0.3), ("Opened", 0.7)))
+HALF_HEAT = StopWeights((("RGB", 0.5), ("Thermal", 0.5)))
+ALL_THREE = StopWeights((("RGB", 0.2), ("Thermal", 0.5), ("Opened", 0.3)))
+
+
+def opened(browser, document, tmp_path, **settings):
+    """The page of a document, which draws what is asked for alone."""
+    browser.open(write_page(document, tmp_path / "page.html", **settings))
+    assert browser.message() == "" and not browser.complaints()
+    still(browser)
+    return browser
+
+
+def test_every_control_of_a_package_is_drawn_right(browser, tmp_path):
+    """At and between stops, left of the first and right of the last one, and blends of several."""
+    document = Document.of(paced_model())
+    page = opened(browser, document, tmp_path)
+    view = document.view(SIZE)
+    xs = (0.0, 0.1, 0.4, 0.75, 1.0, WAY, HALF_HEAT, ALL_THREE)
+    found = [decibels(page, document, at(document, x), view) for x in xs]
+    assert min(found) >= LEAST_DB, found
+    assert not page.complaints()
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        paced_model(40, framed=False, k=1, features=3, hidden=()),
+        paced_model(61, k=9, features=13, hidden=(30, 18)),
+        without_control(paced_model(50), "offset", "scale", "rotation", "color"),
+        without_direction(paced_model(50, framed=False)),
+        replace(paced_model(50), between_stops="encoding", pace=()),
+    ],
+    ids=["linear", "deep", "only opacity moves", "no direction", "encoded x"],
+)
+def test_networks_of_any_shape_are_drawn_right(browser, tmp_path, model):
+    document = Document.of(model)
+    page = opened(browser, document, tmp_path, exact=True)  # N(0, 1) is hard on 10 bits
+    view = document.view(SIZE)
+    found = [decibels(page, document, at(document, x), view) for x in (0.0, 0.3, 0.7)]
+    assert min(found) >= LEAST_DB, found
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_plain_splats_are_drawn_right(browser, tmp_path, degree):
+    mode = ("exclusive", "cumulative")[degree % 2]
+    model = plain_splats(degree=degree, mode=mode, antialiased=degree > 1, thermal=degree == 2)
+    document = Document.of(model)
+    page = opened(browser, document, tmp_path)
+    view = document.view(SIZE)
+    found = [decibels(page, document, at(document, x), view) for x in (0.0, 0.5, 1.0)]
+    assert min(found) >= LEAST_DB - 6 * (degree > 0), found  # harmonics have 8 bits
+
+
+def test_harmonics_stored_exactly_are_drawn_right(browser, tmp_path):
+    document = Document.of(plain_splats(degree=3, antialiased=True))
+    page = opened(browser, document, tmp_path, exact=True)
+    assert decibels(page, document, at(document, 0.5), document.view(SIZE)) >= LEAST_DB
+
+
+def test_objects_are_each_at_their_own_place_and_x(browser, tmp_path):
+    document = several_objects()
+    page = opened(browser, document, tmp_path, exact=True)
+    view = document.view(SIZE)
+    blend = document.scene.objects[1].x
+    for xs in ((0.0, blend, 0.6, 0.2), (0.4, 0.1, 0.0, 1.0), (0.4, 0.4, 0.5, 0.0)):
+        scene = at(document, *xs)
+        scene = replace(scene, objects=(*scene.objects[:3], document.scene.objects[3]))
+        assert decibels(page, document, scene, view) >= LEAST_DB, xs
+
+
+def test_two_eyes_share_one_order(browser, tmp_path):
+    """Off-centre views side by side, colours and order from the middle of both."""
+    document = Document.of(paced_model())
+    page = opened(browser, document, tmp_path)
+    whole = document.view(SIZE)
+    axes, size = whole.world_from_eye.matrix(), (SIZE[0] // 2, SIZE[1])
+    tangents = ((-0.5, 0.7, -0.6, 0.6), (-0.7, 0.5, -0.6, 0.6))
+    eyes = [
+        replace(
+            whole, size=size, tangents=t,
+            world_from_eye=replace(
+                whole.world_from_eye,
+                position=whole.world_from_eye.position + side * 0.0315 * axes[:3, 0],
+            ),
+        )
+        for side, t in zip((-1, 1), tangents, strict=True)
+    ]  # fmt: skip
+    page.run("shapeshift.renderer.sorter.counted = shapeshift.renderer.sorter.asked, 1")
+    scene = at(document, 0.4)
+    picture = drawn(page, scene, eyes)
+    middle = whole.world_from_eye.position
+    wanted = [expected(document, scene, eye, middle) for eye in eyes]
+    assert psnr(picture[:, : size[0]], wanted[0]) >= LEAST_DB - 2  # kept order: 0.0315 m away
+    assert psnr(picture[:, size[0] :], wanted[1]) >= LEAST_DB - 2
+    assert psnr(wanted[0], wanted[1]) < 40  # or the two could have been exchanged
+
+
+def test_half_floats_and_bytes_are_blended_where_a_device_has_no_more(browser, tmp_path):
+    document = Document.of(paced_model())
+    page = opened(browser, document, tmp_path)
+    view, scene = document.view(SIZE), at(document, 0.0)
+    halves = decibels(page, document, scene, view, "rgba16f")
+    # llvmpipe cuts half floats off instead of rounding them: many layers get too dark.
+    assert halves >= 46, halves
+    assert decibels(page, document, scene, view, "rgba8") >= 36
+
+
+def test_nothing_grows_while_x_moves(browser, tmp_path):
+    document = Document.of(paced_model(60))
+    page = opened(browser, document, tmp_path)
+    view = document.view(SIZE)
+    counts = (
+        "(g => [g.textures.size, g.framebuffers.size, g.buffers.size])(shapeshift.renderer.gpu)"
+    )
+    for x in (0.1, 0.4, 0.7):
+        drawn(page, at(document, x), [view])
+    before = page.run(counts)
+    for x in np.linspace(0, 0.7, 21):
+        drawn(page, at(document, float(x)), [view])
+    assert page.run(counts) == before and page.run("shapeshift.renderer.reads.length") == 0

@@ -1,0 +1,12 @@
+"""Writes web/conventions.js: python3 tools/web/write_conventions.py"""
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from shapeshift.app.page.conventions import conventions_text  # noqa: E402
+from shapeshift.runtime_models.files.whole_file import write_whole  # noqa: E402
+
+write_whole(ROOT / "web" / "conventions.js", conventions_text().encode())

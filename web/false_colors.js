@@ -1,0 +1,41 @@
+// false_colors: where palettes belong, as renderer/colors/false_colors.py has it.  At a pure thermal
+// stop the palette is laid over the whole picture.  Between such a stop and another one both stops'
+// colours are decoded; what is thermal, the heat, is drawn in addition and coloured at the last
+// step.  Where several palettes show at once each splat's heat is coloured before it is drawn.
+
+/** @typedef {import("./stops.js").Control} Control */
+/** @typedef {{stop: number, control: Control, palette: string, weight: number, ofLayer: boolean}} Heat */
+/** @typedef {{rest: Control | null, heats: Heat[], pure: boolean}} Shade */
+/** @typedef {"no heat" | "picture" | "beside" | "splats"} Way */
+
+/**
+ * The colours that an object shows: `rest` where the final ones are decoded, `heats` what thermal
+ * stops have in them.  own: each anchor has weights of its own, and these stops are met somewhere.
+ * @param {any} model @param {Control} control @param {number[] | null} own @returns {Shade}
+ */
+export function shadeOf(model, control, own = null) {
+    const { blend } = model, { stops } = blend, follows = model.colorsFollow, weights = own ?? blend.weights(control);
+    const at = follows ? control : 0;
+    const thermal = stops.map((/** @type {any} */ _, /** @type {number} */ s) => s)
+        .filter((/** @type {number} */ s) => stops[s].kind === "thermal" && stops[s].palette && weights[s] > 0);
+    if (!thermal.length) return { rest: at, heats: [], pure: false };
+    const others = weights.map((/** @type {number} */ weight, /** @type {number} */ s) => (thermal.includes(s) ? 0 : weight));
+    const left = others.reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0), pure = !left && thermal.length === 1;
+    const layered = model.kind === "layers" && model.mode === "exclusive" && !pure;
+    const heats = thermal.map((/** @type {number} */ s) => ({
+        stop: s, palette: stops[s].palette, ofLayer: layered,
+        control: pure && !own ? at : follows ? stops[s].x : 0,
+        weight: pure ? 1 : weights[s],
+    }));
+    if (pure) return { rest: null, heats, pure: true };
+    if (layered) return { rest: 0, heats, pure: false };
+    return { rest: left ? (follows ? others.map((/** @type {number} */ weight) => weight / left) : 0) : null, heats, pure: false };
+}
+
+/** How all shades of a scene together come about. @param {Shade[]} shades @returns {{way: Way, palette: string}} */
+export function wayOf(shades) {
+    const names = [...new Set(shades.flatMap((shade) => shade.heats.map((heat) => heat.palette)))];
+    if (!names.length) return { way: "no heat", palette: "" };
+    if (names.length > 1) return { way: "splats", palette: "" };
+    return { way: shades.every((shade) => shade.pure) ? "picture" : "beside", palette: names[0] };
+}
