@@ -203,8 +203,8 @@ def main() -> None:
             key = ",".join(line.split(",cpu")[0].split('"')[:2])
             lines = [old for old in lines if ",".join(old.split('"')[:2]) != key] + [line]
             command = "python tools/training/styles.py SCENE --out docs/bench/styles.csv"
-            where = f"{platform.machine()}, {device.name}, {device.platform}"
-            text = [f"# {command} --pictures FOLDER; {where}", COLUMNS, *lines]
+            machine = f"# {platform.machine()}, {device.name}, {device.platform}"
+            text = [f"# {command} --pictures FOLDER", machine, COLUMNS, *lines]
             arguments.out.write_text("\n".join(text) + "\n")
 
 

@@ -81,14 +81,18 @@ def blocks(splats: Splats, near: Surroundings) -> Splats:
 
 
 def bubbles(splats: Splats, near: Surroundings) -> Splats:
-    """Soap: round, half transparent, of several sizes, lighter than what they are blown from."""
-    size = near.even_grain * (0.35 + 0.75 * near.slot)
-    sheen = 0.8 + 0.2 * waves(splats.means / (0.08 * near.radius))
+    """Soap: of each anchor a round bubble, half transparent, and on it a small white light."""
+    ball, light = near.slot < 0.2, near.slot > 0.8
+    size = near.even_grain * np.where(light, 0.16, 0.62)
+    aside = np.where(light, 0.35, 0.0) * near.even_grain
+    sheen = 0.5 + 0.5 * waves(splats.means / (0.15 * near.radius))
+    color = 0.8 * own_color(splats, near) + 0.2 * sheen
     made = replace(
         splats,
+        means=splats.means + aside[:, None] * unit(UP + outwards(splats, near)),
         scales=np.repeat(size[:, None], 3, axis=1),
-        opacity=solid(splats.opacity, 0.3),
-        color=0.75 * own_color(splats, near) + 0.25 * sheen,
+        opacity=np.where(ball | light, solid(splats.opacity, 0.6), -0.5),
+        color=np.where(light[:, None], 0.97, color),
     )
     return where_present(splats, made)
 
@@ -104,8 +108,8 @@ def melt(splats: Splats, near: Surroundings) -> Splats:
     """Wax: what is high sinks most, runs down in drops, and spreads."""
     high = np.clip((splats.means[:, 1] - near.floor) / near.radius, 0, 1.5)
     run = 0.5 + 0.5 * waves(splats.means[:, [0, 2, 0]] / (0.08 * near.radius))[:, 0]
-    down = near.even_grain * (0.5 + 2.5 * run) * (0.5 + high)
-    size = np.stack([0.6 * near.even_grain, 0.5 * down, 0.6 * near.even_grain], axis=1)
+    down = near.even_grain * (0.5 + 3.5 * run**2) * (0.5 + high)
+    size = np.stack([0.55 * near.even_grain, 0.6 * down, 0.55 * near.even_grain], axis=1)
     made = replace(
         splats,
         means=splats.means - UP * down[:, None],
