@@ -150,7 +150,7 @@ def object_entry(
         "wxyz": [float(v) for v in obj.world_from_object.wxyz],
         "x": control_entry(obj.model, obj.x), "visible": obj.visible,
         "centre": middle.tolist(), "half": half.tolist(), "radius": float(np.linalg.norm(half)),
-        "movable": touched and not room and not item.static, "solid": touched,
+        "movable": item is not None and touched and not room and not item.static, "solid": touched,
         "restitution": item.restitution if item else 0.0, "states": states,
     }  # fmt: skip
 

@@ -22,7 +22,7 @@ Paint = Callable[[np.ndarray], np.ndarray]  # (H, W, 3) display sRGB 0..1 to ano
 Progress = Callable[[str, float], None]
 
 
-class Painted:
+class PaintFunction:
     """A StylePictures: what a function makes of each view's picture."""
 
     def __init__(self, paint: Paint) -> None:
@@ -72,7 +72,7 @@ def add_style(
     except UsageError as error:
         raise UsageError(str(error).replace("--", "")) from None
     if paint is not None:
-        pictures = CarriedPictures(Painted(paint))
+        pictures = CarriedPictures(PaintFunction(paint))
     device = None if pictures is None else open_device(options.device)
     made = put_in(device, model, style, pictures, views, inside, progress)
     return replace(made, pace=measure_pace(made)) if pace else made
