@@ -14,7 +14,6 @@ from shapeshift.runtime_models.stops.remove_stop import remove_stop
 from shapeshift.training.styles.add_style import NewStyle, add_style, drift_db
 from shapeshift.training.styles.carried_pictures import CarriedPictures
 from shapeshift.training.styles.image_network import ImageNetwork
-from shapeshift.training.styles.style_rules import RULES
 from shapeshift.training.styles.style_views import dome_views
 from tests.support.new_stops import wild_stop
 
@@ -40,8 +39,8 @@ def test_random_numbers_in_all_heads_move_no_old_stop(demo, device, tmp_path):
     assert size <= DEMO.stat().st_size
 
 
-@pytest.mark.parametrize("rule", sorted(RULES))
-def test_every_shape(demo, device, tmp_path, rule):
+@pytest.mark.parametrize("rule", ["fur", "blocks", "explode"])
+def test_shapes(demo, device, tmp_path, rule):
     made = add_style(None, demo, NewStyle("New", "RGB", "RGB", rule))
     made, size = filed(made, tmp_path / "new.shift")
     assert min(drift_db(device, demo, made).values()) >= UNMOVED_DB
