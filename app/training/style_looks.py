@@ -132,6 +132,20 @@ def looks_of(options: Options) -> "StylePictures | None":
     return clip_pictures(clip, towards, PatchSettings(options.patches), options.seed)
 
 
+def read_cameras(options: Options, path: Path):
+    """The CameraList of a file.  Raises BadFile, and UsageError for too many."""
+    from shapeshift.app.camera_files import camera_reading
+    from shapeshift.app.terminal import say
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
+
+    cameras = read_camera_list(path, camera_reading(options))
+    for note in cameras.notes:
+        say(note)
+    if len(cameras.views) > 500:
+        raise UsageError(f"--cameras {path} holds {len(cameras.views)} cameras, at most 500 fit.")
+    return cameras
+
+
 def preview_of(
     options: Options,
     device,
@@ -141,13 +155,16 @@ def preview_of(
 ) -> "Rule":
     """The colours of --image without training, as a rule for splats.  Raises BadFile."""
     from shapeshift.scene.cameras.framing import default_background
-    from shapeshift.training.style_features.splat_features import carry_features, scene_views
-    from shapeshift.training.style_features.zero_shot import preview_rule, style_features
+    from shapeshift.training.style_features.splat_features import VIEW_SIZE, scene_views
+    from shapeshift.training.style_features.zero_shot import StylePreview, recolor_rule
     from shapeshift.training.styles.add_style import BEHIND
+    from shapeshift.training.styles.style_views import resized_views
 
     assert options.vgg is not None and options.image is not None, "checked before"
     picture = style_picture(options.image)
-    x = next(stop.x for stop in model.stops if stop.name == source)
+    views = scene_views(model)
+    if options.cameras is not None:
+        views = resized_views(read_cameras(options, options.cameras).views, VIEW_SIZE[0])
     behind = default_background(model, BEHIND)
-    scene = carry_features(device, model, x, options.vgg, scene_views(model), behind, progress)
-    return preview_rule(scene, style_features(options.vgg, picture, scene), options.seed)
+    preview = StylePreview(device, model, source, options.vgg, views, behind, progress)
+    return recolor_rule(preview.colors(picture, seed=options.seed))

@@ -1,11 +1,10 @@
 """What a new stop is learned from, as the options of `style` say it."""
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.errors import UsageError
-from shapeshift.app.training.style_looks import looks_of, views_and_size
+from shapeshift.app.training.style_looks import looks_of, read_cameras, views_and_size
 from shapeshift.app.training.style_options import Options
 from shapeshift.runtime_models.model import AnchorModel
 
@@ -55,20 +54,6 @@ def pictures_and_views(
     if options.pictures is not None:
         return CarriedPictures(PictureFiles(files_for(options.pictures, names))), views
     return looks or CarriedPictures(network_of(options)), views
-
-
-def read_cameras(options: Options, path: Path):
-    """The CameraList of a file.  Raises BadFile, and UsageError for too many."""
-    from shapeshift.app.camera_files import camera_reading
-    from shapeshift.app.terminal import say
-    from shapeshift.scene.cameras.read_cameras import read_camera_list
-
-    cameras = read_camera_list(path, camera_reading(options))
-    for note in cameras.notes:
-        say(note)
-    if len(cameras.views) > 500:
-        raise UsageError(f"--cameras {path} holds {len(cameras.views)} cameras, at most 500 fit.")
-    return cameras
 
 
 def network_of(options: Options) -> "StylePictures":

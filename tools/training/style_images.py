@@ -35,14 +35,13 @@ from shapeshift.training.style_features.nnfm_pictures import (  # noqa: E402
     nnfm_pictures,
 )
 from shapeshift.training.style_features.splat_features import (  # noqa: E402
-    carry_features,
     drawn,
     scene_views,
 )
 from shapeshift.training.style_features.vgg_style import VggStyle  # noqa: E402
 from shapeshift.training.style_features.zero_shot import (  # noqa: E402
-    preview_rule,
-    style_features,
+    StylePreview,
+    recolor_rule,
 )
 from shapeshift.training.styles.add_style import (  # noqa: E402
     BEHIND,
@@ -122,9 +121,9 @@ def by_turns(device, model, vgg: Path, picture: np.ndarray, behind, steps: int):
 def as_preview(device, model, vgg: Path, picture: np.ndarray, behind, steps: int):
     """The same without training, as `style --quality preview` makes it."""
     began, source = cpu_s(), model.stops[0]
-    scene = carry_features(device, model, source.x, vgg, scene_views(model), behind)
+    preview = StylePreview(device, model, source.name, vgg, scene_views(model), behind)
     once = cpu_s() - began
-    rule = preview_rule(scene, style_features(vgg, picture, scene))
+    rule = recolor_rule(preview.colors(picture))
     style = NewStyle("Style", source.name, source.name)
     return once, add_style(device, model, style, recolor=rule)
 

@@ -4,6 +4,7 @@
 style, and the splats have one colour from everywhere, so there is nothing that could flicker.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,11 +13,16 @@ import numpy as np
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import project
 from shapeshift.rasterizer.raster import rasterize
-from shapeshift.runtime_models.model import Splats
+from shapeshift.runtime_models.model import AnchorModel, Splats
 from shapeshift.scene.pose import View
 from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.evaluation.evaluate import ModelRenderer
-from shapeshift.training.style_features.splat_features import LAYERS, SplatFeatures, bilinear
+from shapeshift.training.style_features.splat_features import (
+    LAYERS,
+    SplatFeatures,
+    bilinear,
+    carry_features,
+)
 from shapeshift.training.style_features.vgg_features import VggFeatures
 from shapeshift.training.styles.style_rules import Rule, Surroundings
 
@@ -85,9 +91,32 @@ def all_colors(scene: SplatFeatures, colors: np.ndarray) -> np.ndarray:
     return np.clip(colors, 0, 1)[scene.nearest]
 
 
-def preview_rule(scene: SplatFeatures, style: StyleFeatures, seed: int = 0) -> Rule:
-    """The colours as a rule for splats, so that a stop learns them without pictures."""
-    colors = all_colors(scene, styled_colors(scene, style, seed=seed))
+class StylePreview:
+    """One stop of a scene, ready to be shown in any style: for thumbnails and a live strength."""
+
+    def __init__(
+        self, device, model: AnchorModel, stop: str, vgg: Path, views: Sequence[View],
+        behind: Color, progress: Callable[[str, float], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Carries the features, some 20 seconds of a core.  Raises BadFile."""
+        x = next(each.x for each in model.stops if each.name == stop)
+        self.device, self.vgg, self.behind = device, vgg, behind
+        self.renderer = ModelRenderer(device, model)
+        self.renderer.set_control(x)
+        self.scene = carry_features(device, model, x, vgg, views, behind, progress)
+
+    def colors(self, picture: np.ndarray, strength: float = 1.0, seed: int = 0) -> np.ndarray:
+        """(N, 3) of every splat in the style of a picture (H, W, 3); under a second of a core."""
+        style = style_features(self.vgg, picture, self.scene)
+        return all_colors(self.scene, styled_colors(self.scene, style, strength, seed))
+
+    def draw(self, colors: np.ndarray, view: View) -> np.ndarray:
+        """(H, W, 3) float32 of the stop with these colours: a thumbnail."""
+        return draw_preview(self.device, self.renderer, colors, view, self.behind)
+
+
+def recolor_rule(colors: np.ndarray) -> Rule:
+    """Colours (N, 3) as a rule for splats, so that a stop learns them without pictures."""
 
     def recolored(splats: Splats, near: Surroundings) -> Splats:
         return replace(splats, color=np.where(splats.opacity[:, None] > 0, colors, splats.color))

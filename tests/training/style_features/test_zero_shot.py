@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.evaluation.evaluate import ModelRenderer
 from shapeshift.training.style_features import splat_features as carrying
@@ -17,9 +18,11 @@ from shapeshift.training.style_features.splat_features import (
 )
 from shapeshift.training.style_features.zero_shot import (
     StyleFeatures,
+    StylePreview,
     adain,
     all_colors,
     draw_preview,
+    recolor_rule,
     style_features,
     styled_colors,
 )
@@ -143,6 +146,25 @@ def test_a_thumbnail_with_the_own_colours_is_the_renderers_picture(carried, devi
     wanted = np.clip(renderer.picture(view, GREY), 0, 1)
     own = renderer.evaluator.color(0.0, view.world_from_eye.position)
     np.testing.assert_array_equal(draw_preview(device, renderer, own, view, GREY), wanted)
+
+
+def test_a_preview_of_a_stop_by_its_name(carried, device):
+    model, vgg, scene = carried
+    views = dome_views(model, 5, (96, 72))
+    preview = StylePreview(device, model, "RGB", vgg, views, GREY)
+    np.testing.assert_array_equal(preview.scene.low, scene.low)
+    picture = np.full((24, 24, 3), 0.75, np.float32)
+    colors = preview.colors(picture)
+    np.testing.assert_allclose(colors, 0.75, atol=1e-6)
+    np.testing.assert_allclose(preview.colors(picture, 0.0), all_colors(scene, scene.colors))
+    shown = preview.draw(colors, views[0])
+    assert shown.shape == (72, 96, 3) and 0.4 < shown.max() <= 0.7501
+    splats = evaluate(model, 0.0, np.array([0.3, 0.5, 2.0]))
+    made = recolor_rule(colors)(splats, None)
+    there = splats.opacity > 0
+    np.testing.assert_array_equal(made.color[there], colors[there])
+    np.testing.assert_array_equal(made.color[~there], splats.color[~there])
+    assert made.means is splats.means and made.opacity is splats.opacity
 
 
 def test_views_that_see_nothing(carried, device, monkeypatch):
