@@ -9,7 +9,7 @@ from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
 from shapeshift.app.editor.panels.slider import draw_slider
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.track import shown_stop
+from shapeshift.app.editor.state.track import shown_words
 from shapeshift.app.headset.pacing import QUALITIES
 from shapeshift.app.headset.xr_user import XrState
 
@@ -41,7 +41,7 @@ def draw_head(state: EditorState, ui_scale: float) -> None:
     for index in state.sliders:
         imgui.push_id(index)
         obj = state.scene.objects[index]
-        _named(state, obj.name, shown_stop(state.stops(index), obj.slider_x), ui_scale)
+        _named(state, obj.name, shown_words(state.stops(index), obj.x, obj.slider_x), ui_scale)
         draw_slider(state, index, ui_scale)
         imgui.pop_id()
     for sentence in state.messages.problems:

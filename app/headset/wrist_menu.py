@@ -21,7 +21,7 @@ from shapeshift.app.editor.state.arrange import steer_by_hand
 from shapeshift.app.editor.state.film.gallery import Gallery
 from shapeshift.app.editor.state.film.style_work import StyleWork
 from shapeshift.app.editor.state.object_edits import ObjectEdits
-from shapeshift.app.editor.state.track import ON_STOP, shown_stop
+from shapeshift.app.editor.state.track import ON_STOP, shown_words
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.performance_section import draw_figures
 from shapeshift.app.headset.room_section import (
@@ -237,7 +237,7 @@ class WristMenu:
         obj, shown = None, ""
         for index in editor.sliders[:1]:
             obj = editor.scene.objects[index]
-            shown = shown_stop(editor.stops(index), obj.slider_x)
+            shown = shown_words(editor.stops(index), obj.x, obj.slider_x)
         side = carried.home if carried.open else ""
         row: dict = {"open": carried.open, "hand": side, "shown": shown}
         pose = carried.play_from_panel

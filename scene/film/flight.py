@@ -38,11 +38,16 @@ class Flight:
 
     def view(self, place: float, size: tuple[int, int]) -> View:
         """The view at a place 0..1 of the way."""
-        at = np.array([np.clip(place, 0, 1) * (len(self.eyes) - 1)])
-        wxyz = along(self.wxyz, at, False)[0]
-        up = float(along(self.tan_up[:, None], at, False)[0, 0])
+        at = np.clip(place, 0, 1) * (len(self.eyes) - 1)
+        first = max(int(at) - 2, 0)
+        near = slice(first, int(at) + 4)  # the spline knows its neighbours alone
+        eye, wxyz, tan_up = (
+            along(keys[near], np.array([at - first]), False)[0]
+            for keys in (self.eyes, self.wxyz, self.tan_up[:, None])
+        )
+        up = float(tan_up[0])
         right = up * size[0] / size[1]
-        pose = Pose(along(self.eyes, at, False)[0], wxyz / np.linalg.norm(wxyz))
+        pose = Pose(eye, wxyz / np.linalg.norm(wxyz))
         return View(pose, (-right, right, -up, up), *self.depth_range, size)
 
 

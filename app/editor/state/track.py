@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import Control, StopWeights
 from shapeshift.scene.control import SNAP, snap
 
 STEP = 0.01  # of x: one press of an arrow key
@@ -88,6 +89,22 @@ def shown_stop(stops: Sequence[Stop], x: float) -> str:
         return f"{below[-1].name} to {above[0].name}, {percent} %"
     end = (below[-1:] or above[:1])[0].name if stops else ""
     return f"{end}  x {x:.2f}".strip()
+
+
+def shown_words(stops: Sequence[Stop], control: Control, x: float) -> str:
+    """The same of a control whose knob stands at x: a blend of two stops is between these two,
+    whatever stop the knob has come to.
+    """
+    if not is_blend(control):
+        return shown_stop(stops, x)
+    assert isinstance(control, StopWeights)
+    (start, _), (end, weight) = control.parts[0], control.parts[-1]
+    return f"{start} to {end}, {100 * weight:.0f} %"
+
+
+def is_blend(control: Control) -> bool:
+    """Whether it shows several stops, wherever its knob stands."""
+    return isinstance(control, StopWeights) and len(control.parts) > 1
 
 
 def stepped(x: float, steps: int) -> float:

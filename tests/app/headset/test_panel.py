@@ -308,7 +308,12 @@ def test_the_gallery_is_the_desktop_s(cube):
     cube.press("ice")
     cube.press("fire")
     assert gallery.picked == ("ice", "fire") and cube.x("cube") == 0.5
-    cube.scroll()
+    place = (PANEL.size[0] / 2, PANEL.size[1] * 0.7)
+    for _ in range(200):  # until the slider and its buttons are in sight
+        if {"way", "Slide", "Add style"} <= set(cube.labels()):
+            break
+        cube.point(place, stick=(0.0, -1.0))
+    cube.wait()
     left, top, right, low = cube.menu.picture.boxes["way"]
     middle = ((left + right) / 2, (top + low) / 2)
     for trigger in (0.0, 1.0, 1.0, 0.0):

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.state.track import shown_stop
+from shapeshift.app.editor.state.track import shown_stop, shown_words
 from shapeshift.app.headset.notices import BEGINS_S, BELOW, QUIET_S, SHOWN_S, Late, late_card
 from shapeshift.app.headset.room_section import SIZES, next_scale, size_text
 from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.document.edits import hide
 from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.world.reactions import State
@@ -115,6 +116,15 @@ def test_it_says_which_stop_is_shown(x, want):
 def test_beyond_the_last_stop_and_without_any():
     assert shown_stop(STOPS[:3], 0.9) == "fire  x 0.90"
     assert shown_stop((), 0.9) == "x 0.90"
+
+
+def test_a_blend_is_named_by_its_stops_wherever_its_knob_stands():
+    half = StopWeights(((STOPS[0].name, 0.4), (STOPS[-1].name, 0.6)))
+    for x in (STOPS[1].x, 0.6):
+        assert shown_words(STOPS, half, x) == f"{STOPS[0].name} to {STOPS[-1].name}, 60 %"
+    alone = StopWeights(((STOPS[1].name, 1.0),))
+    assert shown_words(STOPS, alone, STOPS[1].x) == STOPS[1].name
+    assert shown_words(STOPS, STOPS[1].x, STOPS[1].x) == STOPS[1].name
 
 
 def test_late_frames_are_told_for_a_moment_and_not_again_at_once():

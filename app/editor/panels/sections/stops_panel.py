@@ -6,6 +6,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import choice, slider, tip
 from shapeshift.app.editor.state.arrange import go_to_stop
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.track import is_blend
 from shapeshift.scene.control import EASES, MODES, Sweep
 
 Vec = imgui.ImVec2
@@ -49,7 +50,8 @@ def _stop_buttons(state: EditorState, index: int, ui_scale: float) -> None:
     for number, stop in enumerate(stops):
         if number % columns:
             imgui.same_line()
-        lit = abs(stop.x - state.scene.objects[index].slider_x) < 1e-3
+        obj = state.scene.objects[index]
+        lit = abs(stop.x - obj.slider_x) < 1e-3 and not is_blend(obj.x)
         if lit:
             imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
         if imgui.button(f"{stop.name}###stop {number}", Vec(width, 0)):
