@@ -65,8 +65,9 @@ class TrainSettings:
     """Most megabytes of the package on disk, from the start on.  Default: no limit."""
     points: str = "auto"
     """Where the first anchors stand: capture (COLMAP's points or the capture's own), depth (its
-    depth photos), hull (of masks or a known background), random, or a point cloud in the capture's
-    world (PLY, LAS, LAZ, NPZ).  auto: the first of these that there is."""
+    depth photos), hull (of masks or a known background), triangulated (out of the photos), random,
+    or a point cloud in the capture's world (PLY, LAS, LAZ, NPZ).  auto: the first of these that
+    there is."""
     downscale: int | None = None
     """Divide the photos' sides by this number.  Default: such that neither exceeds 640 pixels."""
     masks: Masks = "object"

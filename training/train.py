@@ -22,7 +22,7 @@ from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.export import model_of
 from shapeshift.training.first_anchors.first_anchors import first_anchors
-from shapeshift.training.first_anchors.initial import initial_points
+from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import (
@@ -75,10 +75,12 @@ class Trainer(Run):
         settings: TrainSettings,
         resume: tuple | None = None,
         loaded: dict[str, list[LoadedPhoto]] | None = None,
+        report: Report | None = None,
     ) -> None:
         """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller.
 
-        loaded: photos of the splits train and test, where they were read before.
+        loaded: photos of the splits train and test, where they were read before; report: called
+        with words while the first points take long.
         """
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
@@ -109,7 +111,7 @@ class Trainer(Run):
         self.lr_warmup = LrWarmup()
         self.photo_contrast: dict[tuple, float] = {}
         if resume is None:
-            self.initialise(photos)
+            self.initialise(photos, report)
         else:
             self.restore(*resume)
         self.step = TrainingStep(device, self.layout, self.voxel, self.adam)
@@ -118,11 +120,12 @@ class Trainer(Run):
         if resume is not None:
             self.guard.first_loss = dict(resume[1]["first_loss"])
 
-    def initialise(self, photos: list[LoadedPhoto]) -> None:
+    def initialise(self, photos: list[LoadedPhoto], report: Report | None) -> None:
         """Anchors, features and weights of a new run."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        first = initial_points(self.capture, photos, rng, settings.points)
+        first = initial_points(self.capture, photos, rng, settings.points, report)
+        self.warnings += first.doubts
         self.origin, background = first.origin, self.schedule.background
         start = first_anchors(first, self.anchor_cap, photos, background)
         self.voxel, count = start.voxel, len(start.anchors)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130  # exit code
 SAVE_EVERY = 60.0  # seconds between checkpoints
+READING = "reading photos, finding the first points"
 LOOKS = 10  # at held-out photos in a run
 
 

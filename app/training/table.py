@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
+from shapeshift.app.progress import working
 from shapeshift.app.terminal import say
-from shapeshift.app.training.run_loop import INTERRUPTED
+from shapeshift.app.training.run_loop import INTERRUPTED, READING
 from shapeshift.app.training.table_rows import MEAN, NAMES, TableRow, VggRow, finish, mean_row
 from shapeshift.app.training.train_options import OF_SPLATS, Asked, MachineOptions
 from shapeshift.app.training.train_options import Options as TrainOptions
@@ -166,8 +167,10 @@ def train_method(
         outcome = train_separate(device, capture, settings, out)
     else:
         refuse_foreign(out)
-        trainer = Trainer(device, capture, replace(settings_of(asked.asked), rig=rig))
-        say(describe(trainer))
+        wished = replace(settings_of(asked.asked), rig=rig)
+        with working(READING) as report:
+            trainer = Trainer(device, capture, wished, report=report)
+        say(describe(trainer), *trainer.warnings)
         if train(trainer):
             return None
         write_package(trainer.model(), out)

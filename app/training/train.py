@@ -12,6 +12,7 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import (
     INTERRUPTED,
+    READING,
     calibrated,
     decibels,
     describe,
@@ -64,8 +65,9 @@ def run(options: Options) -> int:
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-    with memory_for_training(), working("reading photos, finding the first anchors"):
-        trainer = Trainer(device, with_extrinsics(capture, settings.rig), settings, resume)
+    with memory_for_training(), working(READING) as shown:
+        given = with_extrinsics(capture, settings.rig)
+        trainer = Trainer(device, given, settings, resume, report=shown)
     say(describe(trainer), *trainer.warnings)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     began, before = time.monotonic(), trainer.iteration

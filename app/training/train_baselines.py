@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, TypeVar
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
+from shapeshift.app.progress import working
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import (
     INTERRUPTED,
+    READING,
     calibrated,
     decibels,
     describe,
@@ -124,8 +126,9 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
     settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
     layers, runs, interrupted = [], {}, False
     for number, part in enumerate(parts):
-        trainer = PlainTrainer(device, part, settings)
-        say(describe_plain(trainer))
+        with working(READING) as report:
+            trainer = PlainTrainer(device, part, settings, report)
+        say(describe_plain(trainer), *trainer.warnings)
         interrupted = train(trainer)
         layers.append((trainer.stop, trainer.splats()))
         file = out / layer_name(number, trainer.stop)
@@ -155,8 +158,9 @@ def train_separate(device, capture: "Capture", settings: "TrainSettings", out: P
     settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
     runs, interrupted = {}, False
     for part in parts:
-        trainer, name = Trainer(device, part, settings), part.stops[0].name
-        say(describe(trainer))
+        with working(READING) as report:
+            trainer, name = Trainer(device, part, settings, report=report), part.stops[0].name
+        say(describe(trainer), *trainer.warnings)
         interrupted = train(trainer)
         write_package(trainer.model(), files[name])
         runs[name] = TrainedFile(files[name], trainer.elapsed, trainer.iteration)

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-ABSENT = 3  # the exit code where pycolmap is not installed or does not load
+ABSENT = 3  # the exit code where pycolmap is not installed: see colmap_child.py
 MOST_ERROR_PX = 8.0  # a mean reprojection error beyond this is no model
 # What is tried where fewer than ENOUGH of the photos find their place: the least angle between the
 # two photos that a model begins with, the inliers that a photo needs, whether matches are guided

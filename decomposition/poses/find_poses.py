@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.decomposition.poses.child import Progress, run_child
 from shapeshift.decomposition.poses.photo_list import PhotoFile, PhotoList
 from shapeshift.decomposition.poses.pose_report import PoseReport
 from shapeshift.decomposition.poses.upright import COLMAP_UP, find_up, length_between, similarity
@@ -19,12 +18,18 @@ from shapeshift.decomposition.poses.write_posed import write_posed
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.colmap_child import Progress, run_child
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_colmap import find_mask
 
 WORK = "poses.work"  # below the folder that is written, as long as the search is not done
 MOST_FOR_ALL_PAIRS = 120  # photos; beyond that neighbours by name are matched alone
 NEIGHBOURS = 10
+SCRIPT = Path(__file__).with_name("colmap_run.py")
+FAILURE = (
+    "the search for poses ended with code {code}, perhaps for want of memory; {log} has its last "
+    "words.  Try smaller photos (--side) or fewer (--every)."
+)
 FEW_POINTS = 60  # that a photo sees: its pose hangs on little
 
 
@@ -74,7 +79,7 @@ def find_poses(
     refuse_links(work)
     masks = copy_masks(photos, settings.masks, work) if settings.masks else None
     job = describe(photos, work, settings, masks)
-    reports = run_child("find", start_job(work, job), work / "log.txt", progress)
+    reports = run_colmap("find", start_job(work, job), progress)
     if not reports or reports[-1]["registered"] < 2:
         raise BadFile(
             f"{photos.root}: no two of its {len(photos.photos)} photos could be placed beside each "
@@ -86,7 +91,7 @@ def find_poses(
     turn, up, scale = frame_of(best, photos, settings.length)
     write_job = work / "write.json"
     write_whole(write_job, json.dumps(job | {"similarity": turn.tolist()}).encode())
-    run_child("write", write_job, work / "log.txt", progress)
+    run_colmap("write", write_job, progress)
     placed = {str(name) for name in best["names"]}
     report = PoseReport(
         photos=len(photos.photos),
@@ -103,6 +108,11 @@ def find_poses(
     )  # fmt: skip
     write_posed(photos, placed, out, work, settings.straight, report)
     return report
+
+
+def run_colmap(what: str, job: Path, progress: Progress) -> list[dict]:
+    """Does `what` of the job, beside which the log is; returns what it reports.  Raises BadFile."""
+    return run_child(SCRIPT, [what, str(job)], job.with_name("log.txt"), progress, FAILURE)
 
 
 def refuse_links(work: Path) -> None:

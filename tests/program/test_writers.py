@@ -10,8 +10,9 @@ FOLDERS = ("app", "decomposition", "rasterizer", "renderer", "runtime_models", "
 
 # Files in temporary folders of our own, in .venv, and in a folder that is not in its place yet.
 OWN = {"first_start.py", "whole_file.py", "las_run.py", "coacd_run.py", "read_las.py",
-       "convex_parts.py", "colmap_run.py", "child.py", "write_package.py", "read_usd.py",
-       "usd_run.py", "read_wrapped.py", "write_video.py"}  # fmt: skip
+       "convex_parts.py", "colmap_run.py", "colmap_child.py", "triangulation.py",
+       "triangulate_run.py", "write_package.py", "read_usd.py", "usd_run.py",
+       "read_wrapped.py", "write_video.py"}  # fmt: skip
 METHODS = {"write_text", "write_bytes", "savez", "savez_compressed", "savetxt", "savefig",
            "tofile", "imwrite", "save", "export", "rename", "os.replace"}  # fmt: skip
 NOT_NAMES = {"file", "held", "arrays", "data"}  # what is open already, or lies in memory

@@ -14,9 +14,9 @@ from shapeshift.training.first_anchors.initial import (
     filler_points,
     initial_points,
     median_neighbour,
-    pixel_of,
     voxel_centres,
 )
+from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos

@@ -24,7 +24,12 @@ from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
 from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color
 from shapeshift.training.first_anchors.first_anchors import neighbour_distance, photo_colors
-from shapeshift.training.first_anchors.initial import choose_voxel, initial_points, voxel_centres
+from shapeshift.training.first_anchors.initial import (
+    Report,
+    choose_voxel,
+    initial_points,
+    voxel_centres,
+)
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.run import SETTLE, Run
@@ -62,7 +67,10 @@ class PlainTrainer(Run):
     primitive, param_group = "splats", "means"
     settings: PlainSettings
 
-    def __init__(self, device, capture: Capture, settings: PlainSettings) -> None:
+    def __init__(
+        self, device, capture: Capture, settings: PlainSettings, report: Report | None = None
+    ) -> None:
+        """report: called with words while the first points take long."""
         self.device, self.capture, self.settings = device, capture, settings
         (self.stop,) = capture.stops
         self.budget = Budget(settings.iterations, settings.seconds)
@@ -78,17 +86,20 @@ class PlainTrainer(Run):
         self.exposures = Exposures(device, self.schedule.photos)
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, 1.0
-        self.adam = Adam(device, self.first_values(photos), self.all_rates())
+        self.adam = Adam(device, self.first_values(photos, report), self.all_rates())
         self.step = PlainStep(device, self.adam, settings.sh_degree)
         self.stats = PlainDensificationStats(device, self.count)
         self.guard, self.next_snapshot = DivergenceGuard(self.adam.state()), SNAPSHOT_EVERY
 
-    def first_values(self, photos: list[LoadedPhoto]) -> dict[str, np.ndarray]:
+    def first_values(
+        self, photos: list[LoadedPhoto], report: Report | None
+    ) -> dict[str, np.ndarray]:
         """Round, faint splats at the first points, in the colours of the photos."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        first = initial_points(self.capture, photos, rng, settings.points)
+        first = initial_points(self.capture, photos, rng, settings.points, report)
         points, self.origin = np.concatenate([first.points, first.guesses]), first.origin
+        self.warnings = list(first.doubts)
         most = min(settings.splats, settings.max_splats)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
         means = voxel_centres(points, self.voxel)

@@ -16,7 +16,7 @@ from shapeshift.scene.pose import View
 from shapeshift.training.baselines.plain import one_modality
 from shapeshift.training.calibration.extrinsics import ExtrinsicOffset, offset_of_matrix, rigid
 from shapeshift.training.calibration.residuals import Shape, ShapeResiduals
-from shapeshift.training.first_anchors.initial import common_box
+from shapeshift.training.first_anchors.views import common_box
 from shapeshift.training.photos import BLACK, read
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background

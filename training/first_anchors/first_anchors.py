@@ -11,9 +11,9 @@ import numpy as np
 from shapeshift.training.first_anchors.initial import (
     InitialPoints,
     median_neighbour,
-    pixel_of,
     voxel_centres,
 )
+from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.photos import BLACK, LoadedPhoto
 
 GUESSES = 0.08  # of the anchors at most: guesses where the photos show what has no points

@@ -1,5 +1,6 @@
 """Where the first anchors stand: at points, on a visual hull, or in the cameras' common view."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -7,17 +8,20 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.point_sources import CLOUDS, cloud_points, depth_points
+from shapeshift.training.first_anchors.triangulation import triangulated_points
+from shapeshift.training.first_anchors.views import common_box, pixel_of
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.supervision.backgrounds import NOISE
 
-SOURCES = ("auto", "capture", "depth", "hull", "random")  # or a file: see CLOUDS
+SOURCES = ("auto", "capture", "depth", "hull", "triangulated", "random")  # or a file: see CLOUDS
 COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of a cube of the carved box's volume
 HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
 FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
 RANDOM_POINTS = 20_000
 NO_POINTS = np.zeros((0, 3))
+FEWEST = 100  # triangulated points; fewer are chance
+Report = Callable[[str], None]  # what is done now, in words
 SAMPLE = 1000  # points whose nearest neighbour is looked for
 
 
@@ -50,34 +54,6 @@ def choose_voxel(points: np.ndarray, most: int, rng: np.random.Generator) -> flo
         middle = (low * high) ** 0.5
         low, high = (middle, high) if len(voxel_centres(points, middle)) > most else (low, middle)
     return high
-
-
-def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(P, 2) pixels, row 0 on top, and (P,) whether the point lies in the image."""
-    camera_from_world, fx, fy, cx, cy = view.pinhole()
-    x, y, z = (points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        pixel = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1)
-    width, height = view.size
-    inside = (z > view.near) & (pixel >= 0).all(1) & (pixel < (width, height)).all(1)
-    return pixel, inside
-
-
-def common_box(views: list[View]) -> tuple[np.ndarray, float]:
-    """(centre (3,), half side) metres of the place that the cameras look at together."""
-    eyes = np.array([v.world_from_eye.position for v in views])
-    ahead = np.array([-v.world_from_eye.matrix()[:3, 2] for v in views])
-    # nearest point to all viewing axes, least squares; nearly parallel axes are held near the eyes
-    away = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
-    spread = max(float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max()), 1e-3)
-    weight = 1e-3 * len(views)  # of the guess
-    guess = (eyes + spread * ahead).mean(0)
-    centre = np.linalg.solve(
-        away.sum(0) + weight * np.eye(3), (away @ eyes[:, :, None]).sum(0)[:, 0] + weight * guess
-    )
-    distance = np.median(np.linalg.norm(eyes - centre, axis=1))
-    tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
-    return centre, float(1.5 * distance * min(tangent, 0.6))
 
 
 def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | None:
@@ -181,17 +157,19 @@ class InitialPoints(NamedTuple):
     origin: str  # of them, in words
     shapes: tuple[np.ndarray, ...]  # the points of each shape that stands for itself
     guesses: np.ndarray = NO_POINTS  # (G, 3) metres, for what has no points
+    doubts: tuple[str, ...] = ()  # what a person should know of it, a sentence each
 
 
 def initial_points(
-    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto"
-) -> InitialPoints:
+    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto",
+    report: Report | None = None,
+) -> InitialPoints:  # fmt: skip
     """The first points, from the best source that there is.  Raises BadFile.
 
     source: one of SOURCES, or the path of a cloud; auto takes the first of these that there is:
-    the capture's own points, depth photos, the visual hull, random ones.
+    the capture's own points, depth photos, the visual hull, points triangulated from the photos,
+    random ones.  report: called with words while it takes long.
     """
-    hulls = []
     if source not in SOURCES:
         return visible_cloud(Path(source), capture, photos, rng)
     if source in ("auto", "capture") and capture.points is not None and len(capture.points):
@@ -201,15 +179,16 @@ def initial_points(
         points = depth_points(photos, rng)
         if len(points):
             return with_guesses(points, "depth photos", capture, photos, rng)
-    if source in ("auto", "hull"):
-        hulls = visual_hulls(photos, capture.background)
-    if shapes := tuple(hull for hull in hulls if len(hull)):
-        return InitialPoints(np.concatenate(shapes), "hull", shapes)
-    if hulls and any(p.see_through for p in photos):
-        raise BadFile(
-            f"{capture.folder}: the masks have no volume in common; check that masks and poses "
-            "belong together, or train with --masks ignore."
-        )
+    if source in ("auto", "hull") and (hull := hull_points(capture, photos)):
+        return hull
+    doubts: tuple[str, ...] = ()
+    if source in ("auto", "triangulated"):
+        try:
+            return from_photos(capture, photos, rng, report)
+        except BadFile as why:
+            if source == "triangulated":
+                raise
+            doubts = (f"{why} The first anchors stand at random places instead.",)
     if source not in ("auto", "random"):
         lacking = {
             "capture": "has no points of its own (COLMAP's points3D, or 'points' in its JSON)",
@@ -218,7 +197,43 @@ def initial_points(
         }[source]
         raise BadFile(f"{capture.folder} {lacking}; take other --points, or leave them out.")
     points = random_points(photos, rng)
-    return InitialPoints(points, "random", (points,))
+    return InitialPoints(points, "random", (points,), doubts=doubts)
+
+
+def hull_points(capture: Capture, photos: list[LoadedPhoto]) -> InitialPoints | None:
+    """The visual hull of each modality; None where nothing tells object from background.
+
+    Raises BadFile where masks contradict each other.
+    """
+    hulls = visual_hulls(photos, capture.background)
+    if shapes := tuple(hull for hull in hulls if len(hull)):
+        return InitialPoints(np.concatenate(shapes), "hull", shapes)
+    if hulls and any(p.see_through for p in photos):
+        raise BadFile(
+            f"{capture.folder}: the masks have no volume in common; check that masks and poses "
+            "belong together, or train with --masks ignore."
+        )
+    return None
+
+
+def from_photos(
+    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, report: Report | None
+) -> InitialPoints:
+    """Points triangulated out of the photos.  Raises BadFile where they are too few."""
+
+    def progress(stage: str, done: int, of: int) -> None:
+        if report is not None:
+            report(f"points out of the photos: {stage}, {done} of {of}")
+
+    points = triangulated_points(photos, capture.background, progress)
+    if len(points) < FEWEST:
+        raise BadFile(
+            f"{capture.folder}: only {len(points)} points could be triangulated out of its photos "
+            f"({FEWEST} are needed); they show too little texture, overlap too little, or do not "
+            "belong to their poses."
+        )
+    origin = f"{len(points):,} triangulated points"
+    return with_guesses(points, origin, capture, photos, rng)
 
 
 def with_guesses(

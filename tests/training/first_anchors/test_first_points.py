@@ -135,7 +135,10 @@ def test_without_points_depth_comes_before_the_hull(balls, photos, coarse):
         ("capture", "has no points of its own"),
         ("depth", "has no depth photos"),
         ("hull", "has neither masks nor a known background"),
-        ("lidar.xyz", "give auto, capture, depth, hull, random, or a file that ends in"),
+        (
+            "lidar.xyz",
+            "give auto, capture, depth, hull, triangulated, random, or a file that ends in",
+        ),
         ("lidar.ply", "is missing"),
         ("lidar.las", "is missing"),
     ],

@@ -1,4 +1,8 @@
-"""Runs colmap_run.py in a process of its own and passes on what it tells."""
+"""Runs a script that uses pycolmap in a process of its own and passes on what it tells.
+
+pycolmap is C++ that logs to standard error, holds the interpreter for minutes and ends the process
+on what it does not like: none of this may happen to the program.
+"""
 
 import json
 import queue
@@ -11,21 +15,24 @@ from contextlib import closing
 from pathlib import Path
 from typing import IO
 
-from shapeshift.decomposition.poses.colmap_run import ABSENT
 from shapeshift.runtime_models.model import BadFile
 
 Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
 POLL_S = 0.5
+ABSENT = 3  # the exit code of a script where pycolmap is not installed or does not load
 
 
-def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]:
-    """Does `what` of the job; returns what it reports besides progress.
+def run_child(
+    script: Path, words: list[str], log: Path, progress: Progress, failure: str
+) -> list[dict]:
+    """Runs the script; returns what it reports, JSON objects a line, besides progress.
 
-    Interrupted, it ends the process; what that wrote into its database stays for the next run.
-    Raises BadFile where the process does not end well.
+    words: behind its name; log: gets its standard error, a database of it lies beside; failure: a
+    sentence for when it does not end well, {code} and {log} are filled in.  Interrupted, it ends
+    the process; what that wrote stays.  Raises BadFile.
     """
-    script = str(Path(__file__).with_name("colmap_run.py"))
-    command = [sys.executable, "-P", script, what, str(job)]
+    # -P: this folder's modules are not to stand in for those of packages.
+    command = [sys.executable, "-P", str(script), *words]
     with log.open("ab") as errors:
         child = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors
@@ -40,12 +47,11 @@ def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]
                 if stream is not None:
                     stream.close()
     if code == ABSENT:
-        raise BadFile("pycolmap, which finds poses, is not installed; install the requirements.")
-    if code:
         raise BadFile(
-            f"the search for poses ended with code {code}, perhaps for want of memory; {log} has "
-            "its last words.  Try smaller photos (--side) or fewer (--every)."
+            "pycolmap, which photos are matched with, is not installed; install the requirements."
         )
+    if code:
+        raise BadFile(failure.format(code=code, log=log))
     return reports
 
 

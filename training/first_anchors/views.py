@@ -1,0 +1,33 @@
+"""What views see: pixels of points, and the place that several look at together."""
+
+import numpy as np
+
+from shapeshift.scene.pose import View
+
+
+def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(P, 2) pixels, row 0 on top, and (P,) whether the point lies in the image."""
+    camera_from_world, fx, fy, cx, cy = view.pinhole()
+    x, y, z = (points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixel = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1)
+    width, height = view.size
+    inside = (z > view.near) & (pixel >= 0).all(1) & (pixel < (width, height)).all(1)
+    return pixel, inside
+
+
+def common_box(views: list[View]) -> tuple[np.ndarray, float]:
+    """(centre (3,), half side) metres of the place that the cameras look at together."""
+    eyes = np.array([v.world_from_eye.position for v in views])
+    ahead = np.array([-v.world_from_eye.matrix()[:3, 2] for v in views])
+    # nearest point to all viewing axes, least squares; nearly parallel axes are held near the eyes
+    away = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
+    spread = max(float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max()), 1e-3)
+    weight = 1e-3 * len(views)  # of the guess
+    guess = (eyes + spread * ahead).mean(0)
+    centre = np.linalg.solve(
+        away.sum(0) + weight * np.eye(3), (away @ eyes[:, :, None]).sum(0)[:, 0] + weight * guess
+    )
+    distance = np.median(np.linalg.norm(eyes - centre, axis=1))
+    tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
+    return centre, float(1.5 * distance * min(tangent, 0.6))
