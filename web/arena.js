@@ -1,6 +1,6 @@
 // arena: what all objects' splats are as decoded, and what each view makes of them; as
 // renderer/gl/buffers.py.  The splats of an object begin with a row of the lists.
-import { MOST_UNIT, WIDTH } from "./conventions.js";
+import { MIN_ALPHA, MOST_UNIT, WIDTH } from "./conventions.js";
 
 /** @typedef {{ellipses: WebGLTexture, rests: WebGLTexture, framebuffer: WebGLFramebuffer}} Records */
 /** @typedef {{image: WebGLTexture, heat: WebGLTexture | null, framebuffer: WebGLFramebuffer, size: number[], kind: string}} Image */
@@ -32,6 +32,7 @@ export class Arena {
         /** @type {Records[]} */ this.records = [];
         /** @type {Image[]} */ this.images = [];
         this.target = "rgba16f";
+        this.minAlpha = MIN_ALPHA;
         this.unit = 1;  // the display value that 1 in a picture stands for
         this.blendInto(gpu.norm16 ? "rgba16" : "rgba16f", brightest);
     }

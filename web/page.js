@@ -2,6 +2,7 @@
 import { Camera, pointUnder } from "./camera.js";
 import { readBeside, readContainer, readInline } from "./container.js";
 import { Grab, depthAlong, handOnRay } from "./grab.js";
+import { offerHeadsets } from "./headset.js";
 import { followLink, linkOf } from "./link.js";
 import { Panel, byId } from "./panel.js";
 import { perspective } from "./poses.js";
@@ -18,7 +19,7 @@ class Page {
         if (!gl) throw new Error("this browser offers no WebGL2");
         this.gl = gl;
         this.wanted = true;
-        this.before = this.linked = this.readAt = 0;
+        this.before = this.linked = this.readAt = this.asked = 0;
         /** @type {any} */ this.headset = null;  // while it draws, the page does not
         this.redraw = () => { this.wanted = true; };
     }
@@ -47,7 +48,7 @@ class Page {
     /** @param {number} time  milliseconds */
     frame(time) {
         if (this.headset?.session) return;
-        requestAnimationFrame((now) => this.frame(now));
+        this.asked = requestAnimationFrame((now) => this.frame(now));
         const { camera, canvas, grab, panel, renderer } = this, seconds = Math.min(0.1, (time - this.before) / 1000);
         this.before = time;
         if (!(renderer && camera && grab && panel)) return;
@@ -63,6 +64,13 @@ class Page {
         renderer.draw([{ worldFromEye: camera.pose, tangents: perspective(camera.fovY, [width, height]), near: NEAR_PART * renderer.scene.radius, viewport: [0, 0, width, height] }]);
         clearTimeout(this.linked);
         this.linked = setTimeout(() => history.replaceState(null, "", linkOf(camera, renderer)), LINK_MS);
+    }
+
+    /** After a headset, which may have kept the page's frames waiting. */
+    resume() {
+        cancelAnimationFrame(this.asked);
+        this.redraw();
+        this.frame(performance.now());
     }
 
     /** A press that takes an object, where things may be moved. @param {PointerEvent} e @returns {boolean} */
@@ -153,6 +161,7 @@ async function main() {
     tell("");
     if (inline) requestAnimationFrame((time) => page.frame(time));
     Object.assign(globalThis, { shapeshift: page });  // for tests and for who embeds the page
+    await offerHeadsets(page);
     document.documentElement.dataset.ready = "yes";
 }
 

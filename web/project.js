@@ -1,7 +1,7 @@
 // project: splats of one posed object -> screen ellipses, as renderer/shaders/project.comp.  The only
 // culling gate.  Sigma' = J W Sigma W^T J^T + low_pass I (EWA splatting; 3DGS, eq. 5).  Eye space has
 // y up and looks along -z; pixels count from lower left.
-import { JACOBIAN_MARGIN, LOW_PASS, MIN_ALPHA } from "./conventions.js";
+import { JACOBIAN_MARGIN, LOW_PASS } from "./conventions.js";
 
 /** @typedef {{worldFromEye: import("./poses.js").Pose, tangents: number[], near: number, viewport: number[], scale?: number}} View */
 
@@ -70,7 +70,7 @@ export class Projector {
                 mean_opacity: { texture: arena.meanOpacity }, covariance0: { texture: arena.covariance0 }, covariance1: { texture: arena.covariance1 },
                 frame: { vec4s: object.seenFrom(from.worldFromEye) }, tangents: from.tangents, size, near: from.near,
                 clamps: [JACOBIAN_MARGIN * Math.max(-left, right), JACOBIAN_MARGIN * Math.max(-down, up)],
-                min_alpha: MIN_ALPHA, low_pass: LOW_PASS, antialiased: { int: object.model.antialiased ? 1 : 0 },
+                min_alpha: arena.minAlpha, low_pass: LOW_PASS, antialiased: { int: object.model.antialiased ? 1 : 0 },
             });
             gpu.fill(records.framebuffer, object.rows, object.row);
         }

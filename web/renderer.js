@@ -7,7 +7,7 @@ import { Decoder } from "./decode.js";
 import { shadeOf, wayOf } from "./false_colors.js";
 import { Gpu, rowsOf } from "./gl.js";
 import { loadModel } from "./models.js";
-import { add, chain, inverse, length, rows } from "./poses.js";
+import { add, chain, dot, inverse, length, rows } from "./poses.js";
 import { Projector } from "./project.js";
 import { Resolver } from "./resolve.js";
 import { Sorter } from "./sort.js";
@@ -77,6 +77,8 @@ export class Renderer {
         /** @type {{object: SceneObject, buffer: WebGLBuffer, fence: WebGLSync}[]} */ this.reads = [];
         /** @type {Pose | null} */ this.sortedFor = null;
         this.resortDegrees = RESORT_DEGREES;
+        this.recolorDegrees = 0;
+        this.direct = false;  // blended in the target itself, where no palette needs a picture of its own
         /** @type {{way: import("./false_colors.js").Way, palette: string}} */ this.colors = { way: "no heat", palette: "" };
     }
 
@@ -107,8 +109,10 @@ export class Renderer {
         this.sort({ ...views[0].worldFromEye, position: middle }, views[0].near);
         const heat = this.colors.way === "beside";
         views.forEach((view, i) => this.projector.project(i, this.objects, view, sizes[i]));
-        views.forEach((_, i) => this.splatter.draw(i, sizes[i], heat));
-        views.forEach((view, i) => this.resolver.draw(i, target, view.viewport, this.background, this.colors, passesThrough));
+        const direct = views.map(({ scale }) => this.direct && !(scale && scale < 1) && ["no heat", "splats"].includes(this.colors.way));
+        const ground = passesThrough ? [0, 0, 0, 0] : [...this.background, 1];
+        views.forEach(({ viewport }, i) => this.splatter.draw(i, sizes[i], heat, direct[i] ? { target, viewport, ground } : null));
+        views.forEach((view, i) => direct[i] || this.resolver.draw(i, target, view.viewport, this.background, this.colors, passesThrough));
     }
 
     /** Only what has another x, or is looked at from elsewhere. @param {number[]} eye  world metres */
@@ -123,11 +127,24 @@ export class Renderer {
             }
             const inObject = chain(inverse(object.pose), { position: eye, wxyz: [1, 0, 0, 0] }).position;
             const key = JSON.stringify([this.colors.way, shades[i], object.own?.version]), from = object.coloredFrom;
-            if (key === object.coloredFor && from && (!object.model.colorsLook || !length(add(inObject, from, -1)))) return;
+            if (key === object.coloredFor && from && (!object.model.colorsLook || !this.looksOther(object, from, inObject))) return;
             this.decoder.decodeColors(object, shades[i], this.colors.way, inObject);
             object.coloredFor = key;
             object.coloredFrom = inObject;
         });
+    }
+
+    /** Whether colours that were made for one eye are too old for another one, both in the object. @param {SceneObject} object @param {number[]} from @param {number[]} to */
+    looksOther(object, from, to) {
+        if (!this.recolorDegrees) return length(add(to, from, -1)) > 0;
+        const a = add(from, object.centre, -1), b = add(to, object.centre, -1);
+        return !(dot(a, b) >= length(a) * length(b) * Math.cos((this.recolorDegrees * Math.PI) / 180));
+    }
+
+    /** What may be left out from now on. @param {import("./sharpness.js").Levers} levers */
+    leaveOut({ minAlpha, direct, resortDegrees, recolorDegrees }) {
+        Object.assign(this, { direct, resortDegrees, recolorDegrees });
+        this.arena.minAlpha = minAlpha;
     }
 
     /** Means and opacities on their way back to the sorter, without waiting for the GPU. @param {SceneObject} object */

@@ -39,6 +39,11 @@ export class Resolver {
      */
     draw(view, target, viewport, background, { way, palette }, passesThrough = 0) {
         const { gl } = this.gpu, [x, y, width, height] = viewport, { image, heat } = this.arena.images[view];
+        const smaller = this.arena.images[view].size[0] < width;
+        for (const texture of [image, heat]) {
+            if (texture) gl.bindTexture(gl.TEXTURE_2D, texture);
+            if (texture) gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, smaller ? gl.LINEAR : gl.NEAREST);
+        }
         gl.bindFramebuffer(gl.FRAMEBUFFER, target);
         gl.viewport(x, y, width, height);
         this.program.use({

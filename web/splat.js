@@ -1,7 +1,7 @@
 // splat: draws the sorted ellipses back to front, as renderer/shaders/splat.vert and splat.frag.
 // Splats are pulled by gl_VertexID: an instance a splat, the usual way of the web, costs software GL
 // 2.4 to 7 times as much.  A quad of two triangles covers 23 % fewer pixels than one triangle.
-import { MAX_ALPHA, MIN_ALPHA } from "./conventions.js";
+import { MAX_ALPHA } from "./conventions.js";
 
 const vertexShader = (/** @type {boolean} */ heat, /** @type {number} */ corners) => `
 uniform highp usampler2D order;          // far to near
@@ -53,20 +53,27 @@ export class Splatter {
         this.heated = null;
     }
 
-    /** @param {number} view @param {number[]} size  pixels @param {boolean} heat */
-    draw(view, size, heat) {
-        const { arena, gpu } = this, { gl } = gpu, records = arena.recordsOf(view), { framebuffer } = arena.imageOf(view, size, heat);
+    /**
+     * @param {number} view @param {number[]} size  pixels @param {boolean} heat
+     * @param {{target: WebGLFramebuffer | null, viewport: number[], ground: number[]} | null} direct  into there and over this; null: into the view's picture
+     */
+    draw(view, size, heat, direct = null) {
+        const { arena, gpu } = this, { gl } = gpu, records = arena.recordsOf(view), framebuffer = direct ? direct.target : arena.imageOf(view, size, heat).framebuffer;
+        const [x, y, width, height] = direct?.viewport ?? [0, 0, ...size], [r, g, b, a] = direct?.ground ?? [0, 0, 0, 0];
         if (heat) this.heated ??= gpu.program(vertexShader(true, this.corners), fragmentShader(true));
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-        gl.viewport(0, 0, size[0], size[1]);
-        gl.clearColor(0, 0, 0, 0);
+        gl.viewport(x, y, width, height);
+        gl.clearColor(r, g, b, a);
+        gl.enable(gl.SCISSOR_TEST);  // the other eye's half stays
+        gl.scissor(x, y, width, height);
         gl.clear(gl.COLOR_BUFFER_BIT);
+        gl.disable(gl.SCISSOR_TEST);
         if (!arena.sorted) return;
         gl.enable(gl.BLEND);
         gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
         (heat && this.heated ? this.heated : this.plain).use({
             order: { texture: arena.order }, ellipses: { texture: records.ellipses }, rests: { texture: records.rests }, colors: { texture: arena.colors },
-            ...(heat && arena.heat ? { heats: { texture: arena.heat } } : {}), size, min_alpha: MIN_ALPHA, per_unit: 1 / arena.unit,
+            ...(heat && arena.heat ? { heats: { texture: arena.heat } } : {}), size, min_alpha: arena.minAlpha, per_unit: direct ? 1 : 1 / arena.unit,
         });
         gl.drawArrays(gl.TRIANGLES, 0, this.corners * arena.sorted);
         gl.disable(gl.BLEND);

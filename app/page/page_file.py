@@ -15,14 +15,16 @@ WEB = Path(__file__).resolve().parents[2] / "web"
 # Each after what it imports; a test compares with the imports.
 MODULES = ("conventions", "poses", "gl", "container", "stops", "false_colors", "arena", "networks",
            "pack", "shade", "decode", "models", "project", "resolve", "sort", "splat", "renderer",
-           "camera", "control", "grab", "link", "panel", "page")  # fmt: skip
+           "camera", "control", "grab", "link", "panel", "sharpness", "overlay", "room_panel",
+           "hands", "headset", "page")  # fmt: skip
+IN_A_HEADSET = ("sharpness", "overlay", "room_panel", "hands", "headset")  # nothing else needs
 IMPORT = re.compile(r"^import \{[^}]*\} from \"\./\w+\.js\";\n", re.M)
 SCRIPT = '<script type="module" src="page.js"></script>'
 
 
-def one_script() -> str:
+def one_script(modules: tuple[str, ...] = MODULES) -> str:
     """All modules as one, without comments and indents."""
-    texts = (IMPORT.sub("", (WEB / f"{name}.js").read_text("utf-8")) for name in MODULES)
+    texts = (IMPORT.sub("", (WEB / f"{name}.js").read_text("utf-8")) for name in modules)
     return squeeze(re.sub(r"^export ", "", "\n".join(texts), flags=re.M))
 
 
