@@ -37,7 +37,7 @@ from shapeshift.training.train import Trainer  # noqa: E402
 
 COLUMNS = "variants,way,bytes,times_joint,psnr_db,worst_db,cpu_s"
 SIZE, VIEWS, TESTS = 96, 24, 4
-STEPS, ANCHORS = 400, 4000  # steps a variant
+STEPS, ANCHORS = 240, 2500  # steps a variant
 TRAINED = 2
 COUNTS = (2, 4, 8, 16)
 
