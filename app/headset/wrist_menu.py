@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from imgui_bundle import imgui
 
@@ -69,7 +68,7 @@ class WristMenu:
         room = RoomActions(self._recentre, self._resize, lambda: actions.leave("from the panel"))
         self._foot = Foot(room)
         self.gallery = Gallery(state.editor)
-        self.styles = StyleWork(state.editor, WorkFolders.of().scenes, self._say_where)
+        self.styles = StyleWork(state.editor, WorkFolders.of().scenes)
         self._sections = self._make_sections(room)
         self._key: tuple = ()  # what the picture was drawn of
         self._unsettled = 0
@@ -195,10 +194,6 @@ class WristMenu:
 
     def _draw_gallery(self, scale: float) -> None:
         draw_gallery(self.gallery, self.styles, self.picture.textures, scale)
-
-    def _say_where(self, path: Path) -> None:
-        """Another scene is no part of this session: it is there for the next one."""
-        self._state.editor.say(f"It is in {path}; open it in the next session.", seconds=10)
 
     def _draw_figures(self, _: float) -> None:
         self._figures_seen = True

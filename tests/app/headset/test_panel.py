@@ -6,14 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.app.editor.state.film.style_work import put_in_place
+from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.pacing import QUALITIES
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.room_section import HOW, SURE_S
 from shapeshift.app.headset.wrist_menu import CLICK, SETTLE_FRAMES, TICK
+from shapeshift.app.opening import ReadingOptions
 from shapeshift.renderer.settings import DEBUG_VIEWS
 from shapeshift.runtime_models.model import Stop
 from shapeshift.vr.frame import LOST
 from shapeshift.vr.touching import Touched
+from tests.support.three_stops import four_stop_package, three_stop_package
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import FROM, LEFT, SETTLED, Wearer, a_state, an_editor, item
 
@@ -329,3 +333,19 @@ def test_the_gallery_is_the_desktop_s(cube):
     cube.press("Stop")
     assert not gallery.sliding
     gallery.thumbnails.close()
+
+
+def test_a_style_is_shown_while_the_session_goes_on(picture, tmp_path):
+    """The new package takes the object's place in the panel and in the world; its stops slide."""
+    _, editor = open_xr(three_stop_package(tmp_path / "three.shift"), ReadingOptions())
+    worn = Wearer(picture, a_state(editor))
+    made = four_stop_package(tmp_path / "four.shift")
+    put_in_place(editor, "three", made, "Melt")
+    worn.wait(3)
+    assert worn.x("three") == 0.3 and worn.menu.row()["shown"] == "Melt"
+    worn.menu.gallery.pick("Melt")
+    worn.menu.gallery.pick("Opened")
+    worn.menu.gallery.slide(0.5)
+    worn.wait(3)
+    shown = worn.state.world.drawn().objects[0]
+    np.testing.assert_allclose(shown.model.blend.weights(shown.x), [0, 0.5, 0, 0.5])

@@ -79,7 +79,7 @@ def _styles(gallery: Gallery, styles: StyleWork, ui_scale: float) -> None:
     imgui.same_line()
     source = gallery.picked[-1] if gallery.picked else gallery.stops[0].name
     if imgui.button("Add style", Vec(-1, 0)):
-        styles.add(source)
+        styles.add(source, gallery.index or 0)
     tip(
         f"A new stop that starts from {source}, in a new file, seconds to minutes; all other stops "
         "stay as they are.",
@@ -91,7 +91,7 @@ def _styles(gallery: Gallery, styles: StyleWork, ui_scale: float) -> None:
     imgui.pop_item_width()
     if gallery.picked and len(gallery.stops) > 1:
         if imgui.button(f"Take out {source}###take out", Vec(-1, 0)):
-            styles.remove(source)
+            styles.remove(source, gallery.index or 0)
         tip("The stop that was picked last, in a new file; this one stays.", ui_scale)
 
 

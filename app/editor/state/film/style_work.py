@@ -2,14 +2,23 @@
 
 import typing
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from shapeshift.app.drawing import make_folder
+from shapeshift.app.editor.state.arrange import edit
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.edited_file import key_of
+from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.editor.state.film.program_child import ProgramChild
-from shapeshift.app.editor.state.film.rendering import free_name, scene_on_disk
+from shapeshift.app.editor.state.film.rendering import free_name
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training.style_options import Options
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe
+from shapeshift.scene.document import edits
 
 ENDING = ".shift"
 _SHAPES = typing.get_args(typing.get_type_hints(Options)["shape"])
@@ -19,9 +28,15 @@ SHAPES: tuple[str, ...] = tuple(shape for shape in _SHAPES if shape)
 class StyleWork:
     """The choices, and the one style that may be under way; a new file each, never the old one."""
 
-    def __init__(self, state: EditorState, folder: Path, show: Callable[[Path], None]) -> None:
-        """folder: where new packages go; show: what is done with one that is there."""
-        self._state, self._folder, self._show = state, folder, show
+    def __init__(
+        self, state: EditorState, folder: Path, open_file: Callable[[Path], None] | None = None
+    ) -> None:
+        """folder: where new packages go; open_file: opens one that was made of what is open alone.
+
+        Without it, and in a scene of several objects, the object gets the new package in its place.
+        """
+        self._state, self._folder, self._open_file = state, folder, open_file
+        self._object, self._stop = "", ""  # whose package it is, and the stop that it shall show
         self.shape = SHAPES[0]
         self.strength = 1.0
         self._child: ProgramChild | None = None
@@ -40,32 +55,34 @@ class StyleWork:
         """Words for the status line; "" when nothing is under way."""
         return f"style {self.progress[1]:.0%}" if self.running else ""
 
-    def name(self) -> str:
+    def name(self, index: int = 0) -> str:
         """What a stop of the chosen shape will be called."""
-        obj = self._state.scene.objects[0]
+        obj = self._state.scene.objects[index]
         taken = {stop.name.casefold() for stop in obj.model.stops}
         word = self.shape.capitalize()
         names = [word, *(f"{word} {n}" for n in range(2, len(taken) + 3))]
         return next(name for name in names if name.casefold() not in taken)
 
-    def add(self, source: str) -> None:
-        """Begins a stop of the chosen shape, from the stop `source`."""
-        words = ["--shape", self.shape, "--name", self.name(), "--from", source]
-        self._begin([*words, "--after", source, "--strength", f"{self.strength:g}"], self.shape)
+    def add(self, source: str, index: int = 0) -> None:
+        """Begins a stop of the chosen shape, from the stop `source` of an object."""
+        name = self.name(index)
+        words = ["--shape", self.shape, "--name", name, "--from", source, "--after", source]
+        self._begin([*words, "--strength", f"{self.strength:g}"], self.shape, index, name)
 
-    def remove(self, stop: str) -> None:
-        """Begins to take a stop out."""
-        self._begin(["--remove", stop], "without")
+    def remove(self, stop: str, index: int = 0) -> None:
+        """Begins to take a stop out of an object."""
+        self._begin(["--remove", stop], "without", index, "")
 
-    def _begin(self, words: list[str], word: str) -> None:
+    def _begin(self, words: list[str], word: str, index: int, stop: str) -> None:
         state = self._state
         try:
-            if state.edited.path is not None or len(state.scene.objects) != 1:
-                raise UsageError("open the package itself; it is one of several objects here.")
-            scene, reading = scene_on_disk(state)
+            item, source = state.edited.file.all_items[index], state.sources[index]
+            if item.part is not None:
+                raise UsageError(f"{item.name} is a part of a package; open that alone.")
             make_folder(self._folder)
-            self._path = free_name(self._folder, f"{Path(scene).stem}-{word}", ENDING)
-            command = ["style", str(scene), *reading, "--out", str(self._path), *words]
+            self._path = free_name(self._folder, f"{source.path.stem}-{word}", ENDING)
+            self._object, self._stop = item.name, stop
+            command = ["style", str(source.path), "--out", str(self._path), *words]
             self._child = ProgramChild(command)
         except (OSError, UsageError) as error:
             state.problem = f"There is no new style: {error}"
@@ -86,5 +103,36 @@ class StyleWork:
         elif problem := child.problem():
             self._state.problem = f"There is no new style: {problem}"
         else:
-            self._show(self._path)
+            self._show()
         return True
+
+    def _show(self) -> None:
+        """What was made, in place of what it was made of."""
+        state = self._state
+        alone = state.edited.path is None and len(state.scene.objects) == 1
+        if self._open_file is not None and alone and not unsaved(state):
+            self._open_file(self._path)
+            return
+        try:
+            put_in_place(state, self._object, self._path, self._stop)
+        except (BadFile, OSError) as error:
+            state.problem = f"The new style is in {self._path}, and cannot be shown: {error}"
+        else:
+            state.say(f"It is in {self._path}", seconds=8)
+
+
+def put_in_place(state: EditorState, name: str, path: Path, stop: str) -> None:
+    """Another package for an object, at one of its stops ("": its first): an edit like others.
+
+    Raises BadFile.
+    """
+    model = state.read_model(path)
+    item = edits.item_named(state.edited.file, name)
+    places = {each.name: each.x for each in model.stops}
+    values: dict[str, Any] = {
+        "model": path.absolute().as_posix(),
+        "x": places.get(stop, model.stops[0].x),
+    }
+    source = Source(path, model, describe(model, path))
+    state.edited.sources[key_of(replace(item, **values))] = source
+    edit(state, edits.change(state.edited.file, name, **values), f"style of {name}")

@@ -1,17 +1,21 @@
 """Styles from the gallery: the command that is started, what is shown of it, and its end."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
 import pytest
 
+from shapeshift.app.editor.state.arrange import undo
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.film import style_work
 from shapeshift.app.editor.state.film.style_work import SHAPES, StyleWork
+from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.read_scene import read_model
-from tests.support.three_stops import three_stop_package
+from shapeshift.runtime_models.stop_weights import StopWeights
+from tests.support.three_stops import four_stop_package, three_stop_package
 
 
 class StandIn:
@@ -82,22 +86,40 @@ def test_a_name_that_is_taken_gets_a_number(work):
     _, styles, _ = work
     styles.shape = "fur"
     assert styles.name() == "Fur"
-    from dataclasses import replace
-
-    from shapeshift.runtime_models.model import Stop
-
     state = work[0]
     model = state.scene.objects[0].model
     state.replace_model(0, replace(model, stops=(Stop("FUR", 0.0), *model.stops[1:])))
     assert styles.name() == "Fur 2"
 
 
-def test_what_is_not_saved_or_not_alone_is_refused(work, child):
+def test_beside_unsaved_edits_the_object_gets_the_new_package(work, child, tmp_path):
+    """In place, as one edit that can be undone; in the headset it is always so."""
+    state, styles, shown = work
+    state.add_region("sphere")
+    state.record_regions()
+    styles.shape = "melt"
+    styles.add("RGB")
+    made = four_stop_package(tmp_path / "scenes" / "three-melt-001.shift")
+    child[0].code = 0
+    styles.poll()
+    assert not state.problem and not shown and str(made) in state.messages.note
+    obj = state.scene.objects[0]
+    assert [stop.name for stop in obj.model.stops] == ["RGB", "Melt", "Thermal", "Opened"]
+    assert obj.x == 0.3 and state.edited.unsaved
+    state.set_x(0, StopWeights((("Melt", 0.5), ("Opened", 0.5))))  # its own stops are known
+    assert undo(state) == "style of three"
+    assert [s.name for s in state.scene.objects[0].model.stops] == ["RGB", "Thermal", "Opened"]
+    assert len(state.regions.items) == 1
+
+
+def test_what_was_made_and_cannot_be_shown_is_said(work, child):
     state, styles, _ = work
     state.add_region("sphere")
     state.record_regions()
     styles.add("RGB")
-    assert "save it first" in state.problem and not child and not styles.running
+    child[0].code = 0
+    styles.poll()
+    assert "cannot be shown" in state.problem
 
 
 def test_shapes_are_the_command_s():
