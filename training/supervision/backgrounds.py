@@ -6,6 +6,7 @@ from shapeshift.training.photos import LoadedPhoto
 
 NAMED = {"black": (0.0, 0.0, 0.0), "white": (1.0, 1.0, 1.0), "gray": (0.5, 0.5, 0.5)}
 NOISE = 0.03  # display sRGB: a photo that differs more from a known background shows the object
+BACKDROP = 0.06  # display sRGB: a photographed backdrop is lit unevenly, see docs/bench/bare.csv
 EDGE = 0.02  # of a photo's sides: its outermost pixels, where a subject stands before something
 ALIKE = 0.7  # of these, in every modality, that have the colour: some photos cut their subject
 EMPTY = 0.2  # of all pixels, at least, that have it: the black rims of undistorted photos are fewer
@@ -68,5 +69,5 @@ def rim_of(rgb: np.ndarray) -> np.ndarray:
 
 
 def near(rgb: np.ndarray, color: np.ndarray) -> np.ndarray:
-    """(...) bool which of 8-bit colours (..., 3) are this one but for noise."""
-    return (np.abs(rgb.astype(np.int16) - color) <= 255 * NOISE).all(axis=-1)
+    """(...) bool which of 8-bit colours (..., 3) are this one but for noise and uneven light."""
+    return (np.abs(rgb.astype(np.int16) - color) <= 255 * BACKDROP).all(axis=-1)
