@@ -99,6 +99,7 @@ export class Headset {
         this.head = rigid(seen.transform);
         if (fresh) this.recentre();
         this.hands.step(frame, seconds);
+        if (!this.session) return;  // a long press has ended it
         page.panel.step(seconds);
         page.grab.step(seconds);
         this.roomPanel.follow(chain(this.worldFromFloor, this.head));

@@ -55,6 +55,9 @@ class Options(ReadingOptions):
     """Into a folder: a page for a server, which shows a coarse scene first; no package."""
     exact: Annotated[bool, EXPERT] = False
     """Of a page: its tables as float32 instead of 8 to 24 bits; about twice as large."""
+    for_: Literal["any", "quest"] = "any"
+    """Of a page; quest: in a headset that has no PC it leaves out what costs little, from 46 dB on,
+    and says so (docs/headset.md)."""
     encoding: Annotated[Literal["kept", "stops"], EXPERT] = "kept"
     """Of a package; stops: the control encoding is written anew, a unit for each stop, so that
     programs which know of no blends of stops meet no jump between them either."""
@@ -76,6 +79,10 @@ def run(options: Options) -> int:
     package = not page and (is_folder(options.out) or options.out.suffix.lower() == PACKAGE)
     if options.encoding != "kept" and not package:
         raise UsageError("--encoding is of packages; name --out NAME.shift, or leave it out.")
+    if options.for_ != "any" and not page:
+        raise UsageError(
+            "--for is of pages; name --out NAME.html or .zip, or --web, or leave it out."
+        )
     if not package and not page:
         writer_of(options.out)  # before the scene is read
     check_output(options.out, options.scenes, options.overwrite)
@@ -327,7 +334,7 @@ def export_as_page(options: Options, scenes: tuple[Path, ...]) -> int:
         if isinstance(obj.model, AnchorModel):
             document = replace(document, scene=Scene((replace(obj, model=with_pace(obj.model)),)))
     title = scenes[0].name.removesuffix(".scene.json").rsplit(".", 1)[0]
-    settings = PageSettings(title, exact=options.exact)
+    settings = PageSettings(title, exact=options.exact, profile=options.for_)
     with progress_after(PATIENCE_S) as progress:
         size = export_page(document, options.out, settings, progress)
     splats = sum(obj.model.splat_count for obj in document.scene.objects)

@@ -5,6 +5,7 @@ import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -37,6 +38,7 @@ class PageSettings:
     title: str
     exact: bool = False  # float32 instead of codes
     pictures: bool = True  # of the stops
+    profile: Literal["any", "quest"] = "any"  # what may be left out in a headset: sharpness.js
 
 
 def page_scene(document: Document, settings: PageSettings, progress: Progress) -> bytes:
@@ -89,6 +91,7 @@ def described(
     ]
     return {
         "title": settings.title,
+        "profile": settings.profile,
         "background": [float(c) for c in document.background],
         "brightest": brightest_of(models),
         "radius": float(radius),

@@ -32,7 +32,8 @@ WATCH = """(() => {
     globalThis.wanted = false;
   };
 })(), 1"""
-STICK, TRIGGER, SQUEEZE, HOME = "thumbstick", "trigger", "squeeze", "b-button"
+STICK, TRIGGER, SQUEEZE = "thumbstick", "trigger", "squeeze"
+HOMES = {"left": "y-button", "right": "b-button"}
 
 
 def install(page) -> None:
@@ -103,5 +104,30 @@ def aim(page, hand: str, at, back_m: float = 0.5, kind: str = "controllers") -> 
     page.run(
         f"device.{kind}.{hand}.position.set({x}, {y}, {z + back_m}),"
         f"device.{kind}.{hand}.quaternion.set(0, 0, 0, 1), 1"
+    )
+    wait(page)
+
+
+def shift(page, hand: str, by, kind: str = "controllers") -> None:
+    """Moves a hand by metres of the world; the room is turned about +y alone."""
+    x, y, z = map(float, by)
+    page.run(f"""(() => {{
+      const {{ wxyz: [w, , v] }} = shapeshift.headset.worldFromFloor;
+      const c = w * w - v * v, s = 2 * w * v, place = device.{kind}.{hand}.position;
+      place.set(place.x + c * {x} - s * {z}, place.y + {y}, place.z + s * {x} + c * {z});
+      return 1;
+    }})()""")
+    wait(page)
+
+
+def lift(page, hand: str, by_m: float, kind: str = "controllers") -> None:
+    shift(page, hand, (0, by_m, 0), kind)
+
+
+def level(page, hand: str, before_m: float) -> None:
+    """The hand a little before the head, pointing ahead."""
+    page.run(
+        f"device.controllers.{hand}.position.set(device.position.x, device.position.y - 0.2,"
+        f" device.position.z - {before_m}), device.controllers.{hand}.quaternion.set(0, 0, 0, 1), 1"
     )
     wait(page)
