@@ -15,7 +15,11 @@ import { Shader } from "./shade.js";
 /** @typedef {{first: number, rows: number}} Batch  first anchor, rows of anchors */
 /** @typedef {{texture: WebGLTexture, rows: number, layers: number, framebuffers: Map<string, WebGLFramebuffer>}} Stage */
 
-const SHAPE = ["offset", "scale", "rotation", "opacity"];
+/** Where the outputs of the networks are staged, and how many vectors in all. @param {number} k */
+function staging(k) {
+    const triples = Math.ceil((3 * k) / 4);
+    return { first: { offset: 0, scale: triples, rotation: 2 * triples, opacity: 2 * triples + k }, vectors: 2 * triples + k + Math.ceil(k / 4) };
+}
 const LARGEST = 3.4e38;
 
 export class Decoder {
@@ -111,8 +115,9 @@ export class Decoder {
         const { model } = object, k = model.perAnchor, { arena, gpu } = this;
         if (model.kind === "layers") return this.shader.weighLayers(object, this.pack);
         for (const batch of batchesOf(model)) {
-            const { texture } = this.stage("out", batch.rows, 3 * k + Math.ceil(k / 4));
-            SHAPE.forEach((name, i) => this.run(object, name, object.own ? null : object.x, batch, i * k, undefined, object.own?.mask(() => true)));
+            const { texture } = this.stage("out", batch.rows, staging(k).vectors);
+            for (const [name, layer] of Object.entries(staging(k).first))
+                this.run(object, name, object.own ? null : object.x, batch, layer, undefined, object.own?.mask(() => true));
             this.pack.use({
                 staged: { layers: texture }, anchors: { texture: model.anchorList }, frames: { texture: model.frameList ?? model.anchorList }, opacities: { texture: model.anchorList },
                 per_anchor: { int: k }, count: { int: model.anchors }, first_anchor: { int: batch.first },
@@ -128,7 +133,7 @@ export class Decoder {
         if (model.kind === "layers") return this.shader.shade(object, shade, way, eye, null, 0, object.rows, () => {});
         const thermal = new Set(shade.heats.map((heat) => heat.stop)), mixed = object.own && !shade.pure;
         for (const batch of batchesOf(model)) {
-            const { texture } = this.stage("out", batch.rows, 3 * k + Math.ceil(k / 4));
+            const { texture } = this.stage("out", batch.rows, staging(k).vectors);
             this.shader.shade(object, shade, way, eye, texture, batch.first, splatRows(batch, object), (control, heat) =>
                 this.run(object, "color", mixed && !heat ? null : control, batch, 0, eye, object.own?.mask((/** @type {number} */ s) => !thermal.has(s))));
         }

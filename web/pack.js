@@ -13,7 +13,7 @@ mat3 rotation(vec4 q) {  // w x y z, of any length
 }`;
 
 export const PACK = `
-uniform sampler2DArray staged;   // offsets, scales, quaternions, opacities: layers of per_anchor each
+uniform sampler2DArray staged;   // offsets, scales, quaternions, opacities of an anchor's splats, side by side
 uniform sampler2D anchors;       // plain splats: their means
 uniform sampler2D frames;        // scales and quaternion: an anchor's own, or a plain splat's
 uniform sampler2D opacities;     // of plain splats
@@ -24,6 +24,11 @@ layout(location = 0) out vec4 mean_opacity;
 layout(location = 1) out vec4 covariance0;   // xx xy xz yy, m^2
 layout(location = 2) out vec4 covariance1;   // yz zz
 ${ROTATION}
+ivec3 here;  // of the anchor
+
+float number(int first, int n) { return texelFetch(staged, here + ivec3(0, 0, first + (n >> 2)), 0)[n & 3]; }
+vec3 triple(int first, int j) { return vec3(number(first, 3 * j), number(first, 3 * j + 1), number(first, 3 * j + 2)); }
+
 void main() {
     int i = (int(gl_FragCoord.y) - first_row) * WIDTH + int(gl_FragCoord.x);
     int a = i / per_anchor, j = i - a * per_anchor;
@@ -38,11 +43,12 @@ void main() {
         axes = rotation(texelFetch(frames, at(2 * a + 1), 0));
         opacity = texelFetch(opacities, at(a), 0).x;
     } else {
-        ivec2 here = at(a - first_anchor);
-        vec3 offset = texelFetch(staged, ivec3(here, j), 0).xyz;
-        scale = texelFetch(staged, ivec3(here, per_anchor + j), 0).xyz;
-        axes = rotation(texelFetch(staged, ivec3(here, 2 * per_anchor + j), 0));
-        opacity = texelFetch(staged, ivec3(here, 3 * per_anchor + j / 4), 0)[j & 3];
+        here = ivec3(at(a - first_anchor), 0);
+        int triples = (3 * per_anchor + 3) / 4;  // vectors
+        vec3 offset = triple(0, j);
+        scale = triple(triples, j);
+        axes = rotation(texelFetch(staged, here + ivec3(0, 0, 2 * triples + j), 0));
+        opacity = number(2 * triples + per_anchor, j);
         if (source == 1) {
             mat3 object_from_anchor = rotation(texelFetch(frames, at(2 * a + 1), 0));
             vec3 size = texelFetch(frames, at(2 * a), 0).xyz;

@@ -27,6 +27,7 @@ uniform int role;                    // 0: final colours; 1: heat; 2: heat in th
 layout(location = 0) out vec4 color; // display sRGB; a below 0: no number
 layout(location = 1) out vec4 heat;  // value times weight, weight
 ${PALETTE_COLOR}
+float output_number(ivec2 here, int n) { return texelFetch(staged, ivec3(here, n >> 2), 0)[n & 3]; }
 float number(int a, int n) {
     int i = a * coefficients * 3 + n;
     return texelFetch(sh, at(i >> 2), 0)[i & 3];
@@ -63,7 +64,8 @@ void main() {
     int a = i / per_anchor, j = i - a * per_anchor;
     color = heat = vec4(0.0);
     if (a >= count) return;
-    vec3 rgb = ${harmonics ? "shaded(a)" : "texelFetch(staged, ivec3(at(a - first_anchor), j), 0).rgb"};
+    ${harmonics ? "" : "ivec2 here = at(a - first_anchor);"}
+    vec3 rgb = ${harmonics ? "shaded(a)" : "vec3(output_number(here, 3 * j), output_number(here, 3 * j + 1), output_number(here, 3 * j + 2))"};
     float share = weight;
     if (channel >= 0) share = texelFetch(stop_weights, at(a * vectors + channel / 4), 0)[channel & 3];
     float brightest = max(max(abs(rgb.r), abs(rgb.g)), abs(rgb.b));

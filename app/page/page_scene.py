@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from shapeshift.app.document import Document
-from shapeshift.renderer.colors.palette import PALETTES, over_background, palette_colors
+from shapeshift.renderer.colors.palette import PALETTES, palette_colors
 from shapeshift.renderer.gl.target import brightest
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.evaluate import follows_eye
@@ -177,12 +177,13 @@ def stop_pictures(document: Document, progress: Progress) -> dict[float, str]:
     stops = [stop.x for stop in document.scene.objects[0].model.stops][:MOST_PICTURES]
     found = {}
     with Renderer(None, sort="numpy") as renderer:
+        renderer.settings = replace(renderer.settings, background=document.background)
         for number, x in enumerate(stops):
             progress("drawing pictures of the stops", number / (len(stops) + 1))
             objects = tuple(replace(obj, x=x) for obj in document.scene.objects)
             renderer.update(Scene(objects))
             renderer.draw([document.view(PICTURE)])
-            picture = over_background(renderer.image(0), document.background)
+            picture = renderer.resolved(0)
             bytes_ = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)
             file = io.BytesIO()
             Image.fromarray(bytes_).save(file, "WEBP", quality=QUALITY)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from shapeshift.runtime_models.model import (
-    SIZE_PER_SPLAT,
     AnchorModel,
     BadFile,
     Mlp,
@@ -146,7 +145,6 @@ def network(out: Container, mlp: Mlp, name: str, model: AnchorModel) -> dict:
     widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
     part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
     weights, biases = list(mlp.weights), list(mlp.biases)
-    weights[-1], biases[-1] = a_vector_a_splat(weights[-1], biases[-1], SIZE_PER_SPLAT[name])
     first = weights[0]  # (outputs, inputs)
     looks, control = "direction" in mlp.inputs, None
     columns = [padded(as_features(first, part_of, widths["feature"]))]
@@ -176,18 +174,6 @@ def as_features(first: np.ndarray, part_of: np.ndarray, width: int) -> np.ndarra
     if "feature" in part_of:
         return first[:, part_of == "feature"]
     return np.zeros((len(first), width), np.float32)
-
-
-def a_vector_a_splat(
-    weight: np.ndarray, bias: np.ndarray, size: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """A last layer whose rows are padded so that three numbers of a splat are a vector of four."""
-    if size != 3:
-        return weight, bias
-    count, inputs = len(bias) // size, weight.shape[1]
-    rows, row = np.zeros((count, 4, inputs), np.float32), np.zeros((count, 4), np.float32)
-    rows[:, :size], row[:, :size] = weight.reshape(count, size, inputs), bias.reshape(count, size)
-    return rows.reshape(4 * count, inputs), row.reshape(-1)
 
 
 def vector_weights(weight: np.ndarray) -> np.ndarray:

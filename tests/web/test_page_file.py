@@ -148,3 +148,19 @@ def test_the_page_of_the_demo_is_no_larger_than_its_package(tmp_path):
     document = Document.of(read_model(package))
     size = export_page(document, tmp_path / "page.html", PageSettings("workshop"), nothing)
     assert size <= package.stat().st_size
+
+
+def test_pictures_of_the_stops_have_false_colours():
+    """The picture of the thermal stop is the one of the palette, not of values."""
+    import base64
+    import io
+
+    from PIL import Image
+
+    from shapeshift.app.page.page_scene import stop_pictures
+
+    pictures = stop_pictures(Document.of(paced_model(60)), nothing)
+    assert list(pictures) == [0.0, 0.4, 1.0] and sum(map(len, pictures.values())) < 15_000
+    bytes_ = base64.b64decode(pictures[0.4].split(",")[1])
+    shown = np.asarray(Image.open(io.BytesIO(bytes_)).convert("RGB"), int)
+    assert np.abs(np.diff(shown, axis=2)).max() > 100  # ironbow is no grey

@@ -1,6 +1,7 @@
 """What a page draws in a real browser, against the float64 reference."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from shapeshift.app.document import Document
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.metrics import psnr
 
+ROOT = Path(__file__).resolve().parents[2]
 SIZE = (320, 180)
 # 8-bit rounding alone leaves 58.9 dB of evenly spread values; codes and float32 take the rest.
 LEAST_DB = 54
@@ -42,10 +44,12 @@ def test_every_control_of_a_package_is_drawn_right(browser, tmp_path):
 @pytest.mark.parametrize(
     "model",
     [
-        paced_model(40, framed=False, k=1, features=3, hidden=()),
+        pytest.param(
+            paced_model(40, framed=False, k=1, features=3, hidden=()), marks=pytest.mark.slow
+        ),
         paced_model(61, k=9, features=13, hidden=(30, 18)),
         without_control(paced_model(50), "offset", "scale", "rotation", "color"),
-        without_direction(paced_model(50, framed=False)),
+        pytest.param(without_direction(paced_model(50, framed=False)), marks=pytest.mark.slow),
         replace(paced_model(50), between_stops="encoding", pace=()),
     ],
     ids=["linear", "deep", "only opacity moves", "no direction", "encoded x"],
@@ -58,7 +62,10 @@ def test_networks_of_any_shape_are_drawn_right(browser, tmp_path, model):
     assert min(found) >= LEAST_DB, found
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("degree", [0, pytest.param(1, marks=SLOW), 2, pytest.param(3, marks=SLOW)])
 def test_plain_splats_are_drawn_right(browser, tmp_path, degree):
     mode = ("exclusive", "cumulative")[degree % 2]
     model = plain_splats(degree=degree, mode=mode, antialiased=degree > 1, thermal=degree == 2)
@@ -69,6 +76,7 @@ def test_plain_splats_are_drawn_right(browser, tmp_path, degree):
     assert min(found) >= LEAST_DB - 6 * (degree > 0), found  # harmonics have 8 bits
 
 
+@pytest.mark.slow
 def test_harmonics_stored_exactly_are_drawn_right(browser, tmp_path):
     document = Document.of(plain_splats(degree=3, antialiased=True))
     page = opened(browser, document, tmp_path, exact=True)
@@ -113,6 +121,7 @@ def test_two_eyes_share_one_order(browser, tmp_path):
     assert psnr(wanted[0], wanted[1]) < 40  # or the two could have been exchanged
 
 
+@pytest.mark.slow
 def test_half_floats_and_bytes_are_blended_where_a_device_has_no_more(browser, tmp_path):
     document = Document.of(paced_model())
     page = opened(browser, document, tmp_path)
@@ -123,6 +132,7 @@ def test_half_floats_and_bytes_are_blended_where_a_device_has_no_more(browser, t
     assert decibels(page, document, scene, view, "rgba8") >= 36
 
 
+@pytest.mark.slow
 def test_nothing_grows_while_x_moves(browser, tmp_path):
     document = Document.of(paced_model(60))
     page = opened(browser, document, tmp_path)
@@ -136,3 +146,22 @@ def test_nothing_grows_while_x_moves(browser, tmp_path):
     for x in np.linspace(0, 0.7, 21):
         drawn(page, at(document, float(x)), [view])
     assert page.run(counts) == before and page.run("shapeshift.renderer.reads.length") == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["workshop.shift", "touch.scene.json"])
+def test_bundled_scenes_are_drawn_right_from_three_cameras(browser, tmp_path, name):
+    from shapeshift.app.document import open_document
+    from shapeshift.app.opening import ReadingOptions
+    from shapeshift.scene.cameras.framing import orbit_path
+
+    document = open_document(ROOT / "assets" / name, ReadingOptions())
+    centre, radius = document.bounds()
+    views = [document.view(SIZE), *orbit_path(3, centre, radius, SIZE)[1:]]
+    page = opened(browser, document, tmp_path)
+    found = [
+        decibels(page, document, at(document, x), view)
+        for x in (0.0, 0.25, 0.5, 0.75, 1.0)
+        for view in views
+    ]
+    assert min(found) >= LEAST_DB, found
