@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from shapeshift.runtime_models.session import load_onnxruntime
+from shapeshift.training.gradients.fold_constants import open_checked
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
-from shapeshift.training.gradients.read_network import open_checked
 from shapeshift.training.gradients.reverse_mode import add_gradient
 
 

@@ -119,7 +119,7 @@ class OnnxGraph:
         from onnx import shape_inference
 
         try:
-            model = shape_inference.infer_shapes(self._light_model(), data_prop=True)
+            model = shape_inference.infer_shapes(self._light_model())
         except (shape_inference.InferenceError, ValueError) as error:
             raise BadFile(f"{self.name} is no network with shapes that fit: {error}.") from None
         for value in (*model.graph.value_info, *model.graph.output):

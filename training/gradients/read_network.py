@@ -1,6 +1,5 @@
 """An ONNX network from a file, for inputs of fixed sizes: checked, pruned, its constants folded."""
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import Account, Memory
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.read_onnx import COPIES, MESSAGE, payload_of
-from shapeshift.runtime_models.session import load_onnxruntime
+from shapeshift.training.gradients.fold_constants import fold_small, optimized
 from shapeshift.training.gradients.onnx_graph import FLOAT, OnnxGraph
 from shapeshift.training.gradients.reverse_mode import KNOWN
 
@@ -38,9 +37,10 @@ def read_network(
     graph.outputs = list(outputs)
     graph.keep_only(outputs)
     refuse_unusual_nodes(graph)
-    graph.infer_shapes()
+    fold_small(graph)
+    graph.keep_only(outputs)
     charge_activations(graph, account)
-    folded = fold_constants(graph)
+    folded = fold_rest(graph)
     folded.infer_shapes()
     charge_activations(folded, account)
     return folded
@@ -145,41 +145,15 @@ def charge_activations(graph: OnnxGraph, account: Account) -> None:
         pass
 
 
-def fold_constants(graph: OnnxGraph) -> OnnxGraph:
-    """The same graph after onnxruntime has folded what exporters leave of Shape, Gather, Concat."""
-    import onnx
-
-    onnxruntime = load_onnxruntime()
-    options = onnxruntime.SessionOptions()
-    options.log_severity_level, options.intra_op_num_threads = 3, 1
-    options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_BASIC
-    with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
-        path = Path(folder) / "folded.onnx"
-        options.optimized_model_filepath = str(path)
-        open_checked(graph.model().SerializeToString(), graph.name, options)
-        model = onnx.load(path)
+def fold_rest(graph: OnnxGraph) -> OnnxGraph:
+    """The same graph as onnxruntime simplifies it."""
     sizes = {name: shape for name, (_, shape) in graph.inputs.items()}
-    folded = graph_of(model, graph.name, sizes)
+    folded = graph_of(optimized(graph), graph.name, sizes)
     folded.opset, folded.ir_version = graph.opset, graph.ir_version
     folded.outputs = list(graph.outputs)
     folded.keep_only(folded.outputs)
     refuse_unusual_nodes(folded)
     return folded
-
-
-def open_checked(data: bytes, name: str, options):
-    """An onnxruntime session.  Raises BadFile, in its words, where the network does not open."""
-    onnxruntime = load_onnxruntime()
-    errors = onnxruntime.capi.onnxruntime_pybind11_state
-    try:
-        return onnxruntime.InferenceSession(
-            data, options, providers=["CPUExecutionProvider"], enable_fallback=0
-        )
-    except (
-        errors.Fail, errors.InvalidArgument, errors.InvalidGraph, errors.InvalidProtobuf,
-        errors.NotImplemented, errors.RuntimeException, UnicodeDecodeError,
-    ) as error:  # fmt: skip
-        raise BadFile(f"{name} is not a network that onnxruntime can open: {error}.") from None
 
 
 def listed(names) -> str:

@@ -63,7 +63,8 @@ def convolution(step: VjpStep) -> dict[int, str]:
     kernel = list(step.attributes.get("kernel_shape") or step.shape(1)[2:])
     strides, pads, dilations = windows(step, kernel)
     group = step.attributes.get("group", 1)
-    plain = group == 1 and {*strides, *dilations} == {1}
+    weights = step.graph.constant(step.inputs[1])
+    plain = group == 1 and {*strides, *dilations} == {1} and weights is not None
     back = [kernel[i % len(kernel)] - 1 - p for i, p in enumerate(pads)]
     if plain and min(back) >= 0:
         # The same as a convolution with the weights turned: 1.5 times faster in onnxruntime.

@@ -13,10 +13,10 @@ import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.session import load_onnxruntime
+from shapeshift.training.gradients.fold_constants import open_checked, quiet_options, run_checked
 from shapeshift.training.gradients.gradient_session import GradientSession, open_graph
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
-from shapeshift.training.gradients.read_network import open_checked, read_bytes, read_network
+from shapeshift.training.gradients.read_network import read_bytes, read_network
 from shapeshift.training.style_features.clip_tokens import MOST_TOKENS, ClipTokenizer
 
 FILES = ("vision_model.onnx", "text_model.onnx", "tokenizer.json", "preprocessor_config.json")
@@ -90,7 +90,7 @@ class ClipModel:
             given = {WORDS: np.array([padded], np.int64)}
             if self.masked:
                 given[MASK] = np.array([[int(i < len(ids)) for i in range(len(padded))]], np.int64)
-            (row,) = run_checked(self.text, [READ], given)
+            (row,) = run_checked(self.text, [READ], given, "text_model.onnx")
             rows.append(refuse_unusual(np.atleast_2d(row), Path("text_model.onnx"))[0])
         mean = np.mean([row / (np.linalg.norm(row) + 1e-12) for row in rows], axis=0)
         return (mean / (np.linalg.norm(mean) + 1e-12)).astype(np.float32)
@@ -148,9 +148,7 @@ def open_text(path: Path):
 
     Raises BadFile.
     """
-    options = load_onnxruntime().SessionOptions()
-    options.log_severity_level, options.intra_op_num_threads = 3, 1
-    session = open_checked(read_bytes(path), path.name, options)
+    session = open_checked(read_bytes(path), path.name, quiet_options())
     inputs = {node.name: node.shape for node in session.get_inputs()}
     outputs = [node.name for node in session.get_outputs()]
     if WORDS not in inputs or set(inputs) - {WORDS, MASK} or READ not in outputs:
@@ -160,15 +158,6 @@ def open_text(path: Path):
         )
     length = inputs[WORDS][1] if len(inputs[WORDS]) == 2 else 0
     return session, min(length, MOST_TOKENS) if isinstance(length, int) else 0, MASK in inputs
-
-
-def run_checked(session, outputs: list[str], given: dict[str, np.ndarray]) -> list[np.ndarray]:
-    """Raises BadFile where the network refuses what it is given."""
-    errors = load_onnxruntime().capi.onnxruntime_pybind11_state
-    try:
-        return session.run(outputs, given)
-    except (errors.Fail, errors.InvalidArgument, errors.RuntimeException) as error:
-        raise BadFile(f"text_model.onnx does not run: {error}.") from None
 
 
 def refuse_unusual(rows: np.ndarray, path: Path) -> np.ndarray:

@@ -158,6 +158,31 @@ def test_overlapping_windows_need_a_newer_version(tmp_path):
     assert "windows that overlap, before version 16" in refusal(path)
 
 
+@pytest.mark.parametrize("name", ["a root", "a product", "a range"])
+def test_sizes_that_are_calculated_are_known_before_anything_is(tmp_path, name):
+    """What shape inference does not see through, as a root of floats, is calculated while small."""
+    large = {"s": np.array([1e10, 1e10, 1e10]), "t": np.array([1 << 11] * 3), "n": np.array(0),
+             "m": np.array(1 << 40), "one": np.array(1)}  # fmt: skip
+    rows = {
+        "a root": [row("Sqrt", "s", out="f"), row("Cast", "f", out="i", to=7),
+                   row("ConstantOfShape", "i", out="c")],
+        "a product": [row("Mul", "t", "t", out="i"), row("ConstantOfShape", "i", out="c")],
+        "a range": [row("Range", "n", "m", "one", out="i"), row("Cast", "i", out="c", to=1)],
+    }[name]  # fmt: skip
+    used = {each for _, inputs, _, _ in rows for each in inputs}
+    rows = [*rows, row("ReduceSum", "c", out="r"), row("Add", "x", "r")]
+    chosen = {each: value for each, value in large.items() if each in used}
+    path = write_model(tmp_path / "n.onnx", rows, {"x": (1, 1, 6)}, ["y"], chosen)
+    assert "of memory" in refusal(path, {"x": (1, 1, 6)})
+
+
+def test_a_shape_that_the_picture_decides_is_refused(tmp_path):
+    rows = [row("Cast", "x", out="i", to=7), row("ConstantOfShape", "i", out="c"),
+            row("ReduceSum", "c", out="r"), row("Add", "x", "r")]  # fmt: skip
+    path = write_model(tmp_path / "n.onnx", rows, {"x": (6,)}, ["y"], {})
+    assert "the shape of 'c' is not known beforehand" in refusal(path, {"x": (6,)})
+
+
 @pytest.mark.parametrize("kind", ["ConstantOfShape", "Expand", "Pad"])
 def test_a_few_bytes_that_ask_for_terabytes(tmp_path, kind):
     many = np.array([1 << 15, 1 << 15, 1 << 10])
