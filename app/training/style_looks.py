@@ -151,7 +151,7 @@ def preview_of(
     device,
     model: "AnchorModel",
     source: str,
-    progress: Callable[[str, float], None],
+    progress: Callable[[str, float], None] | None,
 ) -> "Rule":
     """The colours of --image without training, as a rule for splats.  Raises BadFile."""
     from shapeshift.scene.cameras.framing import default_background

@@ -251,6 +251,7 @@ class Scene(OpenedScene):
         text: str = "",
         vgg: PathText | None = None,
         clip_model: PathText | None = None,
+        quality: Literal["full", "preview"] = "full",
         paint: "Paint | None" = None,
         pictures: PathText | None = None,
         cameras: PathText | None = None,
@@ -271,7 +272,8 @@ class Scene(OpenedScene):
 
         shape: fur, blocks, bubbles, points, melt, explode or strokes, a rule for the splats.
         Colours come from one of network (an ONNX file of a style network, `weights` of its styles
-        by number), image with vgg, image or text with clip_model, paint (a function of a picture
+        by number), image with vgg (quality="preview": its colours in seconds, without training),
+        image or text with clip_model, paint (a function of a picture
         (H, W, 3) in 0..1 that gives another) or pictures (a folder, one for each of cameras).
         source: the stop that it starts from, after: the one that it comes after.  strength 0..1.
         region, keep: as of `style --region`.  views, size: of the dome that is painted.  pace:
@@ -287,7 +289,8 @@ class Scene(OpenedScene):
         options = Options(
             scene=self.path or Path("scene"), out=Path(), name=name, shape=shape,
             network=path_of(network), image=path_of(image), text=text, vgg=path_of(vgg),
-            clip_model=path_of(clip_model), pictures=path_of(pictures), cameras=path_of(cameras),
+            clip_model=path_of(clip_model), quality=quality, pictures=path_of(pictures),
+            cameras=path_of(cameras),
             from_=source, after=after, strength=strength, region=tuple(region), keep=tuple(keep),
             steps=steps, views=views, size=size, seed=seed, device=device,
         )  # fmt: skip

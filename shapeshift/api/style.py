@@ -48,6 +48,7 @@ def add_style(
 ) -> AnchorModel:  # fmt: skip
     """What Scene.add_style gives: the model with one stop more."""
     from shapeshift.app.training.style import check_options, style_of
+    from shapeshift.app.training.style_looks import preview_of
     from shapeshift.app.training.style_region import anchors_inside
     from shapeshift.app.training.style_sources import pictures_and_views
     from shapeshift.rasterizer.device import open_device
@@ -73,8 +74,10 @@ def add_style(
         raise UsageError(str(error).replace("--", "")) from None
     if paint is not None:
         pictures = CarriedPictures(PaintFunction(paint))
-    device = None if pictures is None else open_device(options.device)
-    made = put_in(device, model, style, pictures, views, inside, progress)
+    preview = options.quality == "preview"
+    device = open_device(options.device) if preview or pictures is not None else None
+    recolor = preview_of(options, device, model, style.source, progress) if preview else None
+    made = put_in(device, model, style, pictures, views, inside, progress, recolor)
     return replace(made, pace=measure_pace(made)) if pace else made
 
 

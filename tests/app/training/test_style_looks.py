@@ -83,6 +83,21 @@ def test_a_preview_has_the_pictures_colors_without_training(folder, tmp_path, st
     np.testing.assert_allclose(new[~inside], before[~inside], atol=1e-4)
 
 
+def test_a_preview_in_python_is_that_of_the_command(folder, tmp_path, style, device):
+    import shapeshift as ss
+
+    words = ("--image", "blue.png", "--vgg", "vgg.onnx", "--quality", "preview", "--name", "Sea")
+    assert style(*words) == 0
+    made = ss.load("scene.shift").add_style(
+        "Sea", image="blue.png", vgg="vgg.onnx", quality="preview", pace=False
+    )
+    made.save(tmp_path / "python.shift")
+    one, other = (read_package(tmp_path / n) for n in ("out.shift", "python.shift"))
+    np.testing.assert_allclose(
+        evaluate(one, 1.0, EYE).color, evaluate(other, 1.0, EYE).color, atol=2e-3
+    )  # 2e-3: `save` keeps features as halves
+
+
 def test_words_turn_a_region_red_and_nothing_else(folder, tmp_path, style, device, capsys):
     """Equations 10 to 13 on a made CLIP that knows colours."""
     region = ("--region", "half:0,0,0:1,0,0")
