@@ -16,7 +16,6 @@ from shapeshift.training.first_anchors.initial import (
 from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.photos import BLACK, LoadedPhoto
 
-GUESSES = 0.08  # of the anchors at most: guesses where the photos show what has no points
 NEIGHBOURS = 3  # whose distance is an anchor's size, as the first scale of 3DGS
 SURFACE = 9  # nearest points, an anchor's own place among them, that say how a surface lies
 FLATNESS = (0.3, 2.0)  # least and most of an axis, in the geometric mean of the three
@@ -55,7 +54,7 @@ def first_anchors(
 
 def choose_positions(first: InitialPoints, most: int) -> np.ndarray:
     """(A, 3) at most so many places: of the points and of the guesses added to them."""
-    guesses = subsample(first.guesses, int(GUESSES * most))
+    guesses = subsample(first.guesses, int(first.guess_share * most))
     points = np.unique(first.points, axis=0)  # scans have some of them twice
     if len(first.shapes) > 1:  # hulls lie over each other where stops have the same outlines
         points = voxel_centres(points, median_neighbour(points, np.random.default_rng(0)))

@@ -20,9 +20,22 @@ HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as 
 FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
 RANDOM_POINTS = 20_000
 NO_POINTS = np.zeros((0, 3))
+GUESSES = 0.08  # of the anchors at most: guesses where the photos show what has no points
+ON_HULL = 0.3  # of the anchors at most, where the others stand at triangulated points
 FEWEST = 100  # triangulated points; fewer are chance
 Report = Callable[[str], None]  # what is done now, in words
 SAMPLE = 1000  # points whose nearest neighbour is looked for
+
+
+class InitialPoints(NamedTuple):
+    """Where a run starts."""
+
+    points: np.ndarray  # (P, 3) metres
+    origin: str  # of them, in words
+    shapes: tuple[np.ndarray, ...]  # the points of each shape that stands for itself
+    guesses: np.ndarray = NO_POINTS  # (G, 3) metres, for what has no points
+    guess_share: float = GUESSES  # of the anchors, at most
+    doubts: tuple[str, ...] = ()  # what a person should know of it, a sentence each
 
 
 def median_neighbour(points: np.ndarray, rng: np.random.Generator) -> float:
@@ -150,16 +163,6 @@ def filler_points(
     return np.concatenate(found) if found else np.zeros((0, 3))
 
 
-class InitialPoints(NamedTuple):
-    """Where a run starts."""
-
-    points: np.ndarray  # (P, 3) metres
-    origin: str  # of them, in words
-    shapes: tuple[np.ndarray, ...]  # the points of each shape that stands for itself
-    guesses: np.ndarray = NO_POINTS  # (G, 3) metres, for what has no points
-    doubts: tuple[str, ...] = ()  # what a person should know of it, a sentence each
-
-
 def initial_points(
     capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto",
     report: Report | None = None,
@@ -167,8 +170,8 @@ def initial_points(
     """The first points, from the best source that there is.  Raises BadFile.
 
     source: one of SOURCES, or the path of a cloud; auto takes the first of these that there is:
-    the capture's own points, depth photos, the visual hull, points triangulated from the photos,
-    random ones.  report: called with words while it takes long.
+    the capture's own points, depth photos, points triangulated from the photos and the visual
+    hull, one of the two, random ones.  report: called with words while it takes long.
     """
     if source not in SOURCES:
         return visible_cloud(Path(source), capture, photos, rng)
@@ -179,16 +182,21 @@ def initial_points(
         points = depth_points(photos, rng)
         if len(points):
             return with_guesses(points, "depth photos", capture, photos, rng)
-    if source in ("auto", "hull") and (hull := hull_points(capture, photos)):
+    hull = hull_points(capture, photos) if source in ("auto", "hull") else None
+    if hull and source == "hull":
         return hull
     doubts: tuple[str, ...] = ()
     if source in ("auto", "triangulated"):
         try:
-            return from_photos(capture, photos, rng, report)
+            found = from_photos(capture, photos, rng, report)
+            return with_hull(found, hull) if hull else found
         except BadFile as why:
             if source == "triangulated":
                 raise
-            doubts = (f"{why} The first anchors stand at random places instead.",)
+            where = "on the hull alone" if hull else "at random places"
+            doubts = (f"{why}  The first anchors stand {where}.",)
+    if hull:
+        return hull._replace(doubts=doubts)
     if source not in ("auto", "random"):
         lacking = {
             "capture": "has no points of its own (COLMAP's points3D, or 'points' in its JSON)",
@@ -214,6 +222,13 @@ def hull_points(capture: Capture, photos: list[LoadedPhoto]) -> InitialPoints | 
             "belong together, or train with --masks ignore."
         )
     return None
+
+
+def with_hull(found: InitialPoints, hull: InitialPoints) -> InitialPoints:
+    """Measured points, and the hull for what has too little texture to have some."""
+    return found._replace(
+        origin=f"{found.origin} and the hull", guesses=hull.points, guess_share=ON_HULL
+    )
 
 
 def from_photos(

@@ -31,7 +31,7 @@ OUTSIDE = 0.1  # of the photos that have a point in them may show background the
 def triangulated_points(
     photos: list[LoadedPhoto], background: tuple | None, progress: Progress
 ) -> np.ndarray:
-    """(P, 3) metres, in the order in which they were found; (0, 3) where nothing matches.
+    """(P, 3) metres, sorted, each once; (0, 3) where nothing matches.
 
     Raises BadFile where pycolmap is absent or fails.
     """
@@ -49,7 +49,7 @@ def triangulated_points(
         log = Path(folder, "log.txt")
         run_child(SCRIPT, [str(given), str(wanted)], log, progress, FAILURE)
         with np.load(wanted) as file:
-            points = file["xyz"]
+            points = np.unique(file["xyz"], axis=0)  # features have up to two orientations
     return points[np.isfinite(points).all(axis=1) & on_object(points, photos)]
 
 

@@ -7,7 +7,6 @@ from shapeshift.runtime_models.rotation import rotation_matrices
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.first_anchors.first_anchors import (
     FLATNESS,
-    GUESSES,
     SIZES,
     choose_positions,
     first_anchors,
@@ -16,7 +15,7 @@ from shapeshift.training.first_anchors.first_anchors import (
     subsample,
     surface_axes,
 )
-from shapeshift.training.first_anchors.initial import InitialPoints
+from shapeshift.training.first_anchors.initial import GUESSES, InitialPoints
 from shapeshift.training.photos import LoadedPhoto
 
 RNG = np.random.default_rng

@@ -9,7 +9,8 @@ import pytest
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.first_anchors import triangulation
+from shapeshift.training.first_anchors import initial, triangulation
+from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import initial_points
 from shapeshift.training.first_anchors.triangulation import (
     choose_pairs,
@@ -202,3 +203,18 @@ def test_of_many_photos_some_are_taken_evenly(count):
     assert len(taken) == min(count, triangulation.MOST_PHOTOS // (1 + (count > 0)))
     steps = np.diff([*taken, count])
     assert not count or (steps.min() >= 1 and steps.max() - steps.min() <= 1)
+
+
+def test_masks_give_a_hull_beside_the_points(monkeypatch):
+    masked = [photo_of(view, masked=True) for view in ring(10, 36.0)[:5] + ring(6, 9.0)]
+    hull = initial_points(CAPTURE, masked, RNG(0), "hull")
+    few = initial_points(CAPTURE, masked, RNG(0))  # the ball alone gives 57
+    assert few.origin == "hull" and "on the hull alone" in few.doubts[0]
+    assert few.points.tobytes() == hull.points.tobytes()
+    monkeypatch.setattr(initial, "FEWEST", 40)
+    both = initial_points(CAPTURE, masked, RNG(0))
+    assert both.origin.endswith("triangulated points and the hull") and not both.doubts
+    assert both.guesses.tobytes() == hull.points.tobytes()
+    assert both.points.tobytes() == found(masked).tobytes()
+    start = first_anchors(both, 100, masked, None)
+    assert len(start.anchors) == int(initial.ON_HULL * 100) + min(len(both.points), 70)
