@@ -20,6 +20,7 @@ from shapeshift.training.styles.train_stop import PictureRun, train_on_pictures
 BEHIND = (0.08, 0.08, 0.08)  # display sRGB, of a scene that has no background of its own
 DRIFT_VIEWS, DRIFT_SIZE = 8, (320, 240)
 MOST_STEPS = 100_000
+COLOR_FEATURES = 8  # numbers an anchor for colours by rule: of a file they are some 25 %
 Progress = Callable[[str, float], None]
 
 
@@ -81,7 +82,8 @@ def add_style(
     rules = [RULES[style.rule]] if style.rule else []
     for rule in [*rules, *([recolor] if recolor else [])]:
         report(f"shape: {style.rule}" if rule is not recolor else "colours", 0.0)
-        settings = RuleSettings(strength=style.strength)
+        features = COLOR_FEATURES if rule is recolor else RuleSettings.features
+        settings = RuleSettings(features, style.strength)
         made = with_rule(made, style.name, rule, settings, inside)
     if pictures is not None:
         trainer = StopTrainer(device, made, style.name, StopSettings(seed=style.seed), inside)
