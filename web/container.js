@@ -113,10 +113,26 @@ export function checkScene({ scene, array }) {
         numbers(object.wxyz, 4, "the turn of an object");
         numbers([...numbers(object.centre, 3, "the middle of an object"), object.radius], 4, "the size of an object");
         checkControl(object.x, model.stops.length);
+        checkRegions(object.regions ?? [], model.stops.length);
     }
     if (!(splats <= MOST_SPLATS)) refuse(`the scene has ${splats} splats, and a page shows at most ${MOST_SPLATS}`);
     for (const palette of Object.values(scene.palettes ?? {}))
         if (/** @type {any} */ (palette)?.width !== 3 || /** @type {any} */ (palette).codes?.[2] !== 768) refuse("a palette has not 256 colours");
+}
+
+/** @param {any} regions @param {number} stops */
+function checkRegions(regions, stops) {
+    whole(Array.isArray(regions) ? regions.length : -1, 0, 64, "the count of regions");
+    const fields = /** @type {Record<string, [string, number][]>} */ ({
+        sphere: [["centre", 3]], box: [["centre", 3], ["half", 3], ["wxyz", 4]], half: [["point", 3], ["normal", 3]], painted: [],
+    });
+    for (const region of regions) {
+        if (!Object.hasOwn(fields, region?.kind)) refuse("a region is of a kind that this page does not know");
+        for (const [name, count] of fields[region.kind]) numbers(region[name], count, "a region");
+        if (region.kind === "sphere") numbers([region.radius], 1, "a region");
+        if (region.kind === "painted" ? region.weight?.width !== 1 : !Number.isFinite(region.border)) refuse("a region is not whole");
+        checkControl(region.x, stops);
+    }
 }
 
 /** @param {any} x @param {number} stops */

@@ -8,6 +8,7 @@ import { shadeOf, wayOf } from "./false_colors.js";
 import { Gpu, rowsOf } from "./gl.js";
 import { loadModel } from "./models.js";
 import { add, chain, dot, inverse, length, rows } from "./poses.js";
+import { Regions } from "./regions.js";
 import { Projector } from "./project.js";
 import { Resolver } from "./resolve.js";
 import { Sorter } from "./sort.js";
@@ -64,6 +65,10 @@ export class Renderer {
         this.objects = scene.objects.map((/** @type {any} */ described) => {
             const object = new SceneObject(described, this.models[described.model], row);
             row += object.rows;
+            if (described.regions?.length) {
+                const regions = described.regions.map((/** @type {any} */ region) => (region.weight ? { ...region, weight: table(region.weight, object.model.anchors) } : region));
+                object.own = new Regions(this.gpu, object, regions);
+            }
             return object;
         });
         const hasHeat = this.models.some((/** @type {any} */ model) => model.stops.some((/** @type {any} */ stop) => stop.kind === "thermal" && stop.palette));
@@ -117,6 +122,7 @@ export class Renderer {
 
     /** Only what has another x, or is looked at from elsewhere. @param {number[]} eye  world metres */
     decode(eye) {
+        for (const object of this.objects) if (object.own?.update(object)) object.shaped = false;
         const shades = this.objects.map((o) => shadeOf(o.model, o.x, o.own?.most));
         this.colors = wayOf(shades.filter((_, i) => this.objects[i].visible));
         this.objects.forEach((object, i) => {

@@ -103,7 +103,7 @@ export class Shader {
         if (rest !== null) parts.unshift({ control: rest, role: 0, share: kept, channel: -1, palette: "" });
         const stops = model.stops.length, vectors = Math.ceil(stops / 4) + 1;
         parts.forEach((part, n) => {
-            const each = own && !shade.pure ? own.texture : heats.some((heat) => heat.ofLayer) ? model.layerList : null;
+            const each = shade.pure ? null : heats.some((heat) => heat.ofLayer) ? model.layerList : own ? own.texture : null;
             const heated = each && heats.length > 0;  // what is left for the final colours is the channel after the stops'
             decode(part.control, part.role > 0);
             program.use({

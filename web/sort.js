@@ -41,7 +41,7 @@ function sortInWorker(rowLength, minAlpha) {
             counts[b] = sum;
             sum += count;
         }
-        for (let i = 0; i < n; i++) order[counts[keys[i]]++] = rows[i];
+        for (let i = n - 1; i >= 0; i--) order[counts[keys[i]]++] = rows[i];  // of equals the first is in front
         return { order, count: n };
     };
 

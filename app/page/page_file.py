@@ -14,7 +14,8 @@ from shapeshift.runtime_models.web.limits import LARGEST_FILE
 WEB = Path(__file__).resolve().parents[2] / "web"
 # Each after what it imports; a test compares with the imports.
 MODULES = ("conventions", "poses", "gl", "container", "stops", "false_colors", "arena", "networks",
-           "pack", "shade", "decode", "models", "project", "resolve", "sort", "splat", "renderer",
+           "pack", "shade", "decode", "models", "project", "regions",
+           "resolve", "sort", "splat", "renderer",
            "camera", "control", "grab", "link", "panel", "sharpness", "overlay", "room_panel",
            "hands", "headset", "page")  # fmt: skip
 IN_A_HEADSET = ("sharpness", "overlay", "room_panel", "hands", "headset")  # nothing else needs

@@ -15,12 +15,13 @@ from shapeshift.renderer.gl.target import brightest
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
-from shapeshift.runtime_models.web.limits import MOST_SPLATS
+from shapeshift.runtime_models.web.limits import COLOR_BITS, MOST_SPLATS
 from shapeshift.runtime_models.web.web_model import control_entry, describe_model
 from shapeshift.runtime_models.web.write_container import Container
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document.scene_file import SceneItem, named_stops
 from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Selector
 
 FRAMED = (1280, 720)  # the page stands back where it is narrower
 PICTURE = (160, 90)  # pixels of a stop's picture
@@ -64,10 +65,15 @@ def refuse(document: Document) -> None:
             f"the scene has {splats:,} splats in all objects; a page shows at most {MOST_SPLATS:,}."
         )
     for obj in objects:
-        if obj.selectors:
+        if any(isinstance(selector, Lens) for selector in obj.selectors):
             raise BadFile(
-                f"object '{obj.name}' has regions with an x of their own, which a page cannot show "
-                "yet; remove them, or export it baked (--out scene.ply)."
+                f"object '{obj.name}' has a lens, which a page cannot show; remove it, or export "
+                "the scene baked (--out scene.ply)."
+            )
+        if obj.selectors and obj.model.blend.direct:
+            raise BadFile(
+                f"object '{obj.name}' has regions, and its model encodes x between its stops as it "
+                "is, which a page cannot show together; `export --encoding stops` writes it anew."
             )
         if follows_eye(obj.model):
             describe_model(Container(), obj.model)  # says why
@@ -102,6 +108,7 @@ def described(
         "models": entries,
         "objects": [
             object_entry(obj, items.get(obj.name), number[id(obj.model)], pictures)
+            | {"regions": [region_entry(out, obj, s, every) for s in obj.selectors]}
             for obj in document.scene.objects
         ],
         "palettes": palettes_of(out, models),
@@ -156,6 +163,22 @@ def object_entry(
         "movable": item is not None and touched and not room and not item.static, "solid": touched,
         "restitution": item.restitution if item else 0.0, "states": states,
     }  # fmt: skip
+
+
+def region_entry(out: Container, obj: SceneObject, selector: Selector, every: int) -> dict:
+    """A part of an object with an x of its own; every: of which sample of its anchors."""
+    entry = {"x": control_entry(obj.model, selector.x), "space": selector.space}
+    if isinstance(selector, Painted):
+        weight = out.add_table("painted weights", selector.weight[::every, None], COLOR_BITS)
+        return {**entry, "kind": "painted", "weight": weight}
+    assert not isinstance(selector, Lens), "refuse() lets none pass"
+    entry["border"] = selector.border
+    if isinstance(selector, HalfSpace):
+        return {**entry, "kind": "half", "point": selector.point, "normal": selector.normal}
+    if isinstance(selector, Box):
+        box = {"centre": selector.centre, "half": selector.half, "wxyz": selector.wxyz}
+        return {**entry, "kind": "box", **box}
+    return {**entry, "kind": "sphere", "centre": selector.centre, "radius": selector.radius}
 
 
 def bounding_box(model: Model) -> tuple[np.ndarray, np.ndarray]:

@@ -92,4 +92,6 @@ def _token(out: list[str], token: str) -> None:
         signs = before in "+-" and token in "+-"
         if not (words or signs):
             out.pop()
+    if out and (out[-1] + token[0] == ";}" or (out[-1] == "," and token[0] in ")]}")):
+        out.pop()  # the last of a row or block needs none
     out.append(token)

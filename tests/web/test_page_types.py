@@ -44,6 +44,7 @@ def test_the_script_of_a_page_is_sound(node, tmp_path):
         ("a = b / c / d;\nreturn x\n", "a=b/c/d;return x\n"),
         ("x = `\n  // no\n  vec2 a = b + c;\n`;", "x=`\nvec2 a=b+c;\n`;\n"),
         ("f()\n(g)\n", "f()\n(g)\n"),
+        ("if (a) {\n  f([1,\n 2,\n]);\n}\nb", "if(a){f([1,2])}\nb\n"),
         ("x = y ? `a${ `b  ${ 1 } }` }` : {};", "x=y?`a${`b  ${1} }`}`:{};\n"),
     ],
 )

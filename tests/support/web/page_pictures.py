@@ -50,7 +50,9 @@ def write_page(document: Document, path: Path, **settings) -> Path:
 
 def still(page) -> None:
     """From now on the page draws only what a test asks for."""
-    page.run("shapeshift.headset = { session: true }, 1")
+    page.run("""(page => { page.headset = { session: true };  // it may not have drawn at all yet
+      const { canvas } = page; canvas.width = canvas.clientWidth; canvas.height = canvas.clientHeight;
+    })(shapeshift)""")
 
 
 def view_entry(view: View, left: int = 0) -> dict:
