@@ -16,7 +16,7 @@ WEB = Path(__file__).resolve().parents[2] / "web"
 MODULES = ("conventions", "poses", "gl", "container", "stops", "false_colors", "arena", "networks",
            "pack", "shade", "decode", "models", "project", "resolve", "sort", "splat", "renderer",
            "camera", "control", "grab", "link", "panel", "sharpness", "overlay", "room_panel",
-           "hands", "headset", "page")  # fmt: skip
+           "hands", "headset", "served", "embedded", "page")  # fmt: skip
 IN_A_HEADSET = ("sharpness", "overlay", "room_panel", "hands", "headset")  # nothing else needs
 IMPORT = re.compile(r"^import \{[^}]*\} from \"\./\w+\.js\";\n", re.M)
 SCRIPT = '<script type="module" src="page.js"></script>'
