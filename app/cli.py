@@ -29,6 +29,7 @@ COMMANDS = {
         "commands.export",
         "a scene at one x as .ply, .compressed.ply, .spz, .glb or .splat",
     ),
+    "serve": ("page.serve", "a scene in the browsers of this computer, anew when its file changes"),
     "cameras": ("commands.cameras", "list a file of cameras, or convert it"),
     "simulate": (
         "commands.simulate",
@@ -68,7 +69,7 @@ COMMANDS = {
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
-OPEN_ENDED = ("view", "vr")  # they last as long as somebody looks
+OPEN_ENDED = ("view", "vr", "serve")  # they last as long as somebody looks
 BAD_INPUT = 2  # exit code
 FAULT = 3
 INTERRUPTED = 130

@@ -2,11 +2,13 @@
 import { Camera, pointUnder } from "./camera.js";
 import { readBeside, readContainer, readInline } from "./container.js";
 import { Grab, depthAlong, handOnRay } from "./grab.js";
+import { followParent, keepLink } from "./embedded.js";
 import { offerHeadsets } from "./headset.js";
 import { followLink, linkOf } from "./link.js";
 import { Panel, byId } from "./panel.js";
 import { perspective } from "./poses.js";
 import { Renderer } from "./renderer.js";
+import { followServer } from "./served.js";
 
 const NEAR_PART = 0.01;  // of the scene's radius
 const MOST_RATIO = 2;  // pixels of the picture a pixel of the page
@@ -63,7 +65,7 @@ class Page {
         this.wanted = false;
         renderer.draw([{ worldFromEye: camera.pose, tangents: perspective(camera.fovY, [width, height]), near: NEAR_PART * renderer.scene.radius, viewport: [0, 0, width, height] }]);
         clearTimeout(this.linked);
-        this.linked = setTimeout(() => history.replaceState(null, "", linkOf(camera, renderer)), LINK_MS);
+        this.linked = setTimeout(() => keepLink(linkOf(camera, renderer)), LINK_MS);
     }
 
     /** After a headset, which may have kept the page's frames waiting. */
@@ -162,6 +164,12 @@ async function main() {
     if (inline) requestAnimationFrame((time) => page.frame(time));
     Object.assign(globalThis, { shapeshift: page });  // for tests and for who embeds the page
     await offerHeadsets(page);
+    followParent((link) => {
+        if (!page.camera || !page.renderer) return;
+        followLink(link, page.camera, page.renderer);
+        page.panel?.show();
+    });
+    followServer(() => { if (page.camera && page.renderer) history.replaceState(null, "", linkOf(page.camera, page.renderer)); });
     document.documentElement.dataset.ready = "yes";
 }
 

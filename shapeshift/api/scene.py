@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from shapeshift.api.measure import Measured
     from shapeshift.api.picture import Picture
     from shapeshift.api.render import Context, Drawing
+    from shapeshift.api.show import ShownScene
     from shapeshift.api.style import Paint
     from shapeshift.api.write import Exported
     from shapeshift.app.training.style_options import Shape
@@ -146,6 +147,29 @@ class Scene(OpenedScene):
                 background = scene.subject.background
             scene = scene.showing(show)
         return picture_of(scene, view, background, eye_distance, output, settings, drawing, context)
+
+    def show(self, height: int = 480) -> "ShownScene":
+        """The scene live in a notebook: the page for browsers in a frame, with slider, stops and
+        camera, without a server or an extension; a picture of it stays where frames are not shown.
+
+        height: of the frame, pixels.  The notebook grows by the page's size, for the demo 1.1 MB.
+        Raises UsageError, BadFile for what a page cannot show.
+
+            ss.load("workshop.shift").show()
+        """
+        from shapeshift.api.show import show_scene
+
+        return show_scene(self, height)
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook displays for a scene; None, and it is text: a page cannot show it."""
+        from shapeshift.app.errors import UsageError
+        from shapeshift.runtime_models.model import BadFile
+
+        try:
+            return self.show()._repr_html_()
+        except (BadFile, UsageError):
+            return None
 
     def frames(
         self,

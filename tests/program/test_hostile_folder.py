@@ -118,6 +118,7 @@ HEAVY = [
      "--sweep", "2"),
     ("view", "a.ply", "--screenshot", "heavy/window.png", "--frames", "1"),
     ("vr", "--help"),  # without a runtime it only says so; tests/xr has one
+    ("serve", "--help"),  # it ends by Ctrl-C alone; tests/web starts it
     ("poses", "--help"),  # tests/decomposition/poses finds some
     ("segment", "--help"),  # tests/app/decomposition cuts some
     (),

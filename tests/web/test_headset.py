@@ -305,7 +305,7 @@ def test_fewer_pixels_are_drawn_and_said(inside):
 
 
 def test_sharpness_follows_the_time_that_frames_take(inside):
-    """A display of 72 Hz and a device that draws a whole picture in 30 ms, time going with pixels."""
+    """A display of 72 Hz, and devices whose time for a picture goes with its pixels."""
     page, _ = inside
     scales = page.run("""(() => {
       const sharpness = new shapeshift.headset.sharpness.constructor(1000 / 72), scales = [];

@@ -1,0 +1,50 @@
+"""`scene.show()`: the page in a sandboxed frame, as notebooks have it."""
+
+import base64
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+from support.web.page_scenes import paced_model
+
+import shapeshift as ss
+
+
+@pytest.fixture(scope="module")
+def shown():
+    return ss.Scene.from_model(paced_model(60)).show(height=300)
+
+
+def test_a_picture_stays_where_no_frame_is_shown(shown):
+    bundle = shown._repr_mimebundle_()
+    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(bundle["image/png"]))))
+    assert picture.shape == (360, 640, 3) and picture.std() > 5
+    assert bundle["text/html"].count("<iframe") == 1 and "height: 300px" in bundle["text/html"]
+
+
+def test_a_height_that_is_none_is_refused():
+    with pytest.raises(ss.UsageError, match=r"^height is 10, expected 100 to 4000 pixels\.$"):
+        ss.Scene.from_model(paced_model(20)).show(height=10)
+
+
+@pytest.mark.slow
+def test_the_frame_draws_and_answers_the_notebook(browser, shown, tmp_path):
+    """Sandboxed, so without an address; x and camera go both ways by postMessage."""
+    page = tmp_path / "notebook.html"
+    page.write_text(
+        "<!doctype html><html><script>const told = [];"
+        "addEventListener('message', (e) => told.push(e.data.shapeshift));</script>"
+        f"<body>{shown._repr_html_()}</body></html>"
+    )
+    browser.open(page, ready=False)
+    browser.until("globalThis.told?.length > 0 || (typeof told !== 'undefined' && told.length > 0)")
+    assert browser.run("told.at(-1)").startswith("#x=0&eye=")
+    link = "#x=0.4&eye=1,2,3&turn=1,0,0,0&at=0,0,0"
+    browser.run(f"frames[0].postMessage({{ shapeshift: '{link}' }}, '*'), 1")
+    browser.until(f"told.at(-1) === '{link}'")
+    browser.run("frames[0].postMessage({ shapeshift: '#x=7' }, '*'), 1")  # refused, as in a link
+    browser.run("frames[0].postMessage({ shapeshift: '#x=0.6' }, '*'), 1")
+    browser.until("told.at(-1).startsWith('#x=0.6&eye=1,2,3')")
+    assert not any(said.startswith("#x=7") for said in browser.run("told"))
+    assert not browser.complaints()

@@ -1,0 +1,101 @@
+"""`launch.py serve`: this computer alone, a token, a page that follows its file."""
+
+import http.client
+import threading
+
+import pytest
+from support.web.page_scenes import paced_model
+
+from shapeshift.app.errors import UsageError
+from shapeshift.app.page import serve
+from shapeshift.app.page.page_server import HERE, PageServer
+from shapeshift.runtime_models.package.write_package import EXACT, write_package
+
+
+def ask(server: PageServer, path: str, host: str = "", method: str = "GET"):
+    """(status, headers, body)"""
+    connection = http.client.HTTPConnection(HERE, server.port, timeout=10)
+    try:
+        connection.request(method, path, headers={"Host": host or f"{HERE}:{server.port}"})
+        answer = connection.getresponse()
+        return answer.status, dict(answer.getheaders()), answer.read()
+    finally:
+        connection.close()
+
+
+@pytest.fixture
+def server():
+    with PageServer(0) as server:
+        server.files = {"index.html": b"<html lang>", "scene.bin": b"12345"}
+        yield server
+
+
+def test_who_has_the_address_gets_the_page_and_nobody_else(server):
+    token = server.address.removeprefix(f"http://{HERE}:{server.port}")
+    status, headers, body = ask(server, token)
+    assert (status, body) == (200, b'<html data-served="1" lang>')
+    assert headers["Cache-Control"] == "no-store"
+    assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
+    assert ask(server, token + "scene.bin?a=b")[2] == b"12345"
+    assert ask(server, token, f"localhost:{server.port}")[0] == 200  # over adb reverse
+    outside = ("/", "/x/", token[:-2] + "/", token + "other", token + "../index.html", "/%2e%2e/x")
+    for path in outside:
+        assert ask(server, path)[0] == 404, path
+    for host in ("evil.example", f"evil.example:{server.port}", f"{HERE}:1", HERE):
+        assert ask(server, token, host)[0] == 404, host  # a name that leads here by DNS
+    assert ask(server, token, method="POST")[0] == 501
+    assert ask(server, token, method="HEAD")[2] == b""
+
+
+def test_new_files_are_another_version(server):
+    token = server.address.removeprefix(f"http://{HERE}:{server.port}")
+    assert ask(server, token + "version")[2] == b"1"
+    server.files = {"index.html": b"<html>"}
+    assert ask(server, token + "version")[2] == b"2"
+    assert ask(server, token)[2] == b'<html data-served="2">'
+    assert ask(server, token + "scene.bin")[0] == 404
+
+
+def test_a_port_that_is_taken_is_said_in_a_sentence(server):
+    with pytest.raises(UsageError, match=rf"^port {server.port} is in use .* --port 0 .*\.$"):
+        PageServer(server.port)
+    for port in (-1, 65536):
+        with pytest.raises(UsageError, match=f"--port is {port}"):
+            PageServer(port)
+
+
+def test_a_page_follows_its_file(tmp_path, monkeypatch, capsys):
+    """A change is shown once the file rests; a broken one leaves the page as it was."""
+    monkeypatch.setattr(serve, "LOOK_S", 0.05)
+    path = tmp_path / "a.shift"
+    write_package(paced_model(20), path, EXACT)
+    options = serve.Options(scene=path, port=0)
+    server = PageServer(0)
+    server.files = serve.page_files(options)
+    first = server.files
+    assert {"index.html", "scene.bin", "coarse.bin", "version"} == first.keys()
+
+    class Over(Exception):
+        pass
+
+    looks = iter(range(60))
+
+    def sleep(_):
+        look = next(looks)
+        if look == 2:
+            path.write_bytes(b"no package")
+        if look == 6:
+            assert server.files is first
+            path.unlink()
+            write_package(paced_model(30), path, EXACT)
+        if look == 10:
+            raise Over
+
+    monkeypatch.setattr(serve.time, "sleep", sleep)
+    with pytest.raises(Over):
+        serve.follow(options, server)
+    assert server.files["version"] == b"2" and server.files["scene.bin"] != first["scene.bin"]
+    said = capsys.readouterr().err
+    assert said.count("the page stays as it was") == 1 and said.count("shown anew") == 1
+    with server:  # so that it can be closed
+        assert threading.active_count() > 1
