@@ -30,7 +30,7 @@ from shapeshift.scene.selectors.selector import Lens
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "web"
-MOST_CODE = 45_000  # bytes of script, as a page has it: deflated, as text
+MOST_CODE = 48_000  # bytes of script, as a page has it: deflated, as text
 MOST_INFLATED = 105_000  # of that a fifth for headsets
 PLAIN = PageSettings("a <scene> & more", pictures=False)
 
