@@ -11,7 +11,7 @@ import numpy as np
 
 from shapeshift.training.styles.style_pictures import StylePictures, StyleView, Turns
 
-KEY_VIEWS = 8  # 16 are no better (docs/bench/styles.csv); a dome's first ones lie far apart
+KEY_VIEWS = 8  # 16 were no better (docs/styles.md); a dome's first ones lie far apart
 NEAR_ENOUGH = 0.012  # of a depth: a place that another view sees so near is the same place
 COVERED = 0.5  # of a pixel from which it has a depth
 WELL_COVERED = 0.9  # of a pixel whose colour is carried on
