@@ -51,7 +51,8 @@ def write_page(document: Document, path: Path, **settings) -> Path:
 def still(page) -> None:
     """From now on the page draws only what a test asks for."""
     page.run("""(page => { page.headset = { session: true };  // it may not have drawn at all yet
-      const { canvas } = page; canvas.width = canvas.clientWidth; canvas.height = canvas.clientHeight;
+      const { canvas } = page;
+      [canvas.width, canvas.height] = [canvas.clientWidth, canvas.clientHeight];
     })(shapeshift)""")
 
 
