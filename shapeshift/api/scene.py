@@ -159,7 +159,7 @@ class Scene(OpenedScene):
         """
         from shapeshift.api.show import show_scene
 
-        return show_scene(self, height)
+        return show_scene(self, self.render(camera="front"), height)
 
     def _repr_html_(self) -> str | None:
         """What a notebook displays for a scene; None, and it is text: a page cannot show it."""
@@ -167,7 +167,7 @@ class Scene(OpenedScene):
         from shapeshift.runtime_models.model import BadFile
 
         try:
-            return self.show()._repr_html_()
+            return self.show().html
         except (BadFile, UsageError):
             return None
 
