@@ -24,7 +24,8 @@ class Options(ReadingOptions):
     port: int = 8000
     """Of the address; 0: any that is free."""
     x: Annotated[str, CONTROL] = ""
-    """Where the slider stands at first: a stop by its name, or a number from 0 to 1."""
+    """Where the slider stands at first: a stop by its name, or a number from 0 to 1.  Default: the
+    first stop, and in a scene file what it says for each object."""
     for_: Literal["any", "quest"] = "any"
     """quest: in a headset that has no PC the page leaves out what costs little, from 46 dB on, and
     says so (docs/headset.md)."""

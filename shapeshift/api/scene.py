@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shapeshift.api.measure import Measured
     from shapeshift.api.picture import Picture
     from shapeshift.api.render import Context, Drawing
-    from shapeshift.api.show import ShownScene
+    from shapeshift.api.show import NotebookPage
     from shapeshift.api.style import Paint
     from shapeshift.api.write import Exported
     from shapeshift.app.training.style_options import Shape
@@ -148,7 +148,7 @@ class Scene(OpenedScene):
             scene = scene.showing(show)
         return picture_of(scene, view, background, eye_distance, output, settings, drawing, context)
 
-    def show(self, height: int = 480) -> "ShownScene":
+    def show(self, height: int = 480) -> "NotebookPage":
         """The scene live in a notebook: the page for browsers in a frame, with slider, stops and
         camera, without a server or an extension; a picture of it stays where frames are not shown.
 
@@ -159,7 +159,7 @@ class Scene(OpenedScene):
         """
         from shapeshift.api.show import show_scene
 
-        return show_scene(self, height)
+        return show_scene(self, self.render(camera="front"), height)
 
     def _repr_html_(self) -> str | None:
         """What a notebook displays for a scene; None, and it is text: a page cannot show it."""
@@ -167,7 +167,7 @@ class Scene(OpenedScene):
         from shapeshift.runtime_models.model import BadFile
 
         try:
-            return self.show()._repr_html_()
+            return self.show().html
         except (BadFile, UsageError):
             return None
 

@@ -11,11 +11,10 @@ from shapeshift.api.opened import OpenedScene
 from shapeshift.app.errors import UsageError
 
 HEIGHTS = (100, 4000)  # pixels
-PICTURE = (640, 360)  # of what is kept where nothing may run
 
 
 @dataclass(frozen=True)
-class ShownScene:
+class NotebookPage:
     """What `Scene.show` gives: a notebook displays it.
 
     page: the whole page, as `launch.py export --out page.html` writes it.  png: a picture of it,
@@ -26,13 +25,19 @@ class ShownScene:
     png: bytes
     height: int
 
-    def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, object]:
-        """Live where frames are shown, else the picture."""
-        png = base64.b64encode(self.png).decode()
-        return {"text/html": self._repr_html_(), "image/png": png, "text/plain": repr(self)}
-
     def _repr_html_(self) -> str:
-        """The page may run its script and nothing else: the notebook is out of its reach."""
+        return self.html
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    @property
+    def html(self) -> str:
+        """The frame: its page may run its script and nothing else, the notebook is out of its
+        reach.
+
+        Path("report.html").write_text(scene.show().html)
+        """
         png = base64.b64encode(self.png).decode()
         return (
             f'<iframe sandbox="allow-scripts" allow="xr-spatial-tracking; fullscreen" '
@@ -42,14 +47,13 @@ class ShownScene:
         )
 
     def __repr__(self) -> str:
-        return f"<ShownScene: {len(self.page):,} bytes; a notebook shows it>"
+        return f"<NotebookPage: {len(self.page):,} bytes; a notebook shows it>"
 
 
-def show_scene(scene: OpenedScene, height: int) -> ShownScene:
-    """The page of a scene at its x.  Raises BadFile, UsageError."""
+def show_scene(scene: OpenedScene, picture: np.ndarray, height: int) -> NotebookPage:
+    """The page of a scene at its x, and (H, W, 3) of it.  Raises BadFile, UsageError."""
     from PIL import Image
 
-    from shapeshift.api.scene import Scene
     from shapeshift.app.pace import with_pace
     from shapeshift.app.page.page_file import one_file
     from shapeshift.app.page.page_scene import PageSettings, page_scene
@@ -65,8 +69,6 @@ def show_scene(scene: OpenedScene, height: int) -> ShownScene:
     title = scene.path.stem if scene.path else "scene"
     whole = page_scene(document, PageSettings(title), lambda *_: None)
     page = one_file(title, whole, "the page of this notebook").decode()
-    assert isinstance(scene, Scene)
-    picture = scene.render(camera="front", size=PICTURE)
     kept = io.BytesIO()
     Image.fromarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)).save(kept, "PNG")
-    return ShownScene(page, kept.getvalue(), height)
+    return NotebookPage(page, kept.getvalue(), height)

@@ -214,6 +214,8 @@ NOT_PRIVATE = {
     "_fields",
     "_make",
     "_repr_png_",
+    "_repr_html_",
+    "_repr_mimebundle_",
     "_exit",
     "_state",
     "_getframe",

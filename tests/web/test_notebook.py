@@ -1,6 +1,5 @@
 """`scene.show()`: the page in a sandboxed frame, as notebooks have it."""
 
-import base64
 import io
 
 import numpy as np
@@ -17,10 +16,9 @@ def shown():
 
 
 def test_a_picture_stays_where_no_frame_is_shown(shown):
-    bundle = shown._repr_mimebundle_()
-    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(bundle["image/png"]))))
+    picture = np.asarray(Image.open(io.BytesIO(shown.png)))
     assert picture.shape == (360, 640, 3) and picture.std() > 5
-    assert bundle["text/html"].count("<iframe") == 1 and "height: 300px" in bundle["text/html"]
+    assert shown.html.count("<iframe") == 1 and "height: 300px" in shown.html
 
 
 def test_a_height_that_is_none_is_refused():
@@ -35,7 +33,7 @@ def test_the_frame_draws_and_answers_the_notebook(browser, shown, tmp_path):
     page.write_text(
         "<!doctype html><html><script>const told = [];"
         "addEventListener('message', (e) => told.push(e.data.shapeshift));</script>"
-        f"<body>{shown._repr_html_()}</body></html>"
+        f"<body>{shown.html}</body></html>"
     )
     browser.open(page, ready=False)
     browser.until("globalThis.told?.length > 0 || (typeof told !== 'undefined' && told.length > 0)")
