@@ -60,7 +60,7 @@ def test_files_that_are_no_such_network_are_refused(tmp_path):
     with pytest.raises(BadFile, match="is no file"):
         VggDistance(tmp_path / "absent.onnx")
     (tmp_path / "text.onnx").write_text("no network")
-    with pytest.raises(BadFile, match="onnxruntime can open"):
+    with pytest.raises(BadFile, match="is not a readable ONNX file"):
         VggDistance(tmp_path / "text.onnx")
     write_small(tmp_path / "other.onnx", outputs=("relu1_2", "fc7"))
     with pytest.raises(BadFile, match="the outputs relu1_2, relu2_2, relu3_3, relu4_3"):

@@ -69,6 +69,9 @@ def check_size(width: int, height: int) -> None:
 
 def opened(data: bytes, path: Path):
     """The session of a network's bytes on all cores.  Raises BadFile."""
+    from shapeshift.training.gradients.check_network import check_network
+
+    check_network(data, path)
     errors = load_onnxruntime().capi.onnxruntime_pybind11_state
     try:
         return open_session(data, threads=0)

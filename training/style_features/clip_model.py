@@ -13,6 +13,7 @@ import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.training.gradients.check_network import check_network
 from shapeshift.training.gradients.fold_constants import open_checked, quiet_options, run_checked
 from shapeshift.training.gradients.gradient_session import GradientSession, open_graph
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
@@ -148,7 +149,9 @@ def open_text(path: Path):
 
     Raises BadFile.
     """
-    session = open_checked(read_bytes(path), path.name, quiet_options())
+    data = read_bytes(path)
+    check_network(data, path)
+    session = open_checked(data, path.name, quiet_options())
     inputs = {node.name: node.shape for node in session.get_inputs()}
     outputs = [node.name for node in session.get_outputs()]
     if WORDS not in inputs or set(inputs) - {WORDS, MASK} or READ not in outputs:

@@ -77,7 +77,7 @@ def test_files_that_are_no_style_networks_are_refused(tmp_path):
     with pytest.raises(BadFile, match="is no file"):
         ImageNetwork(tmp_path / "none.onnx", {})
     (tmp_path / "a.onnx").write_bytes(b"nonsense")
-    with pytest.raises(BadFile, match="not a network that onnxruntime can open"):
+    with pytest.raises(BadFile, match="is not a readable ONNX file"):
         ImageNetwork(tmp_path / "a.onnx", {})
     with pytest.raises(BadFile, match="wanted is a picture of 3 channels in"):
         ImageNetwork(network(tmp_path / "b.onnx", (1, 4, "h", "w")), {})
