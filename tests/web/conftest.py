@@ -3,7 +3,8 @@
 import shutil
 
 import pytest
-from support.web.chromium import Chromium, find_chromium
+
+from tests.support.web.chromium import Chromium, find_chromium
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ import io
 import numpy as np
 import pytest
 from PIL import Image
-from support.web.page_scenes import paced_model
 
 import shapeshift as ss
+from tests.support.web.page_scenes import paced_model
 
 
 @pytest.fixture(scope="module")

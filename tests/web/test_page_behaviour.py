@@ -7,13 +7,13 @@ import time
 from pathlib import Path
 
 import pytest
-from support.web.page_pictures import write_page
-from support.web.page_scenes import paced_model, several_objects
 
 from shapeshift.app.document import Document, open_document
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.page.export_page import export_page
 from shapeshift.app.page.page_scene import PageSettings
+from tests.support.web.page_pictures import write_page
+from tests.support.web.page_scenes import paced_model, several_objects
 
 TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
 X = "shapeshift.renderer.objects[0].x"

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.web.page_scenes import paced_model, plain_splats
 
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
@@ -27,6 +26,7 @@ from shapeshift.app.page.page_scene import PageSettings, page_scene
 from shapeshift.runtime_models.model import BadFile, ScaffoldModel
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
+from tests.support.web.page_scenes import paced_model, plain_splats
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "web"

@@ -8,11 +8,11 @@ import zlib
 from pathlib import Path
 
 import pytest
-from support.web.page_scenes import paced_model, plain_splats
 
 from shapeshift.app.document import Document
 from shapeshift.app.page.page_file import page_text
 from shapeshift.app.page.page_scene import PageSettings, page_scene
+from tests.support.web.page_scenes import paced_model, plain_splats
 
 SCRIPT = Path(__file__).resolve().parents[1] / "support" / "web" / "broken_scene.mjs"
 PLAIN = PageSettings("t", pictures=False)

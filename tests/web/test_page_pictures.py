@@ -5,9 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.models import without_control, without_direction
-from support.web.page_pictures import at, decibels, drawn, expected, still, write_page
-from support.web.page_scenes import paced_model, plain_splats, several_objects
 
 from shapeshift.app.document import Document
 from shapeshift.runtime_models.model import SplatLayers
@@ -16,6 +13,9 @@ from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Painted, Sphere
+from tests.support.models import without_control, without_direction
+from tests.support.web.page_pictures import at, decibels, drawn, expected, still, write_page
+from tests.support.web.page_scenes import paced_model, plain_splats, several_objects
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZE = (320, 180)

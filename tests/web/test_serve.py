@@ -4,12 +4,12 @@ import http.client
 import threading
 
 import pytest
-from support.web.page_scenes import paced_model
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.page import serve
 from shapeshift.app.page.page_server import HERE, PageServer
 from shapeshift.runtime_models.package.write_package import EXACT, write_package
+from tests.support.web.page_scenes import paced_model
 
 
 def ask(server: PageServer, path: str, host: str = "", method: str = "GET"):

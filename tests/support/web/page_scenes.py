@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from support.models import make_random_model
 
 from shapeshift.app.document import Document
 from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, SplatLayers, Stop
@@ -11,6 +10,7 @@ from shapeshift.runtime_models.rotation import normalize
 from shapeshift.runtime_models.stop_weights import Pace, StopWeights
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
+from tests.support.models import make_random_model
 
 STOPS = (
     Stop("RGB", 0.0),

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.web import emulated_headset as headset
-from support.web.page_pictures import at, expected, write_page
-from support.web.page_scenes import several_objects
 
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
+from tests.support.web import emulated_headset as headset
+from tests.support.web.page_pictures import at, expected, write_page
+from tests.support.web.page_scenes import several_objects
 
 # 8-bit rounding alone leaves 58.9 dB of evenly spread values; 59.5 was measured before black.
 LEAST_DB = 54
