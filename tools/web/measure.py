@@ -15,11 +15,11 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
-from support.web.chromium import Chromium  # noqa: E402
-from support.web.page_pictures import at, decibels, still  # noqa: E402
+from tests.support.web.chromium import Chromium  # noqa: E402
+from tests.support.web.page_pictures import at, decibels, still  # noqa: E402
 
 from shapeshift.app.document import open_document  # noqa: E402
 from shapeshift.app.opening import ReadingOptions  # noqa: E402

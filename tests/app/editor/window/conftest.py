@@ -18,7 +18,9 @@ from tests.support.desktop.objects_stand import TOUCH, release, viewer_of
 
 
 @pytest.fixture(scope="module")
-def window(display):
+def window(display, request):
+    # Only these files come before all that opens EGL; see tests/conftest.py.
+    assert request.path.name.startswith("test_desktop"), "a window in this file ends the process"
     before = os.environ.get("DISPLAY")
     os.environ["DISPLAY"] = display
     with Window("test", (900, 640)) as window:
