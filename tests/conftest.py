@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -17,6 +18,12 @@ pytest.register_assert_rewrite("tests.support")  # asserts there tell their valu
 # Started as a background job whose parent ignores Ctrl-C, so would the programs that are tested.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Before its first input in a process Hypothesis looks through our whole source for numbers, which
+# on two busy cores takes longer than it finds right for an input.  Nor is an example timed.
+settings.register_profile("shapeshift", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("shapeshift")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

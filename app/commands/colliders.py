@@ -30,7 +30,8 @@ class Options:
     """The scene file to write, which names the colliders in the folder "colliders" beside it."""
     shape: Annotated[tuple[str, ...], Opt(metavar="[NAME=]SHAPE")] = ()
     """One convex piece in place of up to 16, which costs the physics less: hull, box, cylinder,
-    sphere or capsule. Boxes and cylinders stand upright. NAME=SHAPE for one object."""
+    sphere or capsule. Boxes and cylinders stand upright. NAME=SHAPE for one object.
+    Default: the pieces."""
     overwrite: bool = False
     """Replace files that are there."""
 

@@ -53,7 +53,8 @@ class Options(ReadingOptions):
     hold: float = 0.0
     """Seconds that the camera stands at the beginning and at the end."""
     streams: Annotated[tuple[str, ...], Opt(metavar="STREAM")] = ()
-    """depth, normal, coverage: a folder of 16-bit PNG of each beside the film."""
+    """depth, normal, coverage: a folder of 16-bit PNG of each beside the film.
+    Default: none."""
     stereo: float = 0.0
     """Distance of two eyes in metres; above 0 each frame holds both, side by side."""
     supersample: int = 1

@@ -2,9 +2,10 @@
 
     python tools/renderer/peers.py LEG_FOLDER --out docs/bench/peers.csv
 
-Ours draws with OpenCL tiles.  gausscam (PyPI) wants a Vulkan driver for the CPU: name one newer
-than Mesa 23 with VK_ICD_FILENAMES where the system's is older.  gaussian-splats-3d and spark (npm)
-want npm, Chromium and Xvfb.  A peer that cannot run is left out with its reason; the rest goes on.
+Ours draws with OpenCL tiles, and once more as a page in the browser.  gausscam (PyPI) wants a
+Vulkan driver for the CPU: name one newer than Mesa 23 with VK_ICD_FILENAMES where the system's is
+older.  gaussian-splats-3d, spark and playcanvas (npm) want npm, Chromium and Xvfb; the page wants
+the latter two.  A peer that cannot run is left out with its reason; the rest goes on.
 CPU ms are those of the whole process tree, so that other load does not count (Linux only).
 """
 
@@ -23,9 +24,12 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
-from peer_pages.browser import NPM_PACKAGES, CannotRun, browser_frames  # noqa: E402
+from peer_pages.browser import NAMES, NPM_PACKAGES, CannotRun, browser_frames  # noqa: E402
 
+from shapeshift.app.document import open_document  # noqa: E402
 from shapeshift.app.drawing import save_png  # noqa: E402
+from shapeshift.app.opening import ReadingOptions  # noqa: E402
+from shapeshift.app.page.page_scene import PageSettings, page_scene  # noqa: E402
 from shapeshift.renderer.reference.reference import reference_image  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
@@ -68,11 +72,17 @@ def make_views(model, count: int, size: tuple[int, int]) -> list[View]:
 
 
 def write_job(folder: Path, views: list[View]) -> None:
-    """What the peers read: poses in the file's axes, row by row."""
+    """What the peers read: poses in the file's axes, row by row; `views` in ours, for the page."""
     poses = [(FILE_FROM_WORLD @ v.world_from_eye.matrix()).ravel().tolist() for v in views]
+    seen = [
+        {"worldFromEye": {"position": v.world_from_eye.position.tolist(),
+                          "wxyz": v.world_from_eye.wxyz.tolist()},
+         "tangents": list(v.tangents)}
+        for v in views
+    ]  # fmt: skip
     job = {
         "size": views[0].size, "fov_y_degrees": FOV_Y_DEGREES, "near": 0.1, "far": 1000.0,
-        "warm_up": WARM_UP, "poses": poses,
+        "warm_up": WARM_UP, "poses": poses, "views": seen,
     }  # fmt: skip
     (folder / "job.json").write_text(json.dumps(job))
 
@@ -110,8 +120,8 @@ def gausscam(folder: Path) -> Frames:
 
 
 def in_browser(peer: str, folder: Path) -> Frames:
-    """A npm viewer in Chromium, its WebGL drawn by the system's software GL."""
-    if not (folder / "node_modules").exists():
+    """A npm viewer or our page in Chromium, its WebGL drawn by the system's software GL."""
+    if peer in NAMES and not (folder / "node_modules").exists():
         run(["npm", "install", "--no-audit", "--no-fund", "--prefix", folder, *NPM_PACKAGES])
     found = browser_frames(peer, folder)
     cpu = found.cpu_s * 1e3 / len(found.wall_ms)
@@ -135,6 +145,8 @@ PEERS = {
     "gausscam": lambda folder, model, views: gausscam(folder),
     "kellogg": lambda folder, model, views: in_browser("kellogg", folder),
     "spark": lambda folder, model, views: in_browser("spark", folder),
+    "playcanvas": lambda folder, model, views: in_browser("playcanvas", folder),
+    "page": lambda folder, model, views: in_browser("page", folder),
 }
 
 
@@ -152,6 +164,10 @@ def main() -> int:
     splats = PlainSplats(*bigger, layers.wxyz, layers.opacity, layers.sh)
     write_ply(splats, options.work / "splats.ply")
     model = read_model(options.work / "splats.ply")
+    document = open_document(options.work / "splats.ply", ReadingOptions())
+    settings = PageSettings("peers", pictures=False)
+    scene = page_scene(document, settings, lambda *_: None)
+    (options.work / "scene.bin").write_bytes(scene)
     rows = []
     for size in SIZES:
         rows += measure(options, model, size)

@@ -18,8 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
-from tests.support.web.chromium import Chromium  # noqa: E402
-from tests.support.web.page_pictures import at, decibels, still  # noqa: E402
 
 from shapeshift.app.document import open_document  # noqa: E402
 from shapeshift.app.opening import ReadingOptions  # noqa: E402
@@ -29,6 +27,8 @@ from shapeshift.app.page.page_scene import PageSettings  # noqa: E402
 from shapeshift.app.terminal import say  # noqa: E402
 from shapeshift.runtime_models.files.whole_file import write_whole  # noqa: E402
 from shapeshift.scene.cameras.framing import orbit_path  # noqa: E402
+from tests.support.web.chromium import Chromium  # noqa: E402
+from tests.support.web.page_pictures import at, decibels, still  # noqa: E402
 
 SIZE, CAMERAS, XS, RUNS = (640, 360), 3, (0.0, 0.25, 0.5, 0.75, 1.0), 10
 TARGETS = ("rgba16", "rgba16f", "rgba8")

@@ -16,8 +16,16 @@ from pathlib import Path
 import numpy as np
 
 PAGES = Path(__file__).resolve().parent
-NPM_PACKAGES = ("three@0.180.0", "@mkkellogg/gaussian-splats-3d@0.4.7", "@sparkjsdev/spark@2.2.0")
-NAMES = {"kellogg": "@mkkellogg/gaussian-splats-3d", "spark": "@sparkjsdev/spark"}
+WEB = PAGES.parents[2] / "web"
+NPM_PACKAGES = (
+    "three@0.180.0", "@mkkellogg/gaussian-splats-3d@0.4.7", "@sparkjsdev/spark@2.2.0",
+    "playcanvas@2.23.3",
+)  # fmt: skip
+NAMES = {
+    "kellogg": "@mkkellogg/gaussian-splats-3d",
+    "spark": "@sparkjsdev/spark",
+    "playcanvas": "playcanvas",
+}
 TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 PATIENCE_S = 600.0
 
@@ -68,6 +76,8 @@ class Listener(SimpleHTTPRequestHandler):
 
     def translate_path(self, path: str) -> str:
         plain = path.split("?", 1)[0].lstrip("/")
+        if plain.startswith("web/") and "/" not in plain[4:] and plain.endswith(".js"):
+            return str(WEB / plain[4:])
         ours = PAGES / plain
         return str(ours) if ours.is_file() else super().translate_path(path)
 
@@ -100,8 +110,12 @@ def browser_frames(peer: str, folder: Path) -> Answer:
     programs = [shutil.which(name) for name in ("chromium", "Xvfb")]
     if not all(programs):
         raise CannotRun("Chromium and Xvfb are needed (Debian: apt-get install chromium xvfb)")
-    package = json.loads((folder / "node_modules" / NAMES[peer] / "package.json").read_text())
-    answer = Answer(NAMES[peer], package["version"], [], 0.0, None)
+    name, version = "ours, the page", ""
+    if peer in NAMES:
+        name = NAMES[peer]
+        package = (folder / "node_modules" / name / "package.json").read_text()
+        version = json.loads(package)["version"]
+    answer = Answer(name, version, [], 0.0, None)
     done, browser = threading.Event(), []
     handler = type("Here", (Listener,), {"answer": answer, "done": done, "browser": browser})
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(handler, directory=str(folder)))

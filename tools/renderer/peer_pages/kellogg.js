@@ -1,5 +1,5 @@
 import * as GaussianSplats3D from "@mkkellogg/gaussian-splats-3d";
-import { camera, measure, renderer } from "/frames.js";
+import { camera, measureThree, renderer } from "/three_camera.js";
 
 const viewer = new GaussianSplats3D.Viewer({
   selfDrivenMode: false, renderer, camera, useBuiltInControls: false, gpuAcceleratedSort: false,
@@ -8,7 +8,7 @@ const viewer = new GaussianSplats3D.Viewer({
 });
 await viewer.addSplatScene("/splats.ply", { showLoadingUI: false, splatAlphaRemovalThreshold: 1 });
 
-await measure(async () => {
+await measureThree(async () => {
   viewer.update();  // matrices and uniforms; may begin a sort of its own
   if (viewer.sortPromise) await viewer.sortPromise;
   await viewer.runSplatSort(true, true);
