@@ -70,17 +70,18 @@ class Options(ReadingOptions):
     """Red, green and blue behind everything, 0 to 1 as displayed.  Default: what the scene was
     trained on, else black."""
     save_path: Path | None = None
-    """A NAME.film.json for the viewer and other films, with twelve cameras of the way."""
+    """A NAME.film.json for the viewer and other films, with twelve cameras of the way.
+    Default: none."""
     keep_frames: bool = False
     """Leave NAME.frames beside the video, for another one of the same frames."""
     overwrite: bool = False
     """Replace the film, and frames of another one, in --out."""
     only: Annotated[str, Opt(expert=True, metavar="FRAMES")] = ""
     """Draw these frames alone, such as 57 or 0:150 (150 not with it): the parts of a film may be
-    drawn by several machines into one folder."""
+    drawn by several machines into one folder.  Default: all."""
     fov_y: Annotated[float, EXPERT] = 0.0
-    """Degrees from top to bottom, for a camera file that says nothing about the lens; 0: not
-    known."""
+    """Degrees from top to bottom, for a camera file that says nothing about the lens.  Default:
+    0, not known."""
     depth_unit: Annotated[float | None, EXPERT] = None
     """Metres a step of the depth stream.  Default: the finest power of ten that reaches the far
     side."""
