@@ -14,8 +14,8 @@
 #define UNROLL _Pragma("unroll")
 #define ROWS 4  // anchors of a work-item of the forward kernel
 
-// A layer of ROWS anchors: to two vectors of outputs of each, what `takes` inputs add to them.  With
-// two there are enough sums on their way to hide how long each multiply-add takes.
+// A layer of ROWS anchors: what `takes` inputs add to two vectors of outputs of each.  With two
+// there are enough sums on their way to hide how long each multiply-add takes.
 inline void add_pair(float8 *low, float8 *high, const float *in, int stride, int takes,
                      __global const float *weights, int gives) {
   for (int i = 0; i < takes; i++) {
