@@ -48,5 +48,5 @@ def test_bytes_follow_the_layout():
     wide = step_memory(HeadLayout(splats=5, hidden=64))
     assert wide.anchor - five.anchor == 4 * 5 * 32
     total = five.total(1000, 5000, 120, photos=3)
-    by_hand = (five.rest, 1000 * five.anchor, 5000 * 52, 120 * (five.pixel + 3 * five.photo_pixel))
+    by_hand = (five.rest, 1000 * five.anchor, 5000 * 56, 120 * (five.pixel + 3 * five.photo_pixel))
     assert total == np.sum(by_hand)
