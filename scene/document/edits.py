@@ -11,6 +11,7 @@ import numpy as np
 
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
+from shapeshift.scene.appearance import Appearance, Sky
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, FirstView, SceneFile, SceneItem
 from shapeshift.scene.pose import Pose
 
@@ -126,6 +127,18 @@ def look_from(file: SceneFile, eye: np.ndarray, target: np.ndarray, fov_y: float
     if math.dist(view.eye[::2], view.target[::2]) < 1e-6:
         raise ValueError("The first look goes not straight up or down; tilt it a little.")
     return file if view == file.view else replace(file, view=view)
+
+
+def set_appearance(file: SceneFile, name: str, appearance: Appearance) -> SceneFile:
+    """With another appearance of an object, or of all objects where the name is ""."""
+    if name:
+        return change(file, name, appearance=appearance)
+    return file if appearance == file.appearance else replace(file, appearance=appearance)
+
+
+def set_sky(file: SceneFile, sky: Sky | None) -> SceneFile:
+    """With another sky, or with none of its own."""
+    return file if sky == file.sky else replace(file, sky=sky)
 
 
 def item_named(file: SceneFile, name: str) -> SceneItem:

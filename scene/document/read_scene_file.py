@@ -9,6 +9,7 @@ from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import MODES
 from shapeshift.runtime_models.splats.plain_splats import AXES
 from shapeshift.scene.control import EASES
+from shapeshift.scene.document.appearance_rows import read_appearance, read_sky
 from shapeshift.scene.document.scene_file import (
     BACKGROUND,
     ENDING,
@@ -45,6 +46,7 @@ def read_scene_file(path: str | Path) -> SceneFile:
     background = file.optional_object(BACKGROUND)
     rows = file.rows("objects", MOST_OBJECTS, "object")
     view = read_view(file.optional_object("view"))
+    appearance, sky = read_appearance(file), read_sky(file)
     file.refuse_unknown_keys()
     items = tuple(read_item(row, path.name) for row in rows)
     names = [item.name for item in items]
@@ -59,6 +61,8 @@ def read_scene_file(path: str | Path) -> SceneFile:
         floor_y=floor_y,
         gravity_m_s2=gravity,
         view=view,
+        appearance=appearance,
+        sky=sky,
     )
 
 
@@ -106,6 +110,7 @@ def read_looks(row: Fields) -> dict:
         **read_pose(row.optional_object("pose")),
         "x": row.control("x", 0.0),
         "visible": row.flag("visible", True),
+        "appearance": read_appearance(row),
         "selectors": read_selectors(row),
         "collider": collider,
         "friction": row.number("friction", 0.6, "0 to 10", 0, FRICTION),

@@ -15,6 +15,7 @@ from shapeshift.runtime_models.parts import find_label, part_of
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
+from shapeshift.scene.appearance import NEUTRAL, Appearance, Sky
 from shapeshift.scene.cameras.framing import frame_points, framing_view, scene_points, view_from
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
@@ -44,6 +45,7 @@ class SceneItem:
     placed: bool = True  # False: a part without a pose, until `read_models` puts it in its place
     x: Control = 0.0
     visible: bool = True
+    appearance: Appearance = NEUTRAL
     selectors: tuple[Selector, ...] = ()
     collider: str | None = None  # a mesh's path, HULLS, or None: nothing can touch it
     static: bool = False  # touched, but never moved
@@ -78,6 +80,8 @@ class SceneFile:
     floor_y: float | None = None  # metres; None: no floor
     gravity_m_s2: float = 9.81
     view: FirstView | None = None
+    appearance: Appearance = NEUTRAL  # of all objects, after their own
+    sky: Sky | None = None  # behind everything; None: what the model or the program has there
 
     @property
     def all_items(self) -> tuple[SceneItem, ...]:
@@ -136,7 +140,10 @@ def read_models(
 
 def scene_of(file: SceneFile, models: Mapping[str, Model]) -> Scene:
     """What is drawn: every object with its model, where and how the file says.  Raises BadFile."""
-    return Scene(tuple(object_of(item, models[item.name], i) for i, item in labelled(file)))
+    appearance = file.appearance
+    return Scene(
+        tuple(object_of(item, models[item.name], i, appearance) for i, item in labelled(file))
+    )
 
 
 def labelled(file: SceneFile) -> list[tuple[int, SceneItem]]:
@@ -145,7 +152,21 @@ def labelled(file: SceneFile) -> list[tuple[int, SceneItem]]:
     return list(enumerate(file.all_items, first))
 
 
-def object_of(item: SceneItem, model: Model, label: int) -> SceneObject:
+def with_own_appearance(file: SceneFile) -> SceneFile:
+    """The same scene, in which each object has what the file says of all of them, too."""
+    if file.appearance == NEUTRAL:
+        return file
+    of_all, background = file.appearance, file.background
+    if background is not None:
+        background = replace(background, appearance=background.appearance.under(of_all))
+    items = tuple(replace(i, appearance=i.appearance.under(of_all)) for i in file.items)
+    return replace(file, items=items, background=background, appearance=NEUTRAL)
+
+
+def object_of(
+    item: SceneItem, model: Model, label: int, of_scene: Appearance = NEUTRAL
+) -> SceneObject:
+    """The object as it is drawn; of_scene: what the file says of all.  Raises BadFile."""
     count = len(model.means if isinstance(model, SplatLayers) else model.anchors)
     for selector in item.selectors:
         if isinstance(selector, Painted) and len(selector.weight) != count:
@@ -155,8 +176,9 @@ def object_of(item: SceneItem, model: Model, label: int) -> SceneObject:
             )
     try:
         return SceneObject(
-            item.name, model, item.pose, item.x, label, item.visible, selectors=item.selectors
-        )
+            item.name, model, item.pose, item.x, label, item.visible, item.selectors,
+            appearance=item.appearance.under(of_scene),
+        )  # fmt: skip
     except ValueError as error:  # a blend of stops that its model has not
         raise BadFile(f"object '{item.name}': 'x': {error}") from None
 

@@ -23,6 +23,7 @@ from shapeshift.app.editor.state.track import Grip
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
 from shapeshift.runtime_models.model import Finding, Model, Stop
 from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.appearance import Background
 from shapeshift.scene.cameras.framing import (
     default_background,
     fit_points,
@@ -105,9 +106,7 @@ class EditorState:
         self.edited = edited or edited_from_scene(scene, self.sources)
         self.bodies.forget()
         self.shown_scene.forget()
-        if scene.objects:
-            background = default_background(scene.objects[0].model, DARK)
-            self.settings = replace(self.settings, background=background)
+        self.show_background()
         self.filed = tuple(obj.model for obj in scene.objects)
         self.palette = AS_FILED
         self.sweeps = [Sweep.over(obj.model.blend) for obj in scene.objects]
@@ -117,6 +116,14 @@ class EditorState:
         self.regions.clear()
         self.regions.radius = self.radius
         self.keep_regions()
+
+    def show_background(self) -> None:
+        """Puts the file's sky behind everything, else what the first model was trained before."""
+        background: Background | None = self.edited.file.sky
+        if background is None and self.scene.objects:
+            background = default_background(self.scene.objects[0].model, DARK)
+        if background is not None:
+            self.settings = replace(self.settings, background=background)
 
     def keep_regions(self) -> None:
         """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
