@@ -13,7 +13,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.runtime_models.model import Model, Stop
 from shapeshift.runtime_models.stop_weights import Control, Pace, StopWeights, parse_control
-from shapeshift.scene.appearance import Background, Color
+from shapeshift.scene.appearance import Background, Color, behind_of
 from shapeshift.scene.cameras.framing import (
     default_background,
     default_view,
@@ -82,7 +82,7 @@ class Document:
     def background_or(self, otherwise: Color) -> Background:
         """The same, else `otherwise`: display sRGB."""
         if self.file:
-            return self.file.sky or otherwise
+            return behind_of(self.file.sky) or otherwise
         return default_background(self.scene.objects[0].model, otherwise)
 
     @property

@@ -129,6 +129,13 @@ def check_color(color: Sequence[float], name: str) -> None:
         raise ValueError(f"{name} is {color}, expected three values of display sRGB from 0 to 1.")
 
 
+def behind_of(sky: Sky | None) -> Background | None:
+    """What is drawn behind everything: of a sky of one colour that colour."""
+    if sky is not None and sky.zenith == sky.horizon == sky.ground:
+        return sky.horizon
+    return sky
+
+
 def plain_color(background: Background) -> Color:
     """One colour for it, where there can be no other: that at the horizon."""
     return background.horizon if isinstance(background, Sky) else background

@@ -17,6 +17,7 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
 from shapeshift.scene.appearance import NEUTRAL, Appearance, Sky
 from shapeshift.scene.cameras.framing import frame_points, framing_view, scene_points, view_from
+from shapeshift.scene.cameras.orthographic import orthographic
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import UPRIGHT, Painted, Selector
@@ -70,6 +71,16 @@ class FirstView:
     eye: tuple[float, float, float]  # metres
     target: tuple[float, float, float]
     fov_y: float = 0.8  # radians
+    orthographic: bool = False  # parallel rays, to the scale that the target is seen in
+    near_m: float = 0.0  # metres from the eye before which nothing is drawn; 0: as usual
+
+
+@dataclass(frozen=True)
+class NamedView:
+    """A view of the scene to come back to."""
+
+    name: str
+    view: FirstView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +91,7 @@ class SceneFile:
     floor_y: float | None = None  # metres; None: no floor
     gravity_m_s2: float = 9.81
     view: FirstView | None = None
+    views: tuple[NamedView, ...] = ()  # to go to by their names
     appearance: Appearance = NEUTRAL  # of all objects, after their own
     sky: Sky | None = None  # behind everything; None: what the model or the program has there
 
@@ -217,5 +229,13 @@ def first_view(file: SceneFile, scene: Scene, size: tuple[int, int]) -> View:
     if file.view is None:
         return framing_view(points, opacity, size)
     _, radius = frame_points(points, opacity)
-    eye, target = np.array(file.view.eye), np.array(file.view.target)
-    return view_from(eye, target, radius, size, file.view.fov_y)
+    return stated_view(file.view, radius, size)
+
+
+def stated_view(stated: FirstView, radius: float, size: tuple[int, int]) -> View:
+    """The view that a file states, of a scene that reaches so many metres."""
+    eye, target = np.array(stated.eye), np.array(stated.target)
+    view = view_from(eye, target, radius, size, stated.fov_y)
+    if stated.orthographic:
+        return orthographic(view, float(np.linalg.norm(target - eye)), radius, stated.near_m)
+    return replace(view, near=stated.near_m) if stated.near_m > 0 else view

@@ -9,6 +9,7 @@ import numpy as np
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.film.timeline import FilmKeys
+from shapeshift.app.editor.state.scene_objects import with_background
 from shapeshift.app.editor.state.track import next_stop, stepped
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_weights import Control
@@ -77,7 +78,7 @@ def turn_to(state: EditorState, history: History) -> None:
         if state.world is not world:  # a new one stands at its start
             state.follow_world()
         if history.file.sky != before.file.sky:
-            state.show_background()
+            state.settings = with_background(state.settings, history.file.sky, state.scene)
     except BadFile:
         state.edited.history = before
         state.bodies.follow(state.edited)

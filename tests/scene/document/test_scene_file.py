@@ -13,10 +13,12 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.appearance import Appearance, Sky
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import (
     FORMAT,
     FirstView,
+    NamedView,
     SceneFile,
     SceneItem,
     is_scene_file,
@@ -65,6 +67,7 @@ FULL = SceneItem(
     wxyz=(HALF, 0.0, -HALF, 0.0),
     x=StopWeights((("bone", THIRD), ("skin", 2 * THIRD))),
     visible=False,
+    appearance=Appearance(-1.5, 1.25, (1.0, 0.5, THIRD), 0.5),
     selectors=SELECTORS,
     collider="hulls",
     mass_kg=0.3,
@@ -85,7 +88,13 @@ def full(folder: Path) -> SceneFile:
         background=TABLE,
         floor_y=-0.25,
         gravity_m_s2=1.62,
-        view=FirstView((0, 1, 2), (0, 0.5, 0), 1.1),
+        view=FirstView((0, 1, 2), (0, 0.5, 0), 1.1, True, 0.25),
+        views=(
+            NamedView("from the dôor", FirstView((0, 1, 2), (0, 0.5, 0), 1.1)),
+            NamedView("plan", FirstView((0, 9, 0.1), (0, 0, 0), 0.5, True)),
+        ),
+        appearance=Appearance(opacity=0.25),
+        sky=Sky((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9)),
     )
 
 
@@ -112,6 +121,13 @@ def test_every_field_alone_comes_back(tmp_path, field):
         assert item.states == ()
     file = SceneFile(folder=tmp_path, items=(item,))
     write_scene_file(file, tmp_path / "a.scene.json")
+    assert read_scene_file(tmp_path / "a.scene.json") == file
+
+
+def test_a_sky_of_one_colour_is_a_list(tmp_path):
+    file = SceneFile(folder=tmp_path, sky=Sky((0.1, 0.2, 0.3), (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)))
+    write_scene_file(file, tmp_path / "a.scene.json")
+    assert json.loads((tmp_path / "a.scene.json").read_text())["sky"] == [0.1, 0.2, 0.3]
     assert read_scene_file(tmp_path / "a.scene.json") == file
 
 
@@ -158,6 +174,21 @@ WRONG = [
     (("view", "eye"), [0, 1], "3 finite numbers"),
     (("view", "target"), [0, 5, 2], "straight above"),
     (("view", "fov_y"), 4, "radians"),
+    (("view", "orthographic"), 1, "true or false"),
+    (("view", "near_m"), -0.1, "0 or more"),
+    (("views",), {}, "a list"),
+    (("views", 0, "name"), "plan", "of its own"),
+    (("views", 0, "name"), "n" * 101, "100 letters"),
+    (("views", 1, "eye"), 5, "3 finite"),
+    (("sky",), "blue", "braces"),
+    (("sky",), [0, 0, 1.1], "0 to 1"),
+    (("sky", "horizon"), [0, 0], "3 finite numbers"),
+    (("sky", "ground"), [0, 0, -0.1], "0 to 1"),
+    (("appearance", "opacity"), 1.1, "0 to 1"),
+    (("objects", 0, "appearance", "exposure"), 11, "-10 to 10"),
+    (("objects", 0, "appearance", "gamma"), 0, "0.1 to 10"),
+    (("objects", 0, "appearance", "tint"), [1, 1, 5], "0 to 4"),
+    (("objects", 0, "appearance", "tint"), "red", "3 finite numbers"),
     (("background",), "table.ply", "braces"),
     (("background", "model"), "", "path"),
     (("objects",), {}, "a list"),
@@ -240,7 +271,8 @@ def test_a_wrong_value_is_one_sentence_with_object_and_key(path, way, value, sai
     assert said in sentence
 
 
-INNER = [(), ("view",), ("background",), ("objects", 0), ("objects", 0, "pose"),
+INNER = [(), ("view",), ("background",), ("sky",), ("views", 0), ("appearance",),
+         ("objects", 0, "appearance"), ("objects", 0), ("objects", 0, "pose"),
          ("objects", 0, "two_axes"), ("objects", 0, "states", 0), ("objects", 0, "reactions", 0),
          ("objects", 0, "reactions", 3, "region"),
          *[("objects", 0, "selectors", i) for i in range(6)]]  # fmt: skip

@@ -57,13 +57,12 @@ def draw_appearance(state: EditorState, ui_scale: float) -> None:
 def draw_background(state: EditorState, ui_scale: float) -> None:
     """One colour, or those of a sky."""
     now = state.settings.background
-    is_sky = isinstance(now, Sky) and not now.zenith == now.horizon == now.ground
-    changed, on = imgui.checkbox("sky", is_sky)
+    changed, on = imgui.checkbox("sky", isinstance(now, Sky))
     tip("Behind the scene a sky over a ground instead of one colour.", ui_scale)
     if changed:
         _put_sky(state, CLEAR_SKY if on else _plain(plain_color(now)), "")
         return
-    if isinstance(now, Sky) and is_sky:
+    if isinstance(now, Sky):
         for part, what in PARTS.items():
             imgui.same_line()
             color = _picked(part, getattr(now, part), what, ui_scale)
@@ -71,9 +70,8 @@ def draw_background(state: EditorState, ui_scale: float) -> None:
                 _put_sky(state, replace(now, **{part: color}), part)
         return
     imgui.same_line()
-    before = plain_color(now)
-    color = _picked("background", before, "The colour behind the scene.", ui_scale)
-    if color != before:
+    color = _picked("background", now, "The colour behind the scene.", ui_scale)
+    if color != now:
         _put_sky(state, _plain(color), "background")
 
 

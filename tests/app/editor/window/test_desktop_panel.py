@@ -119,7 +119,7 @@ def test_every_key_that_does_something_stands_on_the_sheet(viewer):
     names = {
         "SPACE": "Space", "TAB": "Tab", "ESCAPE": "Esc", "DELETE": "Delete", "COMMA": ",",
         "PERIOD": ".", "LEFT": "left", "RIGHT": "right", "KP_1": "numpad 1", "KP_3": "3",
-        "KP_7": "7", "1": "1", "9": "9",
+        "KP_7": "7", "KP_5": "numpad 5", "1": "1", "9": "9",
     }  # fmt: skip
     parts = (hands, objects, shell, split, touch, two_pictures)
     source = "".join(inspect.getsource(part) for part in parts)
