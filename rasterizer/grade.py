@@ -10,7 +10,7 @@ from shapeshift.rasterizer.device import Device
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-KERNEL = Path(__file__).parent / "kernels" / "grade.cl"
+KERNEL = Path(__file__).parent / "kernels" / "colors" / "grade.cl"
 GROUP = 64
 
 

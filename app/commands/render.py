@@ -100,14 +100,15 @@ class Options(ReadingOptions):
 def run(options: Options) -> int:
     from shapeshift.app.charts.budget import read_budget
     from shapeshift.app.charts.budget_chart import ChartSubject, settings_for
-    from shapeshift.app.commands.look import appearing, read_look
     from shapeshift.app.commands.outputs import draw_outputs
     from shapeshift.app.decomposition.show_views import show_objects
     from shapeshift.app.drawing import (
         MOST_VALUES,
+        appearing,
         make_folder,
         open_renderer,
         parse_size,
+        read_look,
         split_controls,
     )
     from shapeshift.app.errors import UsageError

@@ -105,7 +105,7 @@ class Decoder:
 
     def _grade(self, i: int, grade: Appearance) -> None:
         """The appearance of colours that were just decoded."""
-        arena, program = self._arena, self._gpu.compute("grade.comp")
+        arena, program = self._arena, self._gpu.compute("colors/grade.comp")
         rows = arena.starts[i + 1] - arena.starts[i]
         if rows:
             bind(color=arena.color)

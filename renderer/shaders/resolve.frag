@@ -1,5 +1,5 @@
-// resolve: a premultiplied image over a background, of one colour or a sky.  A palette makes its colours of the image's
-// luminance, or adds those of its heat. The palette colours what is there
+// resolve: a premultiplied image over a background, of one colour or a sky.  A palette makes its
+// colours of the image's luminance, or adds those of its heat. The palette colours what is there
 // and not the background: values are divided by alpha first.
 // Reads:   image, palette, heat, at the pixel's place.
 // Writes:  shown, opaque.

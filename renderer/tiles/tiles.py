@@ -21,7 +21,7 @@ from shapeshift.rasterizer.project import CULL_REASONS, Camera, Projected
 from shapeshift.rasterizer.project_arena import Limits, SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
 from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
-from shapeshift.rasterizer.resolve import Behind, resolve
+from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.rasterizer.surface import rasterize_depth, surface_arena
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
@@ -31,12 +31,13 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
+from shapeshift.renderer.tiles.behind import behind
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import Model, SplatLayers, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
-from shapeshift.scene.appearance import Appearance, Background, Sky, up_of_eye
+from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View
 
 if TYPE_CHECKING:
@@ -319,13 +320,7 @@ class TilesDrawing(Drawing):
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None
     ) -> np.ndarray:
         heat = self._heat_images[i] if self.draws_heat else None
-        behind: Behind | tuple[float, float, float]
-        if isinstance(background, Sky):
-            colors = (background.zenith, background.horizon, background.ground)
-            behind = Behind(colors, up_of_eye(view), view.tangents)
-        else:
-            behind = background
-        return resolve(self.device, self._images[i], behind, palette, heat)
+        return resolve(self.device, self._images[i], behind(background, view), palette, heat)
 
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         read = self.device.download

@@ -9,8 +9,8 @@ from shapeshift.rasterizer.reference import blend
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.rotation import normalize, rotation_matrices
-from shapeshift.scene.cameras.orthographic import PARALLAX_PX, orthographic
 from shapeshift.scene.metrics import psnr
+from shapeshift.scene.orthographic import PARALLAX_PX, orthographic
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer.renderers import EITHER_ON_GL

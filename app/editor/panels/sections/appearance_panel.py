@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, subsection, tip
 from shapeshift.app.editor.state.arrange import edit
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.runtime_models.shapes import three
@@ -33,7 +33,11 @@ PARTS = {
 def draw_appearance(state: EditorState, ui_scale: float) -> None:
     """Of the chosen object where there is one, else of the whole scene."""
     item = edits.find(state.edited.file, state.chosen)
-    name, now = ("", state.edited.file.appearance) if item is None else (item.name, item.appearance)
+    of_scene = state.edited.file.appearance
+    lit = (of_scene if item is None else item.appearance) != NEUTRAL
+    if not subsection("Exposure, gamma, tint, opacity", lit):
+        return
+    name, now = ("", of_scene) if item is None else (item.name, item.appearance)
     imgui.push_id(f"appearance {name}")
     imgui.text_disabled(f"of {name}" if name else "of the whole scene")
     for field, (least, most, text, logarithmic, what) in SLIDERS.items():
@@ -63,8 +67,9 @@ def draw_background(state: EditorState, ui_scale: float) -> None:
         _put_sky(state, CLEAR_SKY if on else _plain(plain_color(now)), "")
         return
     if isinstance(now, Sky):
-        for part, what in PARTS.items():
-            imgui.same_line()
+        for number, (part, what) in enumerate(PARTS.items()):
+            if number:
+                imgui.same_line()
             color = _picked(part, getattr(now, part), what, ui_scale)
             if color != getattr(now, part):
                 _put_sky(state, replace(now, **{part: color}), part)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, subsection, tip
 from shapeshift.app.editor.state.arrange import edit
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -22,6 +22,8 @@ LOGARITHMIC = imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.logarithmic
 def draw_lens(viewpoint: Viewpoint, ui_scale: float) -> None:
     """Field of view, near plane, speed of flight, parallel rays, what drags turn about."""
     camera = viewpoint.camera
+    if not subsection("Lens and speed", camera.parallel or camera.near_m > 0):
+        return
     imgui.push_item_width(-1)
     degrees = math.degrees(camera.fov_y)
     moved, degrees = labelled_slider("fov", degrees, *FOV_DEGREES, "field of view: %.0f\u00b0")

@@ -5,7 +5,12 @@ import pytest
 
 from shapeshift.app.editor.panels import panel
 from shapeshift.app.editor.panels.keys_sheet import GROUPS, spread
-from shapeshift.app.editor.panels.sections import performance_panel, quality_panel
+from shapeshift.app.editor.panels.sections import (
+    appearance_panel,
+    named_views_panel,
+    performance_panel,
+    quality_panel,
+)
 from shapeshift.app.editor.panels.widgets.path_box import can_browse
 from shapeshift.app.paths import TOUCH
 from tests.support.desktop.desktop_stand import run_frames, until_opened
@@ -24,7 +29,7 @@ def unfolded(monkeypatch):
         return True
 
     monkeypatch.setattr(panel, "section", opened)
-    for module in (performance_panel, quality_panel):
+    for module in (appearance_panel, named_views_panel, performance_panel, quality_panel):
         monkeypatch.setattr(module, "subsection", opened)
     return seen
 

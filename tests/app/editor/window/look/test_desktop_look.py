@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.panels import panel
+from shapeshift.app.editor.panels.sections import appearance_panel, named_views_panel
 from shapeshift.app.editor.state.camera.gamepad import REST, PadState
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source
 from shapeshift.scene.appearance import NEUTRAL, Sky
@@ -30,6 +31,8 @@ def widgets(viewer, monkeypatch, request):
     """With one section alone, so that nothing has to be scrolled to."""
     wanted = "Look" if "look" in request.node.name or "chosen" in request.node.name else "Camera"
     monkeypatch.setattr(panel, "section", lambda name, *_, **__: name == wanted)
+    for module in (appearance_panel, named_views_panel):
+        monkeypatch.setattr(module, "subsection", lambda *_: True)
     found = Widgets(monkeypatch)
     run_frames(viewer, 3)
     return found
