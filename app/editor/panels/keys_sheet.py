@@ -22,6 +22,7 @@ MOUSE_AND_CAMERA = (
     ("F", "frame everything"),
     ("Shift+F", "the first view"),
     ("numpad 1, 3, 7", "front, right, top; Ctrl: the other side"),
+    ("numpad 5", "parallel rays, or those of an eye"),
     ("N, P", "next, previous camera of a file"),
     ("K", "keep this view in a file"),
 )

@@ -1,6 +1,7 @@
 """The viewer: a window loop that draws only when something has changed."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ from shapeshift.app.editor.state.quality_controller import FLOOR_DB, TARGET_MS, 
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.adding import Adding
+from shapeshift.app.editor.window.devices.gamepads import attach_pads
 from shapeshift.app.editor.window.files import Files, OpenActions
 from shapeshift.app.editor.window.film.films import attach_films
 from shapeshift.app.editor.window.gizmo import Gizmo
@@ -90,6 +92,7 @@ class Viewer:
             wanted=(options.target_ms or options.floor_db) is not None,
         )
         self.hands = InputActions(window, state, self.viewpoint, self.hooks, self.open_soon)
+        self.pads = attach_pads(window, state, self.viewpoint, self.hands, self.hooks)
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
@@ -157,7 +160,7 @@ class Viewer:
     def _attach_cameras_and_export(self, folders: WorkFolders) -> None:
         hooks, state, viewpoint = self.hooks, self.state, self.viewpoint
         hooks.sections.append(
-            Section("Camera", lambda scale: draw_cameras(viewpoint, scale), open_first=True)
+            Section("Camera", lambda scale: draw_cameras(state, viewpoint, scale), open_first=True)
         )
         hooks.status.append(lambda: viewpoint.steps.text)
         hooks.marks.append(lambda scale: draw_edges(state, viewpoint, scale))
@@ -193,7 +196,8 @@ class Viewer:
         last = time.perf_counter()
         while not (self.window.closing and self.may_close()):
             busy = self.busy()
-            redraw = self.window.wait(0.0 if busy else POLL_S if self.polling else SLEEP_S)
+            watched = self.polling or self.pads.connected
+            redraw = self.window.wait(0.0 if busy else POLL_S if watched else SLEEP_S)
             now = time.perf_counter()
             if self.window.minimised:
                 last = now
@@ -202,7 +206,7 @@ class Viewer:
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
             due = self.state.messages.ended(now) or self.idle_work_due(now)
-            if busy or redraw or self.polling or due:
+            if busy or redraw or self.polling or due or self.pads.poll():
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
@@ -283,11 +287,14 @@ class Viewer:
         """What the screen should show now."""
         state, view, moving = self.state, self.viewpoint.view(), self._moving
         settings = self.dial.while_moving(state.settings) if moving else state.settings
-        return FrameRequest(state.shown(view), view, settings, moving or self.dial.measuring)
+        if self.viewpoint.parallel:  # whose eye is far away from all
+            settings = replace(settings, max_distance=np.inf)
+        shown = state.shown(self.viewpoint.eye_view())
+        return FrameRequest(shown, view, settings, moving or self.dial.measuring)
 
     @property
     def _moving(self) -> bool:
-        by_hand = self.viewpoint.moving or self.hands.push.any
+        by_hand = self.viewpoint.moving or self.hands.push.any or self.pads.input.moving
         state = self.state
         living = state.world is not None and state.running and not state.world.resting
         return by_hand or state.playing or living
