@@ -45,7 +45,7 @@ class Files:
         self._options, self._actions = options, actions
         self._opener = Opener()
         self.recent: RecentFiles | None = None  # None: nothing is kept
-        self._pictures: RecentPictures | None = None  # of those
+        self.pictures: RecentPictures | None = None  # of those
         self.picture_due: Path | None = None  # what is open, of which a picture is wanted
         self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
         # Reads one scene, in the thread that opens; replaced where progress can be shown.
@@ -71,7 +71,7 @@ class Files:
         self._at_demo = not (options.scenes or options.touch)
         if options.screenshot is None:
             self.recent = RecentFiles.read(config_folder())
-            self._pictures = RecentPictures(config_folder())
+            self.pictures = RecentPictures(config_folder())
             if options.scenes:
                 self.remember_all(found)
         self.use_cameras(found, look_through=options.camera is not None)
@@ -96,12 +96,12 @@ class Files:
     def keep_picture(self, picture: np.ndarray) -> None:
         """Of what is open, (H, W, 3) display sRGB, for the list of recent files."""
         path, self.picture_due = self.picture_due, None
-        if path is None or self._pictures is None or self.recent is None:
+        if path is None or self.pictures is None or self.recent is None:
             return
         try:
-            self._pictures.keep(path, picture, self.recent.paths)
+            self.pictures.keep(path, picture, self.recent.paths)
         except OSError:
-            self._pictures = None  # the list does without
+            self.pictures = None  # the list does without
 
     def handle_event(self, event: Event) -> bool:
         """True for Ctrl+O and Ctrl+N, and while the box is open for keys and what is dropped."""
@@ -164,7 +164,7 @@ class Files:
         here = self._state.edited.path
         others = {TOUCH_LABEL: TOUCH} if self._at_demo else {DEMO_LABEL: DEMO}
         others = others if self._at_demo or here == TOUCH else {}
-        clicked, chosen = self._row.draw(self.recent, self._pictures, others, ui_scale)
+        clicked, chosen = self._row.draw(self.recent, self.pictures, others, ui_scale)
         if clicked == OPEN:
             self.ask()
         elif clicked == NEW:

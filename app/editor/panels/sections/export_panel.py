@@ -50,6 +50,7 @@ def draw_export(exporting: Exporting, state: EditorState, ui_scale: float) -> No
         imgui.progress_bar(exporting.progress[1], imgui.ImVec2(-1, 0), exporting.progress[0])
     elif imgui.button(item_label("Export"), imgui.ImVec2(-1, 0)):
         exporting.start()
+    tip("A new file in Shapeshift/exports of your documents; none is written over.", ui_scale)
 
 
 def _draw_colors(exporting: Exporting, state: EditorState, ui_scale: float) -> None:

@@ -114,7 +114,7 @@ def test_new_is_empty_and_asks_first(viewer, hands, monkeypatch):
 
 def test_recent_files_have_pictures(viewer, tmp_path):
     files, config = viewer.files, tmp_path / "config"
-    files.recent, files._pictures = RecentFiles.read(config), RecentPictures(config)
+    files.recent, files.pictures = RecentFiles.read(config), RecentPictures(config)
     files.remember(tmp_path / "ball.ply")
     assert files.picture_due is not None
     for _ in range(10):
