@@ -56,7 +56,8 @@ def in_unit(unit: str, low: float, high: float, wanted: str) -> tuple[str, float
     if unit not in KELVIN or wanted not in KELVIN:
         return unit, low, high
     (size, zero), (other, other_zero) = KELVIN[unit], KELVIN[wanted]
-    return wanted, *(((v * size + zero) - other_zero) / other for v in (low, high))
+    low, high = ((value * size + zero - other_zero) / other for value in (low, high))
+    return wanted, low, high
 
 
 def has_scale(scene: Scene) -> bool:

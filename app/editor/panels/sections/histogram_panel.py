@@ -92,8 +92,8 @@ def _bars(
         ink = theme.color(theme.ACCENT, 0.25)
         edge = corner.x + (last + 1) * each
         draw.add_rect_filled(Vec(corner.x + first * each, corner.y), Vec(edge, low), ink)
-    for counts, ink in ((histogram.counts, theme.MUTED), (chosen, theme.ACCENT)):
-        color = theme.color(ink)
+    for counts, rgb in ((histogram.counts, theme.MUTED), (chosen, theme.ACCENT)):
+        color = theme.color(rgb)
         for place in np.flatnonzero(counts):
             tall = max(float(np.sqrt(counts[place])) / most * (size.y - 4), 1.0)
             x = corner.x + float(place) * each

@@ -60,8 +60,9 @@ class Measuring:
     def then(self, obj: SceneObject, eye: np.ndarray, use: Use) -> None:
         """Does something with the numbers: at once, or when they are there."""
         self.want(obj, eye)
-        if self._work is None and self.of(obj) is not None:
-            use(self.of(obj))
+        known = self.of(obj)
+        if self._work is None and known is not None:
+            use(known)
         else:
             self._waiting.append(use)
 
