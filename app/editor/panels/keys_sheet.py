@@ -11,6 +11,7 @@ from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 Row = tuple[str, str]  # key, what it does
+KEY_NAMES = ("Delete",)  # as printed there, though the word is also on a button
 COLUMN = 330.0  # logical pixels, of a group
 KEY_PART = 0.38  # of a column, where what a key does begins
 MOUSE_AND_CAMERA = (
@@ -113,7 +114,7 @@ def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> Non
     for key, what in rows:
         imgui.set_cursor_pos_x(left)
         y = imgui.get_cursor_pos_y()
-        imgui.text_unformatted(said(key))
+        imgui.text_unformatted(key if key in KEY_NAMES else said(key))
         imgui.set_cursor_pos(Vec(left + KEY_PART * width, y))
         imgui.push_text_wrap_pos(left + width - gap)
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))

@@ -38,6 +38,7 @@ TABLES = {
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
 KEY_TABLES = ("objects", "parts", "split", "touch")  # of app/editor/window: KEYS of the sheet
+PARTS_TOOL = "shapeshift.app.editor.state.parts.parts_tool"
 LETTERS = re.compile(r"[A-Za-z]{2}")
 KEY = r"(Ctrl|Shift|Alt|Esc|Enter|Space|Tab|[A-Z]|F\d+|\d|[+\u2013])"
 NAMES = re.compile(rf"[.\w]*\.\w+|{KEY}([ ,+]+{KEY})*|%\.\d+f .?m")  # the same in all tables
@@ -106,13 +107,14 @@ def texts_of(value: object, what: str = ALL) -> Iterator[str]:
 def overlay_texts() -> set[str]:
     """All of them, in English."""
     found: set[str] = set()
-    for folder in ("panels", "window"):
+    for folder in ("panels", "state", "window"):
         for path in (EDITOR / folder).rglob("*.py"):
             found |= said_in(path)
     for name, tables in TABLES.items():
         module = importlib.import_module(f"{PANELS}.{name}")
         for table, what in tables.items():
             found |= set(texts_of(getattr(module, table), what))
+    found |= set(texts_of(importlib.import_module(PARTS_TOOL).HOW))
     for name in KEY_TABLES:
         module = importlib.import_module(f"shapeshift.app.editor.window.{name}")
         found |= set(texts_of(module.KEYS))

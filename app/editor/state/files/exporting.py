@@ -113,10 +113,10 @@ class Exporting:
 
 
 def write_splats(
-    parts: list[Part], look: ExportLook, path: Path, told: Callable[[str, float], None]
+    parts: list[Part], look: ExportLook, path: Path, progress: Callable[[str, float], None]
 ) -> int:
     """Plain splats at one x; how many."""
-    return len(export(parts, look, path, told).means)
+    return len(export(parts, look, path, progress).means)
 
 
 def write_whole_model(model: AnchorModel, path: Path) -> int:

@@ -22,7 +22,7 @@ OFF = 1.5  # times the usual distance to the last neighbour: as far off a haze h
 
 
 def floaters(numbers: AnchorNumbers) -> np.ndarray:
-    """(A,) bool: anchors that look like floaters.  About 4 s of a core for a million."""
+    """(A,) bool: anchors that look like floaters.  About 10 s of a core for a million."""
     count = len(numbers.places)
     usable = np.isfinite(numbers.places).all(axis=1) & np.isfinite(numbers.size)
     out = np.zeros(count, bool)

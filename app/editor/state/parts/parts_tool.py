@@ -11,6 +11,7 @@ from shapeshift.app.editor.state.parts.finder import Finder, Found, Query, in_bo
 from shapeshift.app.editor.state.parts.lit import Lighting, same, same_look
 from shapeshift.app.editor.state.parts.selecting import ALL, Selecting
 from shapeshift.app.editor.state.regions import brushed
+from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.pose import View
@@ -53,7 +54,7 @@ class PartsTool:
         self.clear()
         self.crop = None
         if self.on:
-            self.state.say(HOW, 8.0)
+            self.state.say(said(HOW), 8.0)
         self.light()
 
     def forget(self) -> None:
@@ -76,8 +77,10 @@ class PartsTool:
         if status := self.finder.status or self.selecting.measuring.status:
             return f"{status} \u2026"
         if self.count:
-            return f"{number(self.count)} anchors of {self.name} chosen"
-        return "parts: point at a thing"
+            return said(
+                "{count} anchors of {name} chosen", count=number(self.count), name=self.name
+            )
+        return said("parts: point at a thing")
 
     @property
     def count(self) -> int:

@@ -1,14 +1,13 @@
 """Small pictures of files that were opened before, kept beside the list of them."""
 
 import hashlib
-import io
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.app.drawing import save_png
 
 FOLDER = "recent"
 SIZE = (96, 54)  # pixels: what such a picture is held to
@@ -35,9 +34,7 @@ class RecentPictures:
         """
         small = shrunk(picture)
         self._folder.mkdir(parents=True, exist_ok=True)
-        out = io.BytesIO()
-        Image.fromarray(small).save(out, "png")
-        write_whole(self._file(path), out.getvalue())
+        save_png(small / 255, self._file(path))
         self._read[path] = small
         kept = {self._file(each) for each in (path, *listed)}
         for old in self._folder.glob("*.png"):

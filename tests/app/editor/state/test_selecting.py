@@ -152,8 +152,8 @@ def test_floaters_of_few_or_broken_anchors():
     assert not floaters(numbers_of(places=np.zeros((50, 3)))).any()  # all at one place
 
 
-def test_a_million_are_chosen_within_a_frame():
-    """Processor time, ratios aside: two frames of 60 a second on a core of this kind."""
+def test_a_million_are_chosen_before_a_hand_feels_it():
+    """Processor time, once when the button is let go."""
     count = 1_000_000
     places = np.random.default_rng(3).normal(size=(count, 3)).astype(np.float32)
     obj = SceneObject("a", ball(4))
@@ -164,7 +164,7 @@ def test_a_million_are_chosen_within_a_frame():
     inside = in_lasso(view, places, obj, outline)
     spent = time.thread_time() - start
     assert 0.1 < inside.mean() < 0.9
-    assert spent < 0.5  # 0.04 s here: a window that waited longer would be felt
+    assert spent < 0.5  # 0.06 s on one core of 2026: a window that waited longer would be felt
 
 
 def test_plain_splats_have_their_own_numbers():
