@@ -30,6 +30,7 @@ from shapeshift.app.editor.state.frame_stats import FrameStatsView
 from shapeshift.app.editor.state.layout import Box, Layout, lay_out
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.quality_controller import FLOOR_DB, TARGET_MS, QualityController
+from shapeshift.app.editor.state.user.kept_palette import KeptPalette
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.adding import Adding
@@ -71,9 +72,7 @@ class Viewer:
     ) -> None:  # fmt: skip
         self.window, self.renderer, self.state, self.options = window, renderer, state, options
         state.overlay = options.panel
-        self.settings = (
-            settings or ProgramSettings()
-        )  # of the program; state.settings are the picture's
+        self.settings = settings or ProgramSettings()  # state.settings are the picture's
         folders = WorkFolders.of(options.pictures)
         self._pictures = folders.pictures
         self.hooks = Hooks()
@@ -101,6 +100,9 @@ class Viewer:
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
         self._add_sections()
+        kept = KeptPalette(state, self.settings, self.shell.keep)
+        self.hooks.opened.append(kept.use)
+        self.hooks.each_frame.append(kept.poll)
         self._framed = Framed(self.viewpoint.free_size, self.viewpoint.refit)
         self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
         self.hooks.opened.append(self._framed.forget)
@@ -118,7 +120,7 @@ class Viewer:
             lambda then: self.objects.saving.before_losing(then),
             self.show_scene,
         )
-        files = Files(state, self.viewpoint, self.options, actions)
+        files = Files(state, self.viewpoint, self.options, actions, self.window.textures)
         hooks.each_frame += [files.poll, lambda: poll_bodies(state)]
         hooks.top.append(files.draw_row)
         hooks.marks.append(files.draw_box)
@@ -164,7 +166,7 @@ class Viewer:
         )
         hooks.status.append(lambda: viewpoint.steps.text)
         hooks.marks.append(lambda scale: draw_edges(state, viewpoint, scale))
-        exporting = Exporting(state, viewpoint, folders.exports)
+        exporting = self.exporting = Exporting(state, viewpoint, folders.exports)
         hooks.sections.append(Section("Export", lambda scale: draw_export(exporting, state, scale)))
         hooks.each_frame.append(exporting.poll)
         hooks.opened.append(exporting.forget)
@@ -182,6 +184,7 @@ class Viewer:
                 lambda scale: draw_regions(state, scale),
                 open_first=bool(state.regions.items),
             ),
+            Section("Settings", self.shell.draw_settings),
             Section(
                 "Performance",
                 lambda scale: draw_performance(state, dial, readings, scale),
@@ -248,6 +251,8 @@ class Viewer:
             self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
             self.dial.seen((now - start) * 1e3, self._moving)
         self.readings.idle = not fresh
+        if self.files.picture_due is not None and not fresh:
+            self.files.keep_picture(self.renderer.resolved(0))
 
     def handle_event(self, event: Event) -> None:
         """Lets one input event act."""
@@ -340,7 +345,7 @@ class Viewer:
             right = state.split.right(state.scene) if state.split.on else state.scene
             for scene, box in ((state.scene, layout.left_legend), (right, layout.legend)):
                 if box is not None:
-                    draw_scale_bar(scene, box, scale)
+                    draw_scale_bar(scene, box, scale, wanted=self.settings.temperature)
             debug, stats = state.settings.debug, self.readings.stats
             draw_legend(debug_legend(debug, stats), layout.free, scale)
             hooks, words = self.hooks, [words() for words in self.hooks.status]
