@@ -98,27 +98,24 @@ class Renderer:
             for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
                 if not obj.seen:
                     continue
-                if decoded.key != (key := control_key(obj)):
-                    self._decode_at(i, obj, decoded)
-                    decoded.key = key
+                key, first = control_key(obj), decoded.key is None
+                # Another key with the same x: a selector changed where nothing is.
+                if decoded.key != key and (first or not same_controls(control_of(obj), decoded.x)):
+                    x = control_of(obj)
+                    # What follows the eye is decoded with the colours, once the eye is known.
+                    follows = first or shape_follows_control(obj.model)
+                    if follows and not follows_eye(obj.model):
+                        self.drawing.decode_geometry(i, x)
+                        self._geometry_runs += 1
+                        decoded.opacity = 1.0
+                    decoded.x = x
+                    decoded.version += 1
+                decoded.key = key
                 self._scale_opacity(i, obj, decoded)
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.seen else HIDDEN for o in scene.objects]
         self.drawing.set_poses(poses)
         self._scene = scene
-
-    def _decode_at(self, i: int, obj: SceneObject, decoded: DecodedObject) -> None:
-        """The geometry of an object at another control value."""
-        x, first = control_of(obj), decoded.key is None
-        if not first and same_controls(x, decoded.x):
-            return  # a selector changed where nothing is
-        # What follows the eye is decoded with the colours, once the eye is known.
-        if (first or shape_follows_control(obj.model)) and not follows_eye(obj.model):
-            self.drawing.decode_geometry(i, x)
-            self._geometry_runs += 1
-            decoded.opacity = 1.0
-        decoded.x = x
-        decoded.version += 1
 
     def _choose_false_colors(self, scene: Scene) -> None:
         """Which colours are decoded, and where palettes belong, as the controls ask for."""

@@ -65,15 +65,17 @@ class Appearance:
         """
         stops = self.exposure + other.exposure * self.gamma
         tint = np.array(self.tint) * np.array(other.tint) ** self.gamma
-        values = {
-            "exposure": stops, "gamma": self.gamma * other.gamma,
-            "tint": three(float(t) for t in np.clip(tint, *LIMITS["tint"])),
-            "opacity": self.opacity * other.opacity,
-        }  # fmt: skip
-        for name in ("exposure", "gamma"):
-            least, most = LIMITS[name]
-            values[name] = min(max(values[name], least), most)
-        return Appearance(**values)
+        return Appearance(
+            exposure=_held("exposure", stops),
+            gamma=_held("gamma", self.gamma * other.gamma),
+            tint=three(float(t) for t in np.clip(tint, *LIMITS["tint"])),
+            opacity=self.opacity * other.opacity,
+        )
+
+
+def _held(name: str, value: float) -> float:
+    least, most = LIMITS[name]
+    return min(max(value, least), most)
 
 
 NEUTRAL = Appearance()

@@ -163,7 +163,7 @@ def read_view(row: Fields | None) -> FirstView | None:
 
 def read_views(file: Fields) -> tuple[NamedView, ...]:
     """The list under "views": as "view", each with a name of its own."""
-    found = []
+    found: list[NamedView] = []
     for row in file.rows("views", MOST_ROWS, "view"):
         name = row.line("name")
         if len(name) > LONGEST_NAME or name in [view.name for view in found]:

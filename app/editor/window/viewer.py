@@ -85,11 +85,9 @@ class Viewer:
         )
         self.viewpoint = Viewpoint(state, lambda: window.size, self._free_wanted, self._pictures)
         self.shown = Shown(renderer, self.readings)
-        self.dial = QualityController(
-            options.target_ms or TARGET_MS,
-            options.floor_db or FLOOR_DB,
-            wanted=(options.target_ms or options.floor_db) is not None,
-        )
+        target_ms, floor_db = options.target_ms or TARGET_MS, options.floor_db or FLOOR_DB
+        wanted = (options.target_ms or options.floor_db) is not None
+        self.dial = QualityController(target_ms, floor_db, wanted=wanted)
         self.hands = InputActions(window, state, self.viewpoint, self.hooks, self.open_soon)
         self.pads = attach_pads(window, state, self.viewpoint, self.hands, self.hooks)
         self.files = self._attach_files()
@@ -108,17 +106,14 @@ class Viewer:
         self.hooks.opened.append(self._framed.forget)
         self.hooks.event_handlers.insert(0, self.shell.handle_event)
         self._title = ""  # what the window's title says
-        self.frames = 0  # drawn since the window opened
-        self._overlay_ms = 0.0
+        self.frames, self._overlay_ms = 0, 0.0  # drawn since the window opened, of the last one
 
     # ---- the parts
 
     def _attach_files(self) -> Files:
         hooks, state = self.hooks, self.state
         actions = OpenActions(
-            self.shown.upload,
-            lambda then: self.objects.saving.before_losing(then),
-            self.show_scene,
+            self.shown.upload, lambda then: self.objects.saving.before_losing(then), self.show_scene
         )
         files = Files(state, self.viewpoint, self.options, actions, self.window.textures)
         hooks.each_frame += [files.poll, lambda: poll_bodies(state)]

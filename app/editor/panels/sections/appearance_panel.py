@@ -46,7 +46,7 @@ def draw_appearance(state: EditorState, ui_scale: float) -> None:
         moved, value = labelled_slider(field, getattr(now, field), least, most, text, flags)
         tip(what, ui_scale)
         if moved:
-            _appear(state, name, replace(now, **{field: round(value, 4)}), field)
+            _appear(state, name, _with(now, field, round(value, 4)), field)
     tint = _picked("tint", now.tint, "A colour that is multiplied with all of its own.", ui_scale)
     if tint != now.tint:
         _appear(state, name, replace(now, tint=tint), "tint")
@@ -89,6 +89,13 @@ def _picked(name: str, color: Color, what: str, ui_scale: float) -> Color:
 
 def _plain(color: Color) -> Sky:
     return Sky(color, color, color)
+
+
+def _with(now: Appearance, field: str, value: float) -> Appearance:
+    """With another exposure, gamma or opacity."""
+    if field == "exposure":
+        return replace(now, exposure=value)
+    return replace(now, gamma=value) if field == "gamma" else replace(now, opacity=value)
 
 
 def _appear(state: EditorState, name: str, appearance: Appearance, field: str) -> None:

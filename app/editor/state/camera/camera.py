@@ -198,7 +198,7 @@ class EditorCamera:
         right, _, forward = self._axes()
         up = np.array([0, self._upright, 0])
         wanted = push.right * right + push.up * up + push.forward * forward
-        length = np.linalg.norm(wanted)
+        length = float(np.linalg.norm(wanted))
         if length > 0:
             wanted *= SPEED_RADII * self.speed * self.radius * push.pace / max(length, 1.0)
         # v' = (wanted - v) / BRAKE_S solved exactly: two short steps equal a long one
