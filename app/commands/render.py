@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from shapeshift.app.document import Document
     from shapeshift.scene.pose import View
 
+MOST_DETAIL = 10.0
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 
@@ -48,6 +49,11 @@ class Options(ReadingOptions):
     sky: Annotated[tuple[str, str, str] | None, Opt(metavar="COLOR")] = None
     """Instead of one colour those at the zenith, the horizon and the ground, each as RRGGBB.
     Default: the scene file's sky, if it has one."""
+    shape_of: Annotated[str, CONTROL] = ""
+    """Heat over shape: the edges and the small changes of brightness of the picture at this x are
+    laid under the picture at --x, as inspection cameras do.  Default: none."""
+    detail: float = 1.0
+    """How much of them, 0 to 10."""
     exposure: float = 0.0
     """Stops of light by which the whole scene is brighter; measured heat keeps its colours."""
     gamma: float = 1.0
@@ -149,7 +155,7 @@ def run(options: Options) -> int:
         scenes = [with_selectors(shown[c], selectors[i]) for c, i in rows]
         work = (renderer, scenes, [views[i] for _, i in rows], paths, options.stereo)
         if options.output == "picture":
-            draw_all(*work)
+            draw_all(*work, *shapes_of(options, document, scenes, rows, selectors))
         else:
             draw_outputs(*work, options.output, unit_of(options, document, views))
     say(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}")
@@ -217,6 +223,10 @@ def check_output(options: Options) -> None:
     """Numbers have neither a legend drawn over them nor a budget."""
     from shapeshift.app.errors import UsageError
 
+    if not 0 <= options.detail <= MOST_DETAIL:
+        raise UsageError(f"--detail is {options.detail}, expected 0 to {MOST_DETAIL:g}.")
+    if options.shape_of and (options.debug or options.output != "picture"):
+        raise UsageError("--shape-of goes without --debug and --output; leave one of them out.")
     for name in ("debug", "target_ms"):
         if options.output != "picture" and getattr(options, name) != getattr(Options, name):
             option = f"--{name.replace('_', '-')}"
@@ -314,20 +324,44 @@ def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
         raise UsageError(f"--select {error}") from None
 
 
-def draw_all(renderer, scenes: list, views: list, paths: list[Path], eye_distance: float) -> None:
-    """A picture of each scene from its view; two eyes side by side where they are apart."""
+def shapes_of(options: Options, document: "Document", scenes: list, rows, selectors) -> tuple:
+    """The scenes whose shape is laid under each picture, and how much of it; () for none."""
+    if not options.shape_of:
+        return ()
+    from shapeshift.app.decomposition.show_views import show_objects
+    from shapeshift.app.drawing import appearing, read_look
+
+    shape = show_objects(document_at(document, options.shape_of).scene, options.show)
+    shape = appearing(shape, read_look(options)[0])
+    return [with_selectors(shape, selectors[i]) for _, i in rows], options.detail
+
+
+def draw_all(
+    renderer, scenes: list, views: list, paths: list[Path], eye_distance: float,
+    shapes: Sequence = (), detail: float = 1.0,
+) -> None:  # fmt: skip
+    """A picture of each scene from its view; two eyes side by side where they are apart.
+
+    shapes: other scenes, one a picture, whose fine structure is laid under it.
+    """
     import numpy as np
 
     from shapeshift.app.commands.picture_legend import with_legend
     from shapeshift.app.drawing import save_png
     from shapeshift.app.progress import tracked
+    from shapeshift.renderer.colors.heat_over_shape import heat_over_shape
     from shapeshift.renderer.debug.debug import debug_legend
     from shapeshift.scene.stereo import stereo_pair
 
-    work = list(zip(scenes, views, paths, strict=True))
-    for scene, view, path in tracked(work, "drawing"):
-        renderer.update(scene)
+    work = list(zip(scenes, views, paths, shapes or [None] * len(scenes), strict=True))
+    for scene, view, path, shape in tracked(work, "drawing"):
         eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
-        stats = renderer.draw(eyes)
-        picture = np.concatenate([renderer.resolved(i) for i in range(len(eyes))], axis=1)
+        parts = []
+        for each in (scene, shape) if shape is not None else (scene,):
+            renderer.update(each)
+            stats = renderer.draw(eyes)
+            parts.append([renderer.resolved(i).copy() for i in range(len(eyes))])
+        if shape is not None:
+            parts[0] = [heat_over_shape(*both, detail) for both in zip(*parts, strict=True)]
+        picture = np.concatenate(parts[0], axis=1)
         save_png(with_legend(picture, debug_legend(renderer.settings.debug, stats)), path)
