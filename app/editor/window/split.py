@@ -12,13 +12,14 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.layout import Box
 from shapeshift.app.editor.state.split_state import SplitState, name_of
 from shapeshift.app.editor.window.hooks import Hooks
-from shapeshift.app.editor.window.shown import FrameRequest
+from shapeshift.app.editor.window.shown import Beside, FrameRequest
 from shapeshift.app.editor.window.two_pictures import TwoPictures
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.heat_over_shape import HeatOverShape
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.scene import Scene
 
 KEYS = (
     ("C", "another stop right of a line, on and off"),
@@ -39,15 +40,27 @@ class Split(TwoPictures):
         self._over: HeatOverShape | None = None  # made when it is first wanted
         self._screen: moderngl.Framebuffer | None = None  # A's picture, where both are mixed
 
+    def other(self, scene: Scene) -> Scene:
+        """The scene at the other x; the same object until one of the two changes."""
+        made_of, x, other = self._made
+        if made_of is not scene or x != self._state.x:
+            other = self._state.right(scene)
+            self._made = (scene, self._state.x, other)
+        return other
+
+    def beside(self, scene: Scene, width: int, refuse: Callable[[BadFile], None]) -> Beside | None:
+        """What is right of the line, where it parts the window at all."""
+        if self._state.over or not 0 < self.cut < width:
+            return None
+        return Beside(self.other(scene), self.cut, self._renderer, refuse)
+
     def draw(self, request: FrameRequest) -> None:
         """Lays the other x over the right part of the window, or mixes both.  Raises BadFile for no
         room.
         """
-        scene, x, other = self._made
-        if scene is not request.scene or x != self._state.x:
-            other = self._state.right(request.scene)
-            self._made = (request.scene, self._state.x, other)
-        request = replace(request, scene=other)
+        if request.beside is not None:
+            return  # both are there
+        request = replace(request, scene=self.other(request.scene))
         if not self._state.over:
             self.draw_right(request)
             return
@@ -97,6 +110,10 @@ def splitting(
             made.append((Split(window, renderer, split_state, free()), renderer))
         return made[0][0]
 
+    def refuse(error: BadFile) -> None:
+        split_state.on = False
+        state.messages.fail(f"There is no room for a second picture: {error}")
+
     def draw(request: FrameRequest) -> None:
         split_state.on = split_state.on and any(
             obj.name == split_state.name for obj in request.scene.objects
@@ -106,8 +123,7 @@ def splitting(
         try:
             split().draw(request)
         except BadFile as error:
-            split_state.on = False
-            state.messages.fail(f"There is no room for a second picture: {error}")
+            refuse(error)
 
     def draw_marks(ui_scale: float) -> None:
         if split_state.on and made and not split_state.over:
@@ -123,7 +139,13 @@ def splitting(
         has_line = split_state.on and bool(made) and not split_state.over
         return has_line and split().handle_line_event(event)
 
+    def beside(scene: Scene, width: int) -> Beside | None:
+        shown = split_state.on and any(obj.name == split_state.name for obj in scene.objects)
+        plain = not state.settings.debug
+        return split().beside(scene, width, refuse) if shown and plain else None
+
     hooks.over.append(draw)
+    hooks.beside = beside
     hooks.marks.append(draw_marks)
     hooks.event_handlers.append(handle_event)
     hooks.keys["Two stops at once"] = list(KEYS)
@@ -133,6 +155,7 @@ def splitting(
     finally:
         split_state.on = split_state.possible = False
         hooks.over.remove(draw)
+        hooks.beside = lambda scene, width: None
         hooks.marks.remove(draw_marks)
         hooks.event_handlers.remove(handle_event)
         for picture, renderer in made:
