@@ -362,6 +362,7 @@ def draw_all(
             stats = renderer.draw(eyes)
             parts.append([renderer.resolved(i).copy() for i in range(len(eyes))])
         if shape is not None:
-            parts[0] = [heat_over_shape(*both, detail) for both in zip(*parts, strict=True)]
+            pairs = zip(*parts, strict=True)
+            parts[0] = [heat_over_shape(heat, photo, detail) for heat, photo in pairs]
         picture = np.concatenate(parts[0], axis=1)
         save_png(with_legend(picture, debug_legend(renderer.settings.debug, stats)), path)

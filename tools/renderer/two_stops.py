@@ -79,13 +79,14 @@ def costs_of(model) -> dict[str, float]:
 
 def main() -> None:
     demo = read_model(ROOT / "assets" / "workshop.shift")
-    print("# python3 tools/renderer/two_stops.py > docs/bench/two_stops.csv")
-    print("scene,way,cpu_ms,times_a_frame")
+    say = sys.stdout.write
+    say("# python3 tools/renderer/two_stops.py > docs/bench/two_stops.csv\n")
+    say("scene,way,cpu_ms,times_a_frame\n")
     names = ("offset", "scale", "rotation", "opacity")
     for scene, model in (("shape differs", demo), ("colours alone", without_control(demo, *names))):
         costs = costs_of(model)
         for way, ms in costs.items():
-            print(f"{scene},{way},{ms:.1f},{ms / costs['one frame']:.2f}")
+            say(f"{scene},{way},{ms:.1f},{ms / costs['one frame']:.2f}\n")
 
 
 if __name__ == "__main__":
