@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Debug, Opt
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
@@ -66,10 +66,10 @@ class Options(ReadingOptions):
     """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
     context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
     """Where the OpenGL context without a window comes from."""
-    debug: Annotated[Literal["", "culls", "birdseye", "overdraw", "depth", "object"], EXPERT] = ""
+    debug: Annotated[Debug, EXPERT] = ""
     """Draw with a legend, instead of the picture, which splats are left out and why, the same from
-    above, how many splats lie over each pixel, how far away they are, or which object they belong
-    to.  Default: the picture."""
+    above, how many splats lie over each pixel, how far away they are, which object they belong to,
+    or splats as ellipses, points or rings.  Default: the picture."""
     output: Literal["picture", "depth", "normal", "coverage"] = "picture"
     """What to write instead of colours: depth in metres along the view, surface normals, or how
     much of each pixel is covered; each as a .npy and a 16-bit .png, with a legend.json."""

@@ -1,4 +1,4 @@
-"""Debug pictures of a frame: culls, birdseye, overdraw, depth, object (settings.debug).
+"""Debug pictures of a frame: settings.DEBUG_VIEWS.
 
 The drawings give what they hold (splat_points), take other colours (write_colors) and count
 fragments (overdraw); everything else is numpy on the CPU, the same for quads and tiles.
@@ -13,7 +13,13 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.debug.classify import Points, classify, eye_places, runs
 from shapeshift.renderer.debug.debug_map import birdseye
 from shapeshift.renderer.debug.points import dim, dot_size, paint_points
-from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
+from shapeshift.renderer.settings import (
+    CULL_REASONS,
+    DEBUG_VIEWS,
+    EDGES,
+    FrameStats,
+    RenderSettings,
+)
 from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.parts import name_of, splat_labels
 from shapeshift.runtime_models.shapes import three
@@ -60,6 +66,7 @@ class DebugDrawing(Protocol):
     def write_colors(self, color: np.ndarray) -> None: ...
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray: ...
     def image(self, i: int) -> np.ndarray: ...
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray: ...
 
 
 def prepare_debug(drawing: DebugDrawing, views: list[View], scene: Scene, name: str) -> bool:
@@ -109,6 +116,8 @@ def debug_image(
         number = drawing.overdraw(i, view, settings)
         largest = float(number.max(initial=0))
         return ramp(HEAT, np.sqrt(number / max(largest, 1))), {"largest": largest}
+    if settings.debug in EDGES:
+        return drawing.edges(i, view, settings, settings.debug)[..., :3].copy(), {}
     if settings.debug == "object":
         return np.ascontiguousarray(rgba[..., :3]), object_counts(scene)
     points, poses = drawing.splat_points(), object_poses(scene)

@@ -22,6 +22,7 @@ from shapeshift.renderer.gl.overdraw import count_overdraw
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter
+from shapeshift.renderer.gl.splat_edges import draw_edges
 from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, StereoPairSplatter
 from shapeshift.renderer.gl.surface import draw_surface
 from shapeshift.renderer.gl.target import brightest, choose_target
@@ -242,6 +243,9 @@ class QuadsDrawing(Drawing):
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         return count_overdraw(self._gpu, self._projector, self.arena, view, settings)
+
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray:
+        return draw_edges(self._gpu, self._projector, self.arena, view, settings, kind)
 
     def surface(self, view: View, settings: RenderSettings) -> Surface:
         """Depth, normals and coverage from a view; the order and the counts in use stay."""

@@ -22,6 +22,9 @@ DEBUG_NAMES = {
     "overdraw": "overdraw",
     "depth": "depth",
     "object": "objects",
+    "ellipses": "splats as ellipses",
+    "points": "splats as points",
+    "rings": "splats as rings",
 }
 
 
