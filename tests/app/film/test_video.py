@@ -82,7 +82,9 @@ def test_av1_leaves_no_thread_in_the_realtime_class(tmp_path):
         seen.append({os.sched_getscheduler(task) for task in tasks})
 
     encode(tmp_path / "a.mp4", paths, exact_fps(6), "av1", look)
-    assert seen == [{os.SCHED_OTHER}] * 3
+    # threads of other libraries may be in a class below: Mesa compiles shaders in SCHED_BATCH
+    assert len(seen) == 3
+    assert not set.union(*seen) - {os.SCHED_OTHER, os.SCHED_BATCH, os.SCHED_IDLE}
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
 
 
