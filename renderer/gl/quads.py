@@ -16,13 +16,13 @@ from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.debug.overdraw import count_overdraw
+from shapeshift.renderer.gl.debug.splat_edges import draw_edges
 from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.overdraw import count_overdraw
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter
-from shapeshift.renderer.gl.splat_edges import draw_edges
 from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, StereoPairSplatter
 from shapeshift.renderer.gl.surface import draw_surface
 from shapeshift.renderer.gl.target import brightest, choose_target

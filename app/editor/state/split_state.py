@@ -34,6 +34,10 @@ class SplitState:
             others = [x for x in thermal if abs(x - obj.slider_x) > ON_STOP]
             self.name, self.x = obj.name, (others or [farthest_stop(obj)])[0]
 
+    def shows(self, scene: Scene) -> bool:
+        """Whether two stops of a scene are to be seen: it is on, and the object is there."""
+        return self.on and any(obj.name == self.name for obj in scene.objects)
+
     def other_is_heat(self, scene: Scene) -> bool:
         """Whether the second x shows more heat than the slider does: its colours are laid over."""
         for obj in scene.objects:

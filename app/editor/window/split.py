@@ -115,15 +115,12 @@ def splitting(
         state.messages.fail(f"There is no room for a second picture: {error}")
 
     def draw(request: FrameRequest) -> None:
-        split_state.on = split_state.on and any(
-            obj.name == split_state.name for obj in request.scene.objects
-        )
-        if not split_state.on:
-            return
-        try:
-            split().draw(request)
-        except BadFile as error:
-            refuse(error)
+        split_state.on = split_state.shows(request.scene)
+        if split_state.on:
+            try:
+                split().draw(request)
+            except BadFile as error:
+                refuse(error)
 
     def draw_marks(ui_scale: float) -> None:
         if split_state.on and made and not split_state.over:
@@ -132,17 +129,15 @@ def splitting(
 
     def handle_event(event: Event) -> bool:
         if isinstance(event, KeyDown) and event.key == glfw.KEY_C and not event.ctrl:
-            index = next(iter(state.sliders), None)
-            if index is not None:
+            for index in state.sliders[:1]:
                 split_state.toggle(state.scene.objects[index], event.shift)
             return True
         has_line = split_state.on and bool(made) and not split_state.over
         return has_line and split().handle_line_event(event)
 
     def beside(scene: Scene, width: int) -> Beside | None:
-        shown = split_state.on and any(obj.name == split_state.name for obj in scene.objects)
-        plain = not state.settings.debug
-        return split().beside(scene, width, refuse) if shown and plain else None
+        wanted = split_state.shows(scene) and not state.settings.debug
+        return split().beside(scene, width, refuse) if wanted else None
 
     hooks.over.append(draw)
     hooks.beside = beside
