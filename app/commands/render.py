@@ -188,10 +188,10 @@ def with_selectors(scene, selectors: tuple):
     return replace(scene, objects=(replace(obj, selectors=selectors),))
 
 
-def document_at(document, control: float | str | None):
-    """The Document at a value of --x; None: as it is.  Raises UsageError."""
+def document_at(document, control: float | str | None, said: str = "--x"):
+    """The Document at a value of --x; None: as it is.  Raises UsageError, about the option said."""
     if isinstance(control, str):
-        return document.placed(control)
+        return document.placed(control, said)
     return replace(document, scene=document.at(control))
 
 
@@ -331,7 +331,7 @@ def shapes_of(options: Options, document: "Document", scenes: list, rows, select
     from shapeshift.app.decomposition.show_views import show_objects
     from shapeshift.app.drawing import appearing, read_look
 
-    shape = show_objects(document_at(document, options.shape_of).scene, options.show)
+    shape = show_objects(document_at(document, options.shape_of, "--shape-of").scene, options.show)
     shape = appearing(shape, read_look(options)[0])
     return [with_selectors(shape, selectors[i]) for _, i in rows], options.detail
 

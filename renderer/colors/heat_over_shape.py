@@ -20,7 +20,7 @@ def heat_over_shape(heat: np.ndarray, photo: np.ndarray, detail: float = 1.0) ->
     detail: how much of the photo's fine structure is added, 0 none.  The luminance is that of
     display values; grey is added, so that hues stay.
 
-        both = ss.heat_over_shape(scene.render("Thermal"), scene.render("RGB"))
+        both = ss.heat_over_shape(scene.render(x="Thermal"), scene.render(x="RGB"))
     """
     luminance = np.asarray(photo, np.float32) @ LUMINANCE.astype(np.float32)
     broad = luminance
