@@ -179,7 +179,9 @@ class Renderer:
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         settings = self._settings_of_frame()
         self.drawing.draws_heat = self._false_colors.way == BESIDE and not settings.debug
-        self._views, self._ways = views, [self._false_colors] * len(views)
+        self._views = views
+        # An eye that is not drawn keeps its picture, and how its colours came about.
+        self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
         full, views = views, [scaled(view, settings.render_scale) for view in views]
         own, sorts = own_colors(self.settings, self._scene, self._decoded, full), 0
         with self._framebuffer_kept():
@@ -359,7 +361,7 @@ class Renderer:
         are; image(i) is the picture in that order afterwards.
         """
         self._decode_colors(views)
-        self._ways = [self._false_colors] * len(views)
+        self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
         settings = replace(self._settings_of_frame(), debug="")
         views = [scaled(view, settings.render_scale) for view in views]
         pictures = []

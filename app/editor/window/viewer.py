@@ -196,9 +196,8 @@ class Viewer:
             watched = self.polling or self.pads.connected
             redraw = self.window.wait(0.0 if busy else POLL_S if watched else SLEEP_S)
             now = time.perf_counter()
-            if self.window.minimised:
+            if self.window.hidden:  # no time passes either
                 last = now
-                time.sleep(0.05)
                 continue
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now

@@ -15,6 +15,10 @@ from shapeshift.renderer.settings import DEBUG_VIEWS
 
 TWO_STOPS = ("one stop", "two stops beside a line", "heat over shape")
 MOST_DETAIL = 3.0
+PALETTE_TIP = (
+    "The colours in which a thermal stop shows temperatures. In all but turbo lighter is hotter, "
+    "also for eyes that confuse colours; viridis and cividis are made for them."
+)
 DEBUG_NAMES = {
     "": "picture",
     "culls": "what is culled, and why",
@@ -50,7 +54,7 @@ def draw_look(state: EditorState, ui_scale: float) -> None:
         names = [AS_FILED, *PALETTES]
         labels = ["heat: as filed", *(f"heat: {name}" for name in PALETTES)]
         chosen = choice("palette", state.palette, names, labels)
-        tip("The colours in which a thermal stop shows temperatures.", ui_scale)
+        tip(PALETTE_TIP, ui_scale)
         if chosen != state.palette:
             state.choose_palette(chosen)
     names = [f"show: {DEBUG_NAMES[name]}" for name in DEBUG_VIEWS]
