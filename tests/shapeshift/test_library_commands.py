@@ -223,7 +223,7 @@ def test_what_a_training_does_not_know_is_refused(capture, tmp_path):
 
 
 def test_the_front_page_of_the_readme_runs(capture, tmp_path, monkeypatch):
-    """Its five lines as they stand there: a second instead of a minute, a small film of few frames."""
+    """Its five lines as they stand there: a second, not a minute; a small film of few frames."""
     import re
     import shutil
     from pathlib import Path
