@@ -17,12 +17,13 @@ from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
-from shapeshift.rasterizer.project import CULL_REASONS, Camera, Projected
-from shapeshift.rasterizer.project_arena import Limits, SortFrames, project_arena
+from shapeshift.rasterizer.project import CULL_REASONS, Projected
+from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
 from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
+from shapeshift.rasterizer.splat_edges import draw_edges
 from shapeshift.rasterizer.surface import rasterize_depth, surface_arena
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.palette import palette_colors
@@ -31,7 +32,7 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
-from shapeshift.renderer.tiles.behind import behind
+from shapeshift.renderer.tiles.inputs import behind, camera_of, limits_of
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
@@ -349,6 +350,12 @@ class TilesDrawing(Drawing):
             return np.zeros(view.size[::-1], np.int32)
         return count_overdraw(self.device, self._projected[i], view.size)
 
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray:
+        if not self.splats:
+            return np.zeros((*view.size[::-1], 4), np.float32)
+        order = self._orders[i if len(self._orders) > 1 else 0]
+        return draw_edges(self.device, self._projected[i], order, view.size, kind)
+
     def surface(self, view: View, settings: RenderSettings) -> Surface:
         """Depth, normals and coverage from a view; the last frame stays as it is."""
         if not self.splats:
@@ -380,20 +387,3 @@ class TilesDrawing(Drawing):
         self._images.clear()
         self._heat_images.clear()
         self.device.pool.free_held()
-
-
-def camera_of(view: View) -> Camera:
-    """The view as rasterizer/ takes it."""
-    return Camera(*view.pinhole(), view.size, view.near, view.widest_tangents())
-
-
-def limits_of(settings: RenderSettings) -> Limits:
-    """The culls of the settings as projection takes them."""
-    return Limits(
-        settings.min_alpha,
-        settings.max_pixels,
-        settings.max_distance,
-        settings.min_pixels,
-        settings.fade,
-        settings.low_pass,
-    )
