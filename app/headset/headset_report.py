@@ -36,6 +36,7 @@ class DoneFrame:
     records: Sequence[Record]
     life: Life
     pace: FramePace
+    layers: Sequence[str] = ()  # that were handed to the compositor
 
 
 class Report:
@@ -114,6 +115,7 @@ def frame_row(done: DoneFrame) -> dict:
             for obj in world.drawn().objects
         },
         "panel": done.panel(),
+        "layers": done.layers,
         "events": [event for record in done.records for event in record.events],
         "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in done.pulses],
         "own_ms": rounded(times[-1]) if times else None,

@@ -22,7 +22,7 @@ from shapeshift.rasterizer.quantize_keys import quantize_keys
 from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
-from shapeshift.rasterizer.surface import rasterize_depth, surface_arena
+from shapeshift.rasterizer.surface import DepthFrame, rasterize_depth, surface_arena
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
@@ -77,6 +77,7 @@ class TilesDrawing(Drawing):
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self.draws_heat = False  # in addition to the colours, from the next frame on
         self._heat_images: dict[int, np.ndarray] = {}
+        self._depths: dict[int, np.ndarray] = {}
 
     def allocate(self, models: list[Model]) -> None:
         check_tiles(self.device, models)
@@ -183,6 +184,7 @@ class TilesDrawing(Drawing):
             for i, view in enumerate(views):
                 self._images[first + i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
                 self._heat_images[first + i] = np.zeros((*view.size[::-1], 2), np.float32)
+                self._depths[first + i] = np.zeros((*view.size[::-1], 4), np.float32)
             return
         with timer.time("project", on_gpu=False):
             self._project(views, settings)
@@ -201,6 +203,21 @@ class TilesDrawing(Drawing):
                 numbers = [first + i for i in same]
                 self._images.update(zip(numbers, images, strict=True))
                 self._heat_images.update(zip(numbers, heats, strict=False))
+        if settings.depth_scale > 0:
+            with timer.time("depth", on_gpu=False):
+                for i, view in enumerate(views):
+                    drawn = self._blend_depth(self._projected[i], tiles[i], view)
+                    depth = self._depths[first + i] = np.zeros((*view.size[::-1], 4), np.float32)
+                    depth[..., 0] = self.device.download(drawn.metres)
+                    depth[..., 3] = 1 - self.device.download(drawn.frame.transmittance)
+
+    def _blend_depth(self, projected: Projected, tiles: Tiles, view: View) -> DepthFrame:
+        """Depth, and normals in place of colours, which the records lose."""
+        surfaces = surface_arena(
+            self.device, self._mean_opacity, self._covariance, self._object_index,
+            self._world_from_objects, camera_of(view), projected,
+        )  # fmt: skip
+        return rasterize_depth(self.device, projected, tiles, surfaces, view.size)
 
     def _heats_of(self, first: int, views: list[int]) -> list:
         """(N, 4) for each of the views: its own, or that of all; made where there is none yet."""
@@ -306,6 +323,9 @@ class TilesDrawing(Drawing):
         heat = self._heat_images[i] if self.draws_heat else None
         return resolve(self.device, self._images[i], background, palette, heat)
 
+    def presentable_depth(self, i: int) -> np.ndarray:
+        return self._depths[i]
+
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         read = self.device.download
         return read(self._mean_opacity), read(self._object_index), read(self._covariance)
@@ -342,11 +362,7 @@ class TilesDrawing(Drawing):
         (projected,) = self._launch([view], settings, sort)
         order = sort_order(self.device, projected.in_tiles)
         tiles = bin_tiles(self.device, projected, view.size, order=order)
-        surfaces = surface_arena(
-            self.device, self._mean_opacity, self._covariance, self._object_index,
-            self._world_from_objects, camera, projected,
-        )  # fmt: skip
-        drawn = rasterize_depth(self.device, projected, tiles, surfaces, view.size)
+        drawn = self._blend_depth(projected, tiles, view)
         normal = self.device.download(drawn.frame.image)
         transmittance = self.device.download(drawn.frame.transmittance)
         metres = self.device.download(drawn.metres)
