@@ -13,6 +13,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.runtime_models.model import Model, Stop
 from shapeshift.runtime_models.stop_weights import Control, Pace, StopWeights, parse_control
+from shapeshift.scene.appearance import Background, Color, behind_of
 from shapeshift.scene.cameras.framing import (
     default_background,
     default_view,
@@ -74,14 +75,14 @@ class Document:
         return np.array(getattr(alone, "origin", (0.0, 0.0, 0.0)), np.float64)
 
     @property
-    def background(self) -> tuple[float, float, float]:
-        """Display sRGB behind everything: what one model was trained before, else black."""
+    def background(self) -> Background:
+        """Behind everything: the file's sky, what one model was trained before, else black."""
         return self.background_or(BLACK)
 
-    def background_or(self, otherwise: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Display sRGB behind everything: what one model was trained before, else `otherwise`."""
+    def background_or(self, otherwise: Color) -> Background:
+        """The same, else `otherwise`: display sRGB."""
         if self.file:
-            return otherwise
+            return behind_of(self.file.sky) or otherwise
         return default_background(self.scene.objects[0].model, otherwise)
 
     @property

@@ -1,10 +1,12 @@
-"""What the modes that draw share: option checks, a renderer without a window, pictures on disk."""
+"""What the modes that draw share: option checks, looks, a renderer, pictures on disk."""
 
 import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import moderngl
 import numpy as np
@@ -13,10 +15,14 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.files.whole_file import whole_file
+from shapeshift.runtime_models.shapes import three
+from shapeshift.scene.appearance import NEUTRAL, Appearance, Background, Color, Sky, check_color
+from shapeshift.scene.scene import Scene
 
 LARGEST_SIDE = 16384  # pixels: the texture limit of common drivers
 MOST_PIXELS = LARGEST_SIDE * 8192  # float images of more do not fit one OpenCL buffer
 MOST_VALUES = 100_000  # of x, and of views on an orbit
+Texts = tuple[str, str, str]
 SOFTWARE = "Shapeshift"  # the Software entry of our PNG files
 
 
@@ -100,3 +106,52 @@ def make_folder(path: Path) -> None:
         raise UsageError(f"cannot make the folder {path}: {error.strerror}.") from None
     if not os.access(path, os.W_OK):
         raise UsageError(f"cannot write into {path}; choose another --out.")
+
+
+class LookOptions(Protocol):
+    """The options of a command that say it."""
+
+    @property
+    def background(self) -> Color | None: ...
+    @property
+    def sky(self) -> Texts | None: ...
+    @property
+    def exposure(self) -> float: ...
+    @property
+    def gamma(self) -> float: ...
+    @property
+    def tint(self) -> Color: ...
+    @property
+    def opacity(self) -> float: ...
+
+
+def read_look(options: LookOptions) -> tuple[Appearance, Background | None]:
+    """The appearance of the whole scene, and what is asked for behind it.  Raises UsageError."""
+    try:
+        if options.background is not None:
+            check_color(options.background, "background")
+        tint = three(options.tint)
+        appearance = Appearance(options.exposure, options.gamma, tint, options.opacity)
+    except ValueError as error:
+        raise UsageError(f"--{error}") from None
+    if options.sky is None:
+        return appearance, options.background
+    if options.background is not None:
+        raise UsageError("--sky says what --background does; leave one of the two out.")
+    return appearance, Sky(*map(read_color, options.sky))
+
+
+def read_color(text: str) -> Color:
+    """Display sRGB of a text like 87b5e8."""
+    if not re.fullmatch("#?[0-9a-fA-F]{6}", text):
+        raise UsageError(f"--sky has the colour '{text[:60]}'; six digits like 87b5e8 are wanted.")
+    value = int(text.removeprefix("#"), 16)
+    return three((value >> shift & 255) / 255 for shift in (16, 8, 0))
+
+
+def appearing(scene: Scene, appearance: Appearance) -> Scene:
+    """The scene with that of all on top of each object's own."""
+    if appearance == NEUTRAL:
+        return scene
+    objects = (replace(obj, appearance=obj.appearance.under(appearance)) for obj in scene.objects)
+    return replace(scene, objects=tuple(objects))

@@ -117,7 +117,7 @@ class Device:
         return self.programs[key]
 
     def launch(self, kernel, items, group, *arguments) -> None:
-        """Enqueue a kernel.  ints become int32, floats float32, device arrays their buffers.
+        """Enqueue a kernel.  Numbers become what it takes, device arrays their buffers.
 
         items: global size, rounded up to a multiple of `group` (the local size); each an int.
         """
@@ -135,10 +135,6 @@ class _Mapped:
 
 
 def _argument(value):
-    if isinstance(value, bool | int | np.integer):
-        return np.int32(value)
-    if isinstance(value, float | np.floating):
-        return np.float32(value)
     return value.data if hasattr(value, "base_data") else value
 
 

@@ -10,7 +10,7 @@ from shapeshift.rasterizer.device import Device
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-KERNEL = Path(__file__).parent / "kernels" / "heat.cl"
+KERNEL = Path(__file__).parent / "kernels" / "colors" / "heat.cl"
 GROUP = 64
 
 

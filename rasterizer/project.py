@@ -145,7 +145,7 @@ def project(
     device.launch(
         kernel, -(-count // wide), GROUP,
         count, width, height, float(camera.near), LEAST_ALPHA, float(low_pass),
-        device.upload(camera.packed()), means, scales, wxyz, opacity, color, record, depth,
+        device.constants(camera.packed()), means, scales, wxyz, opacity, color, record, depth,
     )  # fmt: skip
     return Projected(record, depth, low_pass)
 
@@ -161,7 +161,7 @@ def project_backward(
     kernel = device.program(KERNELS / "project.cl", WIDTH=wide)["project_backward"]
     device.launch(
         kernel, -(-count // wide), GROUP,
-        count, float(projected.low_pass), device.upload(camera.packed()), means, scales, wxyz,
+        count, float(projected.low_pass), device.constants(camera.packed()), means, scales, wxyz,
         projected.record, grad_record, *grads,
     )  # fmt: skip
     return grads

@@ -20,7 +20,7 @@ def quantize_keys(device: Device, scratch: TileScratch) -> None:
     least, most = status[:, 2].min(), status[:, 3].max()
     device.launch(
         device.program(KERNEL)["quantize_keys"], len(status), 1,
-        scratch.chunk, least.view("int32"), most.view("int32"), scratch.pairs, scratch.table,
+        scratch.chunk, int(least), int(most), scratch.pairs, scratch.table,
         scratch.status,
     )  # fmt: skip
     device.queue.finish()

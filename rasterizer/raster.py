@@ -29,6 +29,27 @@ class RasterFrame:
     image: "Array"  # (3, H, W) float32 = sum of colours + transmittance * background
     transmittance: "Array"  # (H, W) float32
     tile_ends: "Array"  # (tiles,) int32: where the early stop ended each list
+    # (I,) uint32 of the CPU form, which its backward pass goes through: in which blocks of its
+    # tile's pixels each intersection was drawn.
+    drawn_blocks: "Array | None" = None
+
+    def for_backward(self, form: str) -> list:
+        """What the backward kernel of a form takes at its end.
+
+        Raises ValueError where the image is of another form.
+        """
+        if form != "cpu":
+            return []
+        if self.drawn_blocks is None:
+            raise ValueError("the CPU form goes back through images of the CPU form alone")
+        return [self.drawn_blocks]
+
+
+def room_for_blocks(device: Device, tiles: Tiles, form: str) -> "Array | None":
+    """What the CPU form's `rasterize` fills for its backward pass."""
+    if form != "cpu":
+        return None
+    return device.empty(max(1, tiles.intersections.shape[0]), np.uint32)
 
 
 def rasterize(
@@ -41,19 +62,23 @@ def rasterize(
 ) -> RasterFrame:
     """The image of `size` (width, height) pixels over a background colour.
 
-    form: "cpu" or "gpu", by default the device's kind; any form draws the lists of any other.
+    form: "cpu" or "gpu", by default the device's kind; any form draws the lists of any other, and
+    goes back through its own images.
     """
     width, height = size
     number = tiles.grid[0] * tiles.grid[1]
     image, transmittance = device.empty((3, height, width)), device.empty((height, width))
     ends = device.empty(number, np.int32)
-    file, group, _ = FORMS[form or device.kind]
+    form = form or device.kind
+    file, group, _ = FORMS[form]
+    blocks = room_for_blocks(device, tiles, form)
     device.launch(
         device.program(file)["rasterize"], number * group, group,
         width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends,
+        *([] if blocks is None else [blocks]),
     )  # fmt: skip
-    return RasterFrame(image, transmittance, ends)
+    return RasterFrame(image, transmittance, ends, blocks)
 
 
 def rasterize_rgba(
@@ -174,7 +199,8 @@ def rasterize_backward(
     _, height, width = frame.image.shape
     first_slot = tiles.slots(device)
     slots = tiles.room(device, first_slot, RECORD)
-    file, _, group = FORMS[form or device.kind]
+    form = form or device.kind
+    file, _, group = FORMS[form]
     defines = {"ABSOLUTE": 1} if absolute and error is None else {}
     defines |= {"SHARE": 1} if error is not None else {}
     defines |= {"WEIGHT": 1} if weight else {}
@@ -186,6 +212,7 @@ def rasterize_backward(
         tiles.tile_bounds, first_slot, projected.record, frame.image, frame.transmittance,
         grad_image, grad_transmittance if with_transmittance else frame.transmittance,
         with_transmittance, slots, *([] if error is None else [error]),
+        *frame.for_backward(form),
     )  # fmt: skip
     grad_record = device.empty((count, RECORD))
     kernel = device.program(KERNELS / "sum_slots.cl")["sum_slots"]

@@ -1,19 +1,38 @@
 """resolve: a drawn image -> bytes for a window: background, palette, 8 bits, bottom row first."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
 
+if TYPE_CHECKING:
+    import pyopencl as cl
+
 KERNEL = Path(__file__).parent / "kernels" / "resolve.cl"
+
+
+@dataclass(frozen=True)
+class Behind:
+    """A sky, as it is seen: colours from horizon to zenith, or to the ground, with the sine of the
+    elevation.
+    """
+
+    colors: Sequence[Sequence[float]]  # zenith, horizon, ground: display sRGB
+    up: np.ndarray  # (3,) the world's +Y along the axes of the eye
+    tangents: tuple[float, float, float, float]  # left, right, down, up
+
+
 NO_PALETTE = np.zeros((1, 3), np.float32)  # its place in the kernel's arguments
 
 
 def resolve(
     device: Device,
     image: np.ndarray,
-    background: tuple[float, float, float],
+    background: tuple[float, float, float] | Behind,
     palette: np.ndarray | None = None,
     heat: np.ndarray | None = None,
 ) -> np.ndarray:
@@ -30,9 +49,30 @@ def resolve(
     beside = None if heat is None or not mixed else device.shared(heat)
     table = np.zeros((2, len(colors), 4), np.float32)  # colours, differences
     table[0, :, :3], table[1, :-1, :3] = colors, np.diff(colors, axis=0)
+    plain, sky = sky_rows(device, background, (width, height))
     device.launch(
         device.program(KERNEL)["resolve"], height, 1,
-        width, height, *(float(c) for c in background), int(mixed),
-        device.shared(image), device.constants(table), pixels, beside,
+        width, height, *(float(c) for c in plain), int(mixed),
+        device.shared(image), device.constants(table), pixels, beside, sky,
     )  # fmt: skip
     return device.view(pixels)
+
+
+def sky_rows(
+    device: Device, background: tuple[float, float, float] | Behind, size: tuple[int, int]
+) -> "tuple[Sequence[float], cl.Buffer | None]":
+    """The colour behind everything, and of a sky what the kernel needs besides: (5, 4) floats.
+
+    Of a pixel (x, y) from the upper left its direction along the axes of the eye is
+    rows[3] + (x rows[4].x, y rows[4].y, 0), and that times rows[2] the sine of its elevation.
+    """
+    if not isinstance(background, Behind):
+        return background, None
+    left, right, low, high = background.tangents
+    zenith, horizon, ground = (np.array(color) for color in background.colors)
+    across, along = (right - left) / size[0], (low - high) / size[1]
+    table = np.zeros((5, 4), np.float32)
+    table[0, :3], table[1, :3], table[2, :3] = zenith - horizon, ground - horizon, background.up
+    table[3, :3] = (left + across / 2, high + along / 2, -1)  # the middle of the first pixel
+    table[4, :2] = across, along
+    return tuple(horizon), device.constants(table)

@@ -10,7 +10,7 @@ from shapeshift.rasterizer.device import Device
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-KERNEL = Path(__file__).parent / "kernels" / "shade_sh.cl"
+KERNEL = Path(__file__).parent / "kernels" / "colors" / "shade_sh.cl"
 LANES = 8  # splats a block
 RUN = 32  # blocks a work-item
 UPLOADED = 1 << 16  # splats at a time, a multiple of LANES

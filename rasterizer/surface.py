@@ -13,7 +13,7 @@ import numpy as np
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
-from shapeshift.rasterizer.raster import FORMS, RasterFrame
+from shapeshift.rasterizer.raster import FORMS, RasterFrame, room_for_blocks
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -42,7 +42,7 @@ def surface(
     kernel = device.program(KERNELS / "surface.cl", WIDTH=wide)["surface"]
     device.launch(
         kernel, -(-count // wide), GROUP,
-        count, float(camera.near), device.upload(camera.packed()), means, scales, wxyz,
+        count, float(camera.near), device.constants(camera.packed()), means, scales, wxyz,
         projected.record, out,
     )  # fmt: skip
     return out
@@ -57,7 +57,7 @@ def surface_backward(
     kernel = device.program(KERNELS / "surface.cl", WIDTH=wide)["surface_backward"]
     device.launch(
         kernel, -(-count // wide), GROUP,
-        count, float(camera.near), device.upload(camera.packed()), means, scales, wxyz,
+        count, float(camera.near), device.constants(camera.packed()), means, scales, wxyz,
         projected.record, surfaces, grad_surface, *grads,
     )  # fmt: skip
 
@@ -77,7 +77,7 @@ def surface_arena(
     kernel = device.program(KERNELS / "surface_arena.cl")["surface_arena"]
     device.launch(
         kernel, count, GROUP,
-        count, float(camera.near), device.upload(camera.packed()),
+        count, float(camera.near), device.constants(camera.packed()),
         device.upload(np.ascontiguousarray(rows[:, :3], np.float32).ravel()), mean_opacity,
         covariance, object_index, projected.record, out,
     )  # fmt: skip
@@ -98,13 +98,16 @@ def rasterize_depth(
     number = tiles.grid[0] * tiles.grid[1]
     image, transmittance = device.empty((3, height, width)), device.empty((height, width))
     ends, metres = device.empty(number, np.int32), device.empty((height, width))
-    file, group, _ = FORMS[form or device.kind]
+    form = form or device.kind
+    file, group, _ = FORMS[form]
+    blocks = room_for_blocks(device, tiles, form)
     device.launch(
         device.program(file, **WITH_DEPTH)["rasterize"], number * group, group,
         width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends, surfaces, metres,
+        *([] if blocks is None else [blocks]),
     )  # fmt: skip
-    return DepthFrame(RasterFrame(image, transmittance, ends), surfaces, metres)
+    return DepthFrame(RasterFrame(image, transmittance, ends, blocks), surfaces, metres)
 
 
 def rasterize_depth_backward(
@@ -125,7 +128,8 @@ def rasterize_depth_backward(
     _, height, width = frame.image.shape
     first_slot = tiles.slots(device)
     slots, depth_slots = (tiles.room(device, first_slot, n) for n in (RECORD, SURFACE))
-    file, _, group = FORMS[form or device.kind]
+    form = form or device.kind
+    file, _, group = FORMS[form]
     defines = WITH_DEPTH | ({"ABSOLUTE": 1} if absolute and error is None else {})
     defines |= {"SHARE": 1} if error is not None else {}
     defines |= {"WEIGHT": 1} if weight else {}
@@ -135,7 +139,7 @@ def rasterize_depth_backward(
         width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.intersections,
         tiles.tile_bounds, first_slot, projected.record, frame.image, frame.transmittance,
         grad_image, grad_transmittance, True, slots, *([] if error is None else [error]),
-        drawn.surface, drawn.metres, grad_metres, depth_slots,
+        drawn.surface, drawn.metres, grad_metres, depth_slots, *frame.for_backward(form),
     )  # fmt: skip
     grad_record, grad_surface = device.empty((count, RECORD)), device.empty((count, SURFACE))
     for name, given, made in (

@@ -7,6 +7,7 @@ from shapeshift.renderer.colors.eye_colors import EyeColors
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.appearance import Appearance
 
 NO_SHADE = Shade(None)  # nothing is decoded yet
 
@@ -21,4 +22,6 @@ class DecodedObject:
     x: Controls = 0.0  # of its geometry
     version: int = 0  # goes up with every other x
     shade: Shade = NO_SHADE  # which colours are decoded
+    grade: Appearance | None = None  # of its colours; None: they are as decoded
+    opacity: float = 1.0  # times that of its splats
     look: EyeColors | None = None  # made for the first pair of eyes

@@ -12,6 +12,7 @@ from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import View
 
 SAMPLE = 4096  # splats, for a median
@@ -61,12 +62,17 @@ class Drawing(ABC):
         eye_object: np.ndarray,
         seen: np.ndarray | None = None,
         at_once: bool = False,
+        grade: Appearance | None = None,
     ) -> None:
         """Colours of object i, towards an eye (3,) in the object's frame, and what of them is heat.
 
         seen: (A,) bool, one an anchor (tiles: a splat of layers): the rest may keep what it has.
-        at_once: the heat becomes colours of its palettes here.
+        at_once: the heat becomes colours of its palettes here.  grade: of what is not heat.
         """
+
+    @abstractmethod
+    def scale_opacity(self, i: int, factor: float) -> None:
+        """Makes the opacities of object i those that were decoded, times a factor."""
 
     @abstractmethod
     def wait_decoded(self) -> None:
@@ -114,12 +120,12 @@ class Drawing(ABC):
         """
 
     def presentable_rgba8(
-        self, i: int, background: tuple[float, float, float], palette: np.ndarray | None = None
+        self, i: int, background: Background, view: View, palette: np.ndarray | None = None
     ) -> np.ndarray:
         """(H, W, 4) uint8 of view i as a window shows it, opaque, row 0 at the bottom.
 
-        palette: of the heat, where the frame has any, else of the picture.  Only where
-        presentable() is an array.
+        view: whose directions a sky is seen in.  palette: of the heat, where the frame has any,
+        else of the picture.  Only where presentable() is an array.
         """
         raise TypeError("this drawing's pictures are textures; present them by GL.")
 

@@ -1,6 +1,5 @@
 """Draws scenes: the passes of a frame in order.  The file to read first in renderer/."""
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,9 +13,6 @@ from shapeshift.renderer.colors.color_cache import (
     centre_of,
     color_key,
     forget_colors,
-    reach_of,
-    reach_of_scaffold,
-    visible_anchors,
 )
 from shapeshift.renderer.colors.eye_colors import EyeColors, drawn_together, shared_is_enough
 from shapeshift.renderer.colors.false_colors import (
@@ -28,11 +24,13 @@ from shapeshift.renderer.colors.false_colors import (
 )
 from shapeshift.renderer.colors.palette import (
     apply_palette,
+    behind,
     over_background,
     overlay_heat,
     palette_colors,
 )
 from shapeshift.renderer.colors.tint import tinted
+from shapeshift.renderer.colors.wanted import wanted_anchors, wanted_of_follower
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
@@ -42,7 +40,6 @@ from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_control
-from shapeshift.runtime_models.model import ScaffoldModel, SplatLayers
 from shapeshift.runtime_models.stop_weights import same_controls
 from shapeshift.scene.control import control_key, control_of
 from shapeshift.scene.metrics import psnr
@@ -85,7 +82,7 @@ class Renderer:
         self._false_colors = FalseColors()
         self.drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
-        self._sizes: list[tuple[int, int]] = []  # of the views of the last frame
+        self._views: list[View] = []  # of the last frame, in the size that is shown
         self._debug: list[tuple[np.ndarray, dict[str, float]]] = []  # picture and numbers, a view
 
     @property
@@ -99,27 +96,31 @@ class Renderer:
             if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
                 self._rebuild(scene)
             for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
-                if not obj.visible or decoded.key == (key := control_key(obj)):
+                if not obj.seen:
                     continue
-                x, first = control_of(obj), decoded.key is None
-                # The same control still: a selector changed where nothing is.
-                if first or not same_controls(x, decoded.x):
+                key, first = control_key(obj), decoded.key is None
+                # Another key with the same x: a selector changed where nothing is.
+                if decoded.key != key and (first or not same_controls(control_of(obj), decoded.x)):
+                    x = control_of(obj)
                     # What follows the eye is decoded with the colours, once the eye is known.
-                    if (first or shape_follows_control(obj.model)) and not follows_eye(obj.model):
+                    follows = first or shape_follows_control(obj.model)
+                    if follows and not follows_eye(obj.model):
                         self.drawing.decode_geometry(i, x)
                         self._geometry_runs += 1
+                        decoded.opacity = 1.0
                     decoded.x = x
                     decoded.version += 1
                 decoded.key = key
+                self._scale_opacity(i, obj, decoded)
             self._choose_false_colors(scene)
-        poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
+        poses = [o.world_from_object.matrix() if o.seen else HIDDEN for o in scene.objects]
         self.drawing.set_poses(poses)
         self._scene = scene
 
     def _choose_false_colors(self, scene: Scene) -> None:
         """Which colours are decoded, and where palettes belong, as the controls ask for."""
         pairs = zip(self._decoded, scene.objects, strict=True)
-        state = [(d.version, o.visible, o.tint is None) for d, o in pairs]
+        state = [(d.version, o.seen, o.tint is None, o.appearance) for d, o in pairs]
         if state == self._false_key:
             return
         self._false_key = state
@@ -130,6 +131,20 @@ class Renderer:
             if not (same_way and shade.same(decoded.shade)):
                 decoded.shade = shade
                 forget_colors(decoded.colored)
+        for decoded, obj in zip(self._decoded, scene.objects, strict=True):
+            # What a palette is to be laid over are values, not colours.
+            plain = obj.appearance.keeps_colors or self._false_colors.way == PICTURE
+            grade = None if plain else replace(obj.appearance, opacity=1.0)
+            if grade != decoded.grade:
+                decoded.grade = grade
+                forget_colors(decoded.colored)
+
+    def _scale_opacity(self, i: int, obj: SceneObject, decoded: DecodedObject) -> None:
+        """Its splats as opaque as its appearance says; nothing where they are."""
+        opacity = obj.appearance.opacity
+        if decoded.opacity != opacity:
+            self.drawing.scale_opacity(i, opacity)
+            decoded.opacity = opacity
 
     def _rebuild(self, scene: Scene) -> None:
         """A new arena for another set of objects; an empty one if the set does not fit."""
@@ -158,7 +173,7 @@ class Renderer:
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         settings = self._settings_of_frame()
         self.drawing.draws_heat = self._false_colors.way == BESIDE and not settings.debug
-        self._sizes = [view.size for view in views]  # of what is shown
+        self._views = views
         full, views = views, [scaled(view, settings.render_scale) for view in views]
         own, sorts = self._own_colors(full), 0
         with self._framebuffer_kept():
@@ -223,7 +238,7 @@ class Renderer:
         eye_world = np.mean([v.world_from_eye.position for v in views], axis=0)
         degrees = self.settings.recolor_degrees
         for i, (obj, decoded) in enumerate(zip(self._scene.objects, self._decoded, strict=True)):
-            if not obj.visible:
+            if not obj.seen:
                 continue
             colored = decoded.colored[which]
             object_from_world = np.linalg.inv(obj.world_from_object.matrix())
@@ -232,11 +247,13 @@ class Renderer:
             stale = colored.is_stale(key, degrees, nearer=follows_eye(obj.model))
             follows = follows_eye(obj.model)
             if follows:
-                due, wanted = self._wanted_of_follower(obj, colored, stale, views)
+                due, wanted = wanted_of_follower(self.settings, obj, colored, stale, views)
                 if due:
                     colored.key, colored.anchors = key, wanted
             else:
-                wanted = self._wanted_anchors(i, obj, decoded, colored, stale, views)
+                wanted = wanted_anchors(
+                    self.drawing, self.settings, i, obj, decoded, colored, stale, views
+                )
                 due = colored.mark_colored(key, wanted, stale)  # else all seen have their colours
             if not due and obj.tint is colored.tint:
                 continue
@@ -244,59 +261,12 @@ class Renderer:
                 if due and follows:
                     self.drawing.decode_geometry(i, decoded.x, eye, wanted)
                     self._geometry_runs += 1
+                    decoded.opacity = 1.0
+                    self._scale_opacity(i, obj, decoded)
                 if due:
                     at_once = self._false_colors.way == SPLATS
-                    self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
+                    self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once, decoded.grade)
                     self._color_runs += 1
-
-    def _wanted_anchors(
-        self, i: int, obj: SceneObject, decoded: DecodedObject, colored: ColorCache, stale: bool,
-        views: list[View],
-    ) -> np.ndarray | None:  # fmt: skip
-        """(A,) bool: the anchors that views see and whose colours are stale; None: all.
-
-        Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
-        """
-        if not self.settings.skip_unseen or isinstance(obj.model, SplatLayers):
-            if stale or colored.anchors is None:
-                return None
-            return ~colored.anchors  # left out before: now all are wanted
-        if not stale and colored.anchors is None:
-            return None
-        reach_key = (decoded.version, self.settings.min_alpha)
-        if colored.reach_key != reach_key:
-            colored.reach, colored.reach_key = None, reach_key
-            if stale:  # how far splats reach is worth knowing once x rests
-                return None
-        if colored.reach is None:
-            mean_opacity, owner, covariance = self.drawing.splat_points()
-            mine = owner == i
-            k = math.sqrt(2 * math.log(1 / self.settings.min_alpha))
-            parts = (obj.model.anchors, mean_opacity[mine], covariance[mine], k)
-            colored.reach = reach_of(*parts)
-        pose = obj.world_from_object.matrix()
-        seen = visible_anchors(obj.model.anchors, colored.reach, pose, views, self.settings)
-        return seen if stale or colored.anchors is None else seen & ~colored.anchors
-
-    def _wanted_of_follower(
-        self, obj: SceneObject, colored: ColorCache, stale: bool, views: list[View]
-    ) -> tuple[bool, np.ndarray | None]:
-        """Whether a model that follows the eye is to be decoded, and (A,) which anchors; None: all.
-
-        Where its splats can be is known beforehand, so only what views see needs to be decoded;
-        for one eye as a whole, so what comes into view has the rest decoded, too.
-        """
-        model = obj.model
-        assert isinstance(model, ScaffoldModel), "the one kind that follows the eye"
-        if not self.settings.skip_unseen:
-            return stale or colored.anchors is not None, None
-        if colored.reach is None or colored.reach_key != self.settings.min_alpha:
-            colored.reach = reach_of_scaffold(model, self.settings.min_alpha)
-            colored.reach_key = self.settings.min_alpha
-        pose = obj.world_from_object.matrix()
-        seen = visible_anchors(model.anchors, colored.reach, pose, views, self.settings)
-        new = colored.anchors is not None and (seen & ~colored.anchors).any()
-        return stale or bool(new), None if seen.all() else seen
 
     def image(self, i: int = 0) -> np.ndarray:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
@@ -311,13 +281,14 @@ class Renderer:
         written to `out` where there is one; or its debug picture, a new one, with settings.debug.
         """
         if self._debug:
-            return bilinear(self._debug[i][0], self._sizes[i])
-        palette, rgba = self._false_colors.palette, bilinear(self.drawing.image(i), self._sizes[i])
+            return bilinear(self._debug[i][0], self._views[i].size)
+        palette, view = self._false_colors.palette, self._views[i]
+        rgba = bilinear(self.drawing.image(i), view.size)
         if self.drawing.draws_heat:
-            rgba = overlay_heat(rgba, bilinear(self.drawing.heat(i), self._sizes[i]), palette)
+            rgba = overlay_heat(rgba, bilinear(self.drawing.heat(i), view.size), palette)
         elif self._false_colors.way == PICTURE:
             rgba = apply_palette(rgba, palette)
-        return over_background(rgba, self.settings.background, out)
+        return over_background(rgba, behind(self.settings.background, view), out)
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
         """Fills a GL framebuffer with view i as resolved() shows it."""
@@ -327,15 +298,15 @@ class Renderer:
         palette = palette_colors(name) if name else None
         image = opaque(self._debug[i][0]) if self._debug else self.drawing.presentable(i)
         heat = self.drawing.presentable_heat(i) if self.drawing.draws_heat else None
-        background = self.settings.background
+        background, view = self.settings.background, self._views[i]
         as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
             if as_array and self._resolve.takes_bytes(framebuffer, image.shape[1::-1]):
-                pixels = self.drawing.presentable_rgba8(i, background, palette)
+                pixels = self.drawing.presentable_rgba8(i, background, view, palette)
                 self._resolve.copy(pixels, framebuffer)
             else:
                 unit = 1.0 if self._debug else self.drawing.unit_of(i)
-                self._resolve.draw(image, framebuffer, background, palette, heat, unit)
+                self._resolve.draw(image, framebuffer, background, palette, heat, unit, view)
 
     def coverage(self, i: int = 0) -> moderngl.Texture | np.ndarray:
         """How much splats hide of what is behind them in view i, as drawn: the alpha of a GL

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+from shapeshift.scene.appearance import Background, Sky, check_color
+
 ORDERS = ("depth", "distance")
 KEY_BITS = (16, 32)
 STEREO_SORTS = ("shared", "each")
@@ -23,7 +25,7 @@ class RenderSettings:
     # The pixel
     min_alpha: float = 1 / 255  # a pixel's alpha below this is not drawn (3DGS)
     low_pass: float = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
-    background: tuple[float, float, float] = (0.0, 0.0, 0.0)  # display sRGB
+    background: Background = (0.0, 0.0, 0.0)  # display sRGB, or a sky
     # What quads blend into (renderer/gl/target.py); tiles blend float32 in registers.  auto: 16
     # bits from 0 to the scene's brightest colour, half floats where that is over 64 or not bounded.
     target: str = "auto"
@@ -63,9 +65,8 @@ class RenderSettings:
             if getattr(self, name) not in choices:
                 text = ", ".join(repr(c) for c in choices)
                 raise ValueError(f"{name} is {getattr(self, name)!r}; choose one of {text}.")
-        if not (len(self.background) == 3 and all(0 <= c <= 1 for c in self.background)):
-            text = f"background is {self.background}"
-            raise ValueError(f"{text}, expected three values of display sRGB from 0 to 1.")
+        if not isinstance(self.background, Sky):
+            check_color(self.background, "background")
         for name, least, most in (
             ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
             ("min_transmittance", 1e-6, 0.1), ("depth_scale", 0.0, 1.0),

@@ -58,7 +58,7 @@ class Picker:
         depths, alphas, owners = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, int)]
         splats = [np.zeros(0, int)]
         for index, obj in enumerate(scene.objects):
-            if not obj.visible:
+            if not obj.seen:
                 continue
             object_from_world = np.linalg.inv(obj.world_from_object.matrix())
             eye = object_from_world[:3, :3] @ origin + object_from_world[:3, 3]

@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
+from shapeshift.scene.appearance import NEUTRAL, Appearance
 from shapeshift.scene.pose import UNIT_SLACK, Pose
 from shapeshift.scene.selectors.selector import Selector
 
@@ -34,6 +35,12 @@ class SceneObject:
     visible: bool = True
     selectors: tuple[Selector, ...] = ()  # parts with an x of their own; a later one lies above
     tint: Tint | None = None  # no look of its own: which object it is, what of it is chosen
+    appearance: Appearance = NEUTRAL  # what of its own look is shown how
+
+    @property
+    def seen(self) -> bool:
+        """Whether anything of it is drawn."""
+        return self.visible and self.appearance.opacity > 0
 
     @property
     def slider_x(self) -> float:

@@ -40,6 +40,7 @@ _NAMES_OF = {
     "runtime_models.model": ("AnchorModel", "BadFile", "ScaffoldModel", "SplatLayers", "Stop"),
     "runtime_models.splats.plain_splats": ("PlainSplats",),
     "runtime_models.stop_weights": ("StopWeights",),
+    "scene.appearance": ("Appearance", "Sky"),
     "scene.cameras.camera_list": ("CameraList",),
     "scene.metrics": ("psnr", "ssim"),
     "scene.pose": ("Pose", "View", "look_at", "perspective"),

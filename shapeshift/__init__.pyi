@@ -31,6 +31,8 @@ from shapeshift.runtime_models.model import SplatLayers as SplatLayers
 from shapeshift.runtime_models.model import Stop as Stop
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats as PlainSplats
 from shapeshift.runtime_models.stop_weights import StopWeights as StopWeights
+from shapeshift.scene.appearance import Appearance as Appearance
+from shapeshift.scene.appearance import Sky as Sky
 from shapeshift.scene.cameras.camera_list import CameraList as CameraList
 from shapeshift.scene.metrics import psnr as psnr
 from shapeshift.scene.metrics import ssim as ssim

@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import subprocess
+import warnings
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,15 @@ def own_settings(tmp_path_factory):
         for name in ("XDG_CONFIG_HOME", "APPDATA"):
             patch.setenv(name, str(folder))
         yield folder
+
+
+@pytest.fixture(autouse=True)
+def no_hurry():
+    """A test that leaves this process in a realtime class starves all others, its children too."""
+    yield
+    if hasattr(os, "sched_getscheduler") and os.sched_getscheduler(0) != os.SCHED_OTHER:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        warnings.warn("this test left the process in a realtime class", stacklevel=1)
 
 
 @pytest.fixture(scope="session")

@@ -41,7 +41,7 @@ def step_memory(layout: HeadLayout, form: str = "cpu") -> StepMemory:
     loss_planes = {"cpu": 18, "gpu": 24}[form]  # windowed maps, and a value a pixel
     return StepMemory(
         anchor=FLOAT * (by_anchor + k * by_splat),
-        slot=FLOAT * (RECORD + {"cpu": 1, "gpu": 4}[form]),  # the sort by tile has two of each
+        slot=FLOAT * (RECORD + {"cpu": 2, "gpu": 4}[form]),  # blocks; the sort has two of each
         pixel=FLOAT * (4 + 3 + loss_planes),
         photo_pixel=FLOAT * (9 + 1),  # the photo, its windowed maps, its bytes
         rest=FLOAT * ((5 + CHUNKS[form]) * weights + (8 << LOW_BITS)),

@@ -13,6 +13,7 @@ from shapeshift.app.charts.chart_settings import Named, changed_settings, render
 from shapeshift.app.charts.comparison import MOST_DB, exact
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.scene.appearance import Background
 from shapeshift.scene.metrics import psnr, ssim
 from shapeshift.scene.pose import View
 from shapeshift.scene.stereo import stereo_pair
@@ -57,7 +58,7 @@ class Pricing:
 
     def __init__(
         self, renderers: tuple[Renderer, Renderer], ctx: moderngl.Context | None,
-        chart_scene: ChartScene, background: tuple[float, float, float],
+        chart_scene: ChartScene, background: Background,
     ) -> None:  # fmt: skip
         self._exact, self._trial = renderers
         self._ctx, self._stage, self._background = ctx, chart_scene, background

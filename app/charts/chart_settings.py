@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, fields, replace
 from shapeshift.app.charts.comparison import exact
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.appearance import Background
 
 EXACT = "exact"
 # Fields that a drawing does not read: a setting with one of them is left out of its chart.
@@ -131,7 +132,7 @@ def named_settings(name: str, drawing: str) -> Named:
 
 
 def render_settings(
-    named: Named, background: tuple[float, float, float], drawing: str, distances: Distances
+    named: Named, background: Background, drawing: str, distances: Distances
 ) -> RenderSettings:
     """What to draw a row with.  Shortcuts blend into 16 bits, as the viewer does."""
     plain = exact(RenderSettings(background=background), drawing)

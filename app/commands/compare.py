@@ -179,7 +179,7 @@ def drawn_views(options: Options, views: list, a, b) -> Iterator[Compared]:
             yield Compared(file.stem, draw_a(view.resized(size)), picture)
 
 
-def artist(renderer, side, background: tuple[float, float, float]):
+def artist(renderer, side, background):
     """view -> (H, W, 3): the side's scene alone in this renderer."""
     from dataclasses import replace
 

@@ -45,6 +45,17 @@ class Options(ReadingOptions):
     background: tuple[float, float, float] | None = None
     """Red, green and blue behind everything, 0 to 1 as displayed.  Default: what the scene was
     trained on, else black."""
+    sky: Annotated[tuple[str, str, str] | None, Opt(metavar="COLOR")] = None
+    """Instead of one colour those at the zenith, the horizon and the ground, each as RRGGBB.
+    Default: the scene file's sky, if it has one."""
+    exposure: float = 0.0
+    """Stops of light by which the whole scene is brighter; measured heat keeps its colours."""
+    gamma: float = 1.0
+    """Above 1 dark tones are brighter, below 1 darker."""
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Red, green and blue by which all colours are multiplied."""
+    opacity: float = 1.0
+    """By which the opacity of every splat is multiplied, 0 to 1."""
     drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
     """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
     context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
@@ -93,9 +104,11 @@ def run(options: Options) -> int:
     from shapeshift.app.decomposition.show_views import show_objects
     from shapeshift.app.drawing import (
         MOST_VALUES,
+        appearing,
         make_folder,
         open_renderer,
         parse_size,
+        read_look,
         split_controls,
     )
     from shapeshift.app.errors import UsageError
@@ -104,8 +117,7 @@ def run(options: Options) -> int:
     size = parse_size(options.size) if options.size else None
     if not 1 <= options.frames <= MOST_VALUES:
         raise UsageError(f"--frames is {options.frames}, expected 1 to {MOST_VALUES}.")
-    if options.background and not all(0 <= c <= 1 for c in options.background):
-        raise UsageError(f"--background is {options.background}, expected three values in 0..1.")
+    appearance, backdrop = read_look(options)
     if not 0 <= options.stereo < 1:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
     settings, budget = choose_settings(options), read_budget(options.target_ms, options.floor_db)
@@ -120,10 +132,12 @@ def run(options: Options) -> int:
     subjects = [document_at(document, each) for each in controls]
     labels = [label_of(each, s.x) for each, s in zip(controls, subjects, strict=True)]
     rows, paths = choose_paths(options, labels, count)
-    shown = [show_objects(subject.scene, options.show) for subject in subjects]
+    shown = [
+        appearing(show_objects(subject.scene, options.show), appearance) for subject in subjects
+    ]
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
-        background = options.background or document.background
+        background = backdrop or document.background
         renderer.settings = replace(
             settings, target=renderer.settings.target, background=background
         )

@@ -51,6 +51,7 @@ def run(options: Options) -> int:
     from shapeshift.app.drawing import make_folder, open_renderer, parse_size
     from shapeshift.app.stability_cases.case_context import CaseContext
     from shapeshift.app.stability_cases.table import open_table
+    from shapeshift.scene.appearance import plain_color
 
     size = parse_size(options.size)
     names = choose_cases(options)
@@ -65,8 +66,9 @@ def run(options: Options) -> int:
             options.out, command_line(), subject(options, renderer, scene), options.overwrite
         )
         case = CaseContext(
-            renderer, ctx, scene, size, reopen, scene.background, options.steps, options.rounds
-        )
+            renderer, ctx, scene, size, reopen, plain_color(scene.background), options.steps,
+            options.rounds,
+        )  # fmt: skip
         perform(case, names, table)
     print_table(table, names)
     failed = [name for name in names if table.failed(name)]

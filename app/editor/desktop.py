@@ -15,6 +15,7 @@ from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.levels import attach_refiner
+from shapeshift.app.editor.window.shell import speak_first
 from shapeshift.app.editor.window.split import splitting
 from shapeshift.app.editor.window.viewer import Viewer
 from shapeshift.app.editor.window.window import Window
@@ -51,10 +52,11 @@ def run(options: Options) -> int:
     settings = (
         ProgramSettings.read(config_folder()) if options.screenshot is None else ProgramSettings()
     )
+    speak_first(settings, state.messages)
     with refiner, state.bodies, Window("Shapeshift", size, settings.text_size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             if not options.size and options.screenshot is None:
-                window.grow_with_text()
+                window.stand(settings.place)
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, state, options, settings, own_files)
             hooks, upload = viewer.hooks, viewer.shown.upload
@@ -71,6 +73,7 @@ def run(options: Options) -> int:
                 )  # fmt: skip
             with two, viewer.parts.finder:
                 viewer.loop()
+            viewer.shell.keep_place()
     return 0
 
 

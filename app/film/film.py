@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from shapeshift.app.film.draw_film import FrameForm
     from shapeshift.app.film.film_plan import Clock, FilmPlan
     from shapeshift.app.film.frame_folder import FrameFolder
+    from shapeshift.scene.appearance import Background
     from shapeshift.scene.cameras.camera_list import CameraList
     from shapeshift.scene.film.film_path import FilmPath
 
@@ -300,11 +301,12 @@ def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameF
     """Makes the folder of frames ready.  Raises UsageError."""
     from shapeshift.app.drawing import make_folder
     from shapeshift.app.film.frame_folder import film_key, frame_facts
+    from shapeshift.scene.document.appearance_rows import background_row
     from shapeshift.scene.film.film_file import write_film_file
 
     drawing = {
         "size": list(plan.size), "stereo": form.eye_distance, "supersample": form.supersample,
-        "depth_unit": form.depth_unit, "background": list(background_of(options, plan)),
+        "depth_unit": form.depth_unit, "background": background_row(background_of(options, plan)),
         "drawing": options.drawing, "context": options.context,
     }  # fmt: skip
     reading = {name: getattr(options, name) for name in ReadingOptions.__dataclass_fields__}
@@ -320,7 +322,7 @@ def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameF
         write_film_file(film_of(plan.document, plan), options.save_path)
 
 
-def background_of(options: Options, plan: "FilmPlan") -> tuple[float, float, float]:
+def background_of(options: Options, plan: "FilmPlan") -> "Background":
     return options.background or plan.document.background
 
 

@@ -110,9 +110,30 @@ def encode(path: Path, frames: Sequence[Path], fps: Fraction, codec: str, done: 
                 fill(plane, values)
             picture.pts = number
             picture.time_base = 1 / fps
-            container.mux(stream.encode(picture))
+            packets = stream.encode(picture)
+            if number == 0:
+                leave_realtime()
+            container.mux(packets)
             done(number)
         container.mux(stream.encode())
+
+
+def leave_realtime() -> None:
+    """Takes this process' threads back out of the realtime class, with none of its own.
+
+    SVT-AV1 puts them, and whoever calls it, into SCHED_FIFO at 99 where it may (as root, so in most
+    containers); everything else on the machine would stand still, children that are started later
+    among it.
+    """
+    tasks = Path("/proc/self/task")
+    if not hasattr(os, "sched_setscheduler") or not tasks.is_dir():
+        return
+    for task in [int(folder.name) for folder in tasks.iterdir()]:
+        try:
+            if os.sched_getscheduler(task) in (os.SCHED_FIFO, os.SCHED_RR):
+                os.sched_setscheduler(task, os.SCHED_OTHER, os.sched_param(0))
+        except ProcessLookupError:
+            pass  # this thread has ended
 
 
 def fill(plane: Any, values: np.ndarray) -> None:

@@ -14,6 +14,7 @@ from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.resolution import Resolution
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.appearance import Background
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 
@@ -48,7 +49,7 @@ class Pacing:
     """
 
     def __init__(
-        self, background: tuple[float, float, float], quality: str = AUTO,
+        self, background: Background, quality: str = AUTO,
         floor_db: float = FLOOR_DB, target_ms: float | None = None, stereo_colors: str = AUTO,
     ) -> None:  # fmt: skip
         self.quality, self.floor_db, self._fixed_ms = quality, floor_db, target_ms

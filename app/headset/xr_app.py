@@ -23,6 +23,7 @@ from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
+from shapeshift.scene.appearance import plain_color
 from shapeshift.scene.pose import View
 from shapeshift.scene.world.record import Record
 from shapeshift.vr.card import Card
@@ -222,7 +223,8 @@ class XrApp:
             self.renderer.present(framebuffer, i)
             if self.state.floor_shown:
                 grid = Grid(self._level_m, self._clearness)
-                behind, hidden = self.background, self.renderer.coverage(i)
+                behind = plain_color(self.background)
+                hidden = self.renderer.coverage(i)
                 floor = self.eyes.floor
                 floor.draw(framebuffer, play_views[i], self.state.play_space, hidden, grid, behind)
             self.eyes.overlay.draw(framebuffer, play_views[i], over, depths and depths[i])

@@ -18,6 +18,7 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
 from shapeshift.runtime_models.web.limits import COLOR_BITS, MOST_SPLATS
 from shapeshift.runtime_models.web.web_model import control_entry, describe_model
 from shapeshift.runtime_models.web.write_container import Container
+from shapeshift.scene.appearance import plain_color
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document.scene_file import SceneItem, named_stops
 from shapeshift.scene.scene import Scene, SceneObject
@@ -98,7 +99,7 @@ def described(
     return {
         "title": settings.title,
         "profile": settings.profile,
-        "background": [float(c) for c in document.background],
+        "background": [float(c) for c in plain_color(document.background)],
         "brightest": brightest_of(models),
         "radius": float(radius),
         "view": {"eye": eye.tolist(), "target": (eye - ahead * axes[:3, 2]).tolist(),
@@ -200,7 +201,7 @@ def stop_pictures(document: Document, progress: Progress) -> dict[float, str]:
     stops = [stop.x for stop in document.scene.objects[0].model.stops][:MOST_PICTURES]
     found = {}
     with Renderer(None, sort="numpy") as renderer:
-        renderer.settings = replace(renderer.settings, background=document.background)
+        renderer.settings = replace(renderer.settings, background=plain_color(document.background))
         for number, x in enumerate(stops):
             progress("drawing pictures of the stops", number / (len(stops) + 1))
             objects = tuple(replace(obj, x=x) for obj in document.scene.objects)

@@ -5,9 +5,11 @@
 //   C = sum of c alpha T,  T the product of 1 - alpha of what lies before
 // Early stop: blocks whose transmittance is below STOP everywhere are dropped from the mask every
 // BATCH intersections; a tile ends with its last block.
-// Reads:   tile_start (tiles + 1), intersections, record (N, 12); backward also tile_end, the
-//          image, its transmittance and the gradients of both, tile_bounds and first_slot.
-// Writes:  image (3, H, W), transmittance (H, W), tile_end; backward the slots (count, 12).
+// Reads:   tile_start (tiles + 1), intersections, record (N, 12); backward also tile_end,
+//          drawn_blocks, the image, its transmittance and the gradients of both, tile_bounds and
+//          first_slot.
+// Writes:  image (3, H, W), transmittance (H, W), tile_end and, an intersection each, drawn_blocks:
+//          a bit for each block that it was drawn in; backward the slots (count, 12).
 // Units:   pixels, row 0 on top; display sRGB; transmittance 0..1; depths in metres.
 #include "common/vector.cl"
 #include "common/raster.cl"
@@ -32,7 +34,7 @@ inline Depth8 depth_under(const float8 f, float8 dx, float8 dy) {
 #endif
 
 // SURFACE: with a depth a splat (surface.cl), metres become the sum of alpha T z.
-__kernel void rasterize(RASTERIZE_TAKES) {
+__kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
 #ifdef SURFACE
@@ -64,7 +66,9 @@ __kernel void rasterize(RASTERIZE_TAKES) {
       const float8 f = vload8(intersections[p + j], surface);
 #endif
       // Only blocks that are open and that the ellipse touches.
-      for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
+      const uint drawn = open & batch.blocks[j];
+      drawn_blocks[p + j] = drawn;
+      for (uint left = drawn; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
         // power here is log2 of exp(-power / 2): largest at the mean, `least` at the threshold.
@@ -127,7 +131,8 @@ __kernel void rasterize(RASTERIZE_TAKES) {
 // For densification: ABSOLUTE sums |gradient of the mean| in slots 9 and 10 (AbsGS), or SHARE sums
 // alpha T times an error of the pixel in 9; WEIGHT sums alpha T in 11.  Each only where it is
 // defined.
-__kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
+__kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
+                                 __global const uint* drawn_blocks) {
   const int tile = get_global_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
@@ -185,19 +190,18 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
     grad_z[k] = vload8(0, z);
 #endif
   }
-  Batch batch;
-  uint open = 0xffffffffu;
+  float splats[BATCH * RECORD];
   const int end = tile_end[tile], last_intersection = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end; p += BATCH) {
-    // The batches of the forward pass: blocks close at the same intersections.
-    const int n = fetch(p, end, x0, y0, intersections, record, &batch);
-    int slot[BATCH];  // ahead of use, so that these misses overlap, too
+    const int n = min(BATCH, end - p);
+    int slot[BATCH];  // ahead of use, as the records, so that these misses overlap
     for (int j = 0; j < n; j++) {
       const int splat = intersections[p + j];
+      copy_record(record, splat, splats + RECORD * j);
       slot[j] = first_slot[splat] + rank_of_tile(tile_bounds[splat], tile_x, tile_y);
     }
     for (int j = 0; j < n; j++) {
-      const float* s = batch.splats + RECORD * j;
+      const float* s = splats + RECORD * j;
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
@@ -212,7 +216,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
       float8 by_uu = 0, by_uv = 0, by_vv = 0, by_low = 0, by_high = 0;
 #endif
       // The same blocks in the same order as in the forward pass, so the same T.
-      for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
+      for (uint left = drawn_blocks[p + j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
         const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
@@ -298,8 +302,6 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
 #endif
       vstore4((float4)(sum8(sum_b), sum8(extra_x), sum8(extra_y), sum8(sum_w)), 0, out + 8);
     }
-    // The very test of the forward pass, at the same intersection.
-    open = still_open(open, T);
   }
   // Slots are not cleared beforehand: every intersection writes its own.
   for (int p = end; p < last_intersection; p++) {  // behind the early stop: nothing is felt there

@@ -50,7 +50,7 @@ def shared_is_enough(scene: Scene, looks: list[EyeColors], views: list[View]) ->
     """Whether nobody sees that colours are those of the middle of the eyes; a look an object."""
     eyes_world = np.array([view.world_from_eye.position for view in views])
     for obj, look in zip(scene.objects, looks, strict=True):
-        if obj.visible:
+        if obj.seen:
             object_from_world = np.linalg.inv(obj.world_from_object.matrix())
             eyes = eyes_world @ object_from_world[:3, :3].T + object_from_world[:3, 3]
             if not look.shared_db(eyes) >= SHARED_DB:
@@ -62,7 +62,7 @@ def drawn_together(scene: Scene, views: int, own_colors: bool) -> list[slice]:
     """Which views of a frame are decoded and drawn at once: all of them, but one by one where each
     eye is to see its own splats of a model whose shape follows the eye.
     """
-    follows = any(obj.visible and follows_eye(obj.model) for obj in scene.objects)
+    follows = any(obj.seen and follows_eye(obj.model) for obj in scene.objects)
     if own_colors and follows:
         return [slice(i, i + 1) for i in range(views)]
     return [slice(0, views)]

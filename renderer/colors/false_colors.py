@@ -18,6 +18,7 @@ from shapeshift.renderer.colors.palette import LUMINANCE, palette_values
 from shapeshift.runtime_models.evaluate import colors_follow_control
 from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, StopWeights, same_controls
+from shapeshift.scene.appearance import NEUTRAL
 from shapeshift.scene.scene import Scene
 
 NO_HEAT, PICTURE, BESIDE, SPLATS = "no heat", "picture", "beside", "splats"  # ways to show it
@@ -84,10 +85,10 @@ def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
     shown = [
         shade
         for obj, shade in zip(scene.objects, shades, strict=True)
-        if obj.visible and obj.model.splat_count
+        if obj.seen and obj.model.splat_count
     ]
     names = {heat.palette for shade in shown for heat in shade.heats}
-    tinted = any(obj.visible and obj.tint is not None for obj in scene.objects)
+    tinted = any(obj.seen and obj.tint is not None for obj in scene.objects)
     if len(names) == 1 and all(shade.pure for shade in shown) and not tinted:
         plain = [
             Shade(x if colors_follow_control(obj.model) else 0.0)
@@ -149,21 +150,26 @@ def _shade_of_layers(model: SplatLayers, rows: np.ndarray, thermal: list[int]) -
 
 
 ColorAt = Callable[[Controls], np.ndarray]  # (N, 3) display sRGB as decoded at a control
+Grade = Callable[[np.ndarray], np.ndarray]  # of colours (N, 3)
 
 
-def split_colors(shade: Shade, count: int, color_at: ColorAt) -> tuple[np.ndarray, np.ndarray]:
+def split_colors(
+    shade: Shade, count: int, color_at: ColorAt, grade: Grade = NEUTRAL.graded
+) -> tuple[np.ndarray, np.ndarray]:
     """(N, 3) what of the colours is not heat, and (N, 2) value times weight, and weight: the slow
-    twin of the heat passes.
+    twin of the heat passes.  grade: of the appearance, for what is not heat.
     """
     heat = np.zeros((count, 2))
     for part in shade.heats:
         weights = _of_splats(part.weights, count)
         value = np.where(weights > 0, color_at(part.control) @ LUMINANCE, 0)
         heat += weights[:, None] * np.stack([value, np.ones(count)], axis=1)
-    return _kept(shade, heat, color_at), heat
+    return _kept(shade, heat, color_at, grade), heat
 
 
-def mixed_colors(shade: Shade, count: int, color_at: ColorAt) -> np.ndarray:
+def mixed_colors(
+    shade: Shade, count: int, color_at: ColorAt, grade: Grade = NEUTRAL.graded
+) -> np.ndarray:
     """(N, 3) display sRGB with each splat's heat in the colours of its palettes."""
     heat, colors = np.zeros((count, 2)), np.zeros((count, 3))
     for part in shade.heats:
@@ -171,15 +177,15 @@ def mixed_colors(shade: Shade, count: int, color_at: ColorAt) -> np.ndarray:
         false = palette_values(color_at(part.control) @ LUMINANCE, part.palette)
         colors += np.where(weights[:, None] > 0, weights[:, None] * false, 0)
         heat[:, 1] += weights
-    return _kept(shade, heat, color_at) + colors
+    return _kept(shade, heat, color_at, grade) + colors
 
 
-def _kept(shade: Shade, heat: np.ndarray, color_at: ColorAt) -> np.ndarray:
+def _kept(shade: Shade, heat: np.ndarray, color_at: ColorAt, grade: Grade) -> np.ndarray:
     """(N, 3) the colours that are not heat, times what is left for them."""
     kept = np.maximum(1 - heat[:, 1:], 0)
     rest = np.zeros((len(heat), 3))
     if shade.rest is not None:
-        rest = np.where(kept > 0, kept * color_at(shade.rest), 0)
+        rest = np.where(kept > 0, kept * grade(color_at(shade.rest)), 0)
     return np.where(np.isfinite(heat[:, :1]), rest, np.nan)
 
 

@@ -13,7 +13,7 @@ class Heater:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._add, self._blend = (gpu.compute("heat.comp", BLEND=blend) for blend in (0, 1))
+        self._add, self._blend = (gpu.compute("colors/heat.comp", BLEND=blend) for blend in (0, 1))
         self._palette = gpu.reserve(16 * 256, "palette")
         self._weights: moderngl.Buffer | None = None
 

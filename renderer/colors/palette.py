@@ -6,6 +6,8 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_weights import Controls, StopBlend
+from shapeshift.scene.appearance import Background, Color, Sky
+from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, used on display values
@@ -57,7 +59,7 @@ def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
     """
     best: tuple[str, float, Stop | None] = ("", 0.0, None)
     for obj in scene.objects:
-        for x in (obj.x, *(selector.x for selector in obj.selectors)) if obj.visible else ():
+        for x in (obj.x, *(selector.x for selector in obj.selectors)) if obj.seen else ():
             weights, stop = thermal_weights(obj.model.blend, x)
             if stop is not None and weights[0] > best[1]:
                 best = (stop.palette, float(weights[0]), stop)
@@ -103,21 +105,31 @@ def overlay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
     return out
 
 
+def behind(background: Background, view: View) -> np.ndarray:
+    """(3,) or (H, W, 3) float32 display sRGB: what a view has behind everything."""
+    if isinstance(background, Sky):
+        return background.picture(view)
+    return np.asarray(background, np.float32)
+
+
 def over_background(
-    rgba: np.ndarray, background: tuple[float, float, float], out: np.ndarray | None = None
+    rgba: np.ndarray, background: np.ndarray | Color, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """(H, W, 3) of premultiplied (H, W, 4): what is seen before a background, display sRGB.
+    """(H, W, 3) of premultiplied (H, W, 4): what is seen before a background, display sRGB, of
+    (3,) or (H, W, 3).
 
     out: written to and given back, where there is one.  A channel and some rows at a time: the
     loops over three numbers that numpy would make of the whole take four times as long.
     """
     if out is None:
         out = np.empty((*rgba.shape[:2], 3), rgba.dtype)
+    shown = np.asarray(background, np.float32)
     for first in range(0, len(rgba), ROWS):
         part = rgba[first : first + ROWS]
         through = 1 - part[..., 3]
-        for c, behind in enumerate(np.asarray(background, np.float32)):
-            out[first : first + ROWS, :, c] = part[..., c] + through * behind
+        here = shown[first : first + ROWS] if shown.ndim == 3 else shown
+        for c in range(3):
+            out[first : first + ROWS, :, c] = part[..., c] + through * here[..., c]
     return out
 
 

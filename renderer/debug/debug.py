@@ -189,7 +189,7 @@ def opaque(picture: np.ndarray) -> np.ndarray:
 def object_poses(scene: Scene) -> np.ndarray:
     """(O, 4, 4) world_from_object, NaN where hidden."""
     nowhere = np.full((4, 4), np.nan)
-    poses = [o.world_from_object.matrix() if o.visible else nowhere for o in scene.objects]
+    poses = [o.world_from_object.matrix() if o.seen else nowhere for o in scene.objects]
     return np.reshape(poses, (-1, 4, 4))
 
 

@@ -183,6 +183,24 @@ class Arena:
         if end > start:
             self.color.write(rows, offset=16 * start)
 
+    def read_opacity(self, i: int) -> np.ndarray:
+        """(n,) of object i."""
+        return self._mean_opacity_of(i)[:, 3]
+
+    def write_opacity(self, i: int, opacity: np.ndarray) -> None:
+        """Other opacities (n,) of object i; its means stay."""
+        rows = self._mean_opacity_of(i)
+        rows[:, 3] = opacity
+        if len(rows):
+            self.mean_opacity.write(rows, offset=16 * self.starts[i])
+
+    def _mean_opacity_of(self, i: int) -> np.ndarray:
+        start, end = self.starts[i], self.starts[i + 1]
+        if end == start:
+            return np.zeros((0, 4), np.float32)
+        data = self.mean_opacity.read(16 * (end - start), offset=16 * start)
+        return np.frombuffer(data, np.float32).reshape(-1, 4).copy()
+
     def write_heat(self, i: int, heat: np.ndarray) -> None:
         """Uploads what thermal stops have in the colours of object i, (n, 4), to the set in use."""
         start, end = self._rows(i, heat, "heats")

@@ -2,17 +2,19 @@
 
 import numpy as np
 
+from shapeshift.renderer import layout
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.heat import Heater
 from shapeshift.renderer.colors.palette import palette_colors
-from shapeshift.renderer.gl.buffers import Arena
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.buffers import Arena, bind
+from shapeshift.renderer.gl.gpu import Gpu, groups_for
 from shapeshift.renderer.gl.layers import Layers
 from shapeshift.renderer.gl.networks import GlNetworks
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.appearance import Appearance
 
 MLPS = ("gl", "onnxruntime")
 
@@ -75,12 +77,13 @@ class Decoder:
         eye: np.ndarray,
         seen: np.ndarray | None = None,
         at_once: bool = False,
+        grade: Appearance | None = None,
     ) -> None:
         """Colours of object i towards an eye (3,) in the object's frame, and what of them is heat;
         after geometry.
 
         seen: (A,) bool; the rest may keep what it has (compute passes colour all at once).
-        at_once: the heat becomes colours of its palettes here.
+        at_once: the heat becomes colours of its palettes here.  grade: of what is not heat.
         """
         heater = self._heater
         for number, heat in enumerate(shade.heats):
@@ -91,12 +94,25 @@ class Decoder:
         layers = isinstance(self._models[i], Layers)
         if shade.rest is not None and not (shade.heats and layers):
             self.color(i, shade.rest, eye, seen)
+        if grade is not None and shade.rest is not None:
+            self._grade(i, grade)
         if i in self._colors:
             self._colors[i].forget_after(self._arena.set, len(shade.heats))
         if heater is not None and shade.heats:
             heater.blend(self._arena, i, at_once)
         else:
             self._arena.clear_heat(i)
+
+    def _grade(self, i: int, grade: Appearance) -> None:
+        """The appearance of colours that were just decoded."""
+        arena, program = self._arena, self._gpu.compute("colors/grade.comp")
+        rows = arena.starts[i + 1] - arena.starts[i]
+        if rows:
+            bind(color=arena.color)
+            self._gpu.run(
+                program, groups_for(rows, layout.WORKGROUP), count=rows, start=arena.starts[i],
+                gain=tuple(grade.gain), power=grade.power,
+            )  # fmt: skip
 
     def color(
         self,

@@ -19,7 +19,7 @@ class Layers:
         self._gpu, self._model = gpu, model
         self._weigh = gpu.compute("weigh.comp", OWN_CONTROL=0)
         self._own_weights: moderngl.Buffer | None = None  # (N,), made when splats differ in x
-        self._shade = gpu.compute("shade_sh.comp")
+        self._shade = gpu.compute("colors/shade_sh.comp")
         count, coefficients, _ = model.sh.shape
         self._coefficients = coefficients
         self._opacity = gpu.upload(np.asarray(model.opacity, np.float32))

@@ -33,6 +33,7 @@ from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import View
 
 
@@ -53,7 +54,9 @@ class QuadsDrawing(Drawing):
         self._sort_policy = SortPolicy()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
         self._models: list[Model] = []
-        self._most: float | None = None  # brightest colour of these; None: not known yet
+        self._most: list[float] = []  # brightest colour of each of these; []: not known yet
+        self._grades: dict[int, Appearance | None] = {}  # of objects whose colours are graded
+        self._own_opacity: dict[int, np.ndarray] = {}  # as decoded, where the arena has others
         self._last = 0  # row of the counts of the view drawn last
         self.draws_heat = False  # in addition to the colours, from the next frame on
         self.arena: Arena  # these two from allocate() on
@@ -68,7 +71,8 @@ class QuadsDrawing(Drawing):
     def allocate(self, models: list[Model]) -> None:
         self._release_arena()
         self._changed = True
-        self._models, self._most = models, None
+        self._models, self._most = models, []
+        self._grades, self._own_opacity = {}, {}
         counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
         self.arena = Arena(self._gpu, counts, antialiased)
         self._decoder = Decoder(self._gpu, self.arena, models, self._mlps)
@@ -86,6 +90,7 @@ class QuadsDrawing(Drawing):
         seen: np.ndarray | None = None,
     ) -> None:
         self._changed = True
+        self._own_opacity.pop(i, None)
         self._decoder.geometry(i, x, eye_object, seen)
 
     def color_set(self, which: int, count: int) -> None:
@@ -98,8 +103,16 @@ class QuadsDrawing(Drawing):
         eye_object: np.ndarray,
         seen: np.ndarray | None = None,
         at_once: bool = False,
+        grade: Appearance | None = None,
     ) -> None:
-        self._decoder.shade(i, shade, eye_object, seen, at_once)
+        self._grades[i] = grade
+        self._decoder.shade(i, shade, eye_object, seen, at_once, grade)
+
+    def scale_opacity(self, i: int, factor: float) -> None:
+        if i not in self._own_opacity:
+            self._own_opacity[i] = self.arena.read_opacity(i)
+        self.arena.write_opacity(i, self._own_opacity[i] * np.float32(factor))
+        self._changed = True
 
     def wait_decoded(self) -> None:
         """Nothing: GL keeps the order of the passes itself."""
@@ -186,10 +199,14 @@ class QuadsDrawing(Drawing):
         return self._projector.counts(self.arena, self._last)
 
     def _brightest(self) -> float:
-        """The largest colour of the scene, found out once."""
-        if self._most is None:
-            self._most = brightest(self._models)
-        return self._most
+        """The largest colour of the scene; of its models found out once."""
+        self._most = self._most or [brightest([model]) for model in self._models]
+        graded = [
+            float(grade.graded(np.full(3, most)).max()) if grade is not None else most
+            for i, most in enumerate(self._most)
+            for grade in [self._grades.get(i)]
+        ]
+        return max([1.0, *graded])
 
     def presentable(self, i: int) -> moderngl.Texture:
         return self._splatter.texture(i)

@@ -4,6 +4,8 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.scene.appearance import Background, Sky, up_of_eye
+from shapeshift.scene.pose import View
 
 STEPS = 256  # colours of a palette
 
@@ -25,17 +27,19 @@ class Resolve:
         self,
         source: moderngl.Texture | np.ndarray,
         framebuffer: moderngl.Framebuffer,
-        background: tuple[float, float, float],
+        background: Background,
         palette: np.ndarray | None = None,
         heat: moderngl.Texture | np.ndarray | None = None,
         unit: float = 1.0,
+        view: View | None = None,
     ) -> None:
         """Fills the framebuffer's viewport: palette applied, over the background.
 
         source: premultiplied; a texture has row 0 at the bottom, an array (H, W, 4) on top.
         palette: (256, 3) display sRGB; None: the colours are final.  heat: of the same kind as
         source, value and weight times alpha first, of which the palette makes colours; None: it
-        makes them of the source.  unit: the display value that 1 in these stands for.
+        makes them of the source.  unit: the display value that 1 in these stands for.  view: whose
+        directions a sky is seen in.
         """
         from_array = isinstance(source, np.ndarray)
         images = [source] if heat is None or palette is None else [source, heat]
@@ -57,7 +61,7 @@ class Resolve:
         program["image"].value, program["palette"].value, program["heat"].value = 0, 1, 2
         program["use_palette"].value = palette is not None
         program["use_heat"].value = len(textures) > 1
-        program["background"].value = tuple(background)
+        set_background(program, background, view)
         program["top_first"].value, program["unit"].value = from_array, unit
         with self._gpu.drawing_into(framebuffer):
             self._gpu.ctx.enable_only(moderngl.NOTHING)
@@ -125,3 +129,16 @@ class Resolve:
 
     def __exit__(self, *failure) -> None:
         self.release()
+
+
+def set_background(program: moderngl.Program, background: Background, view: View | None) -> None:
+    """The uniforms of what is behind everything; a sky needs the view that it is seen in."""
+    program["has_sky"].value = isinstance(background, Sky)
+    if not isinstance(background, Sky):
+        program["background"].value = tuple(background)
+        return
+    assert view is not None, "a sky is seen from somewhere"
+    program["background"].value = background.horizon
+    program["zenith"].value, program["ground"].value = background.zenith, background.ground
+    program["tangents"].value = view.tangents
+    program["up"].value = tuple(up_of_eye(view))

@@ -11,6 +11,7 @@ from shapeshift.rasterizer.reference import blend, screen_covariance
 from shapeshift.renderer import layout
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
+    PICTURE,
     SPLATS,
     FalseColors,
     Shade,
@@ -21,7 +22,7 @@ from shapeshift.renderer.colors.false_colors import (
 from shapeshift.renderer.colors.palette import overlay_heat
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate
-from shapeshift.runtime_models.model import Model, is_antialiased
+from shapeshift.runtime_models.model import is_antialiased
 from shapeshift.runtime_models.rotation import normalize, rotation_matrices
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.control import control_of
@@ -90,7 +91,7 @@ def shaded_objects(
     found = [
         gate_object(obj, view, settings, eye, (colors.way, shade))
         for obj, shade in zip(scene.objects, colors.shades, strict=True)
-        if obj.visible
+        if obj.seen
     ]
     return found, colors
 
@@ -145,10 +146,11 @@ def gate_object(
         np.asarray(a, np.float64)
         for a in (splats.means, splats.scales, splats.wxyz, splats.opacity)
     )
-    color = shaded_color(obj.model, splats.color, eye_object, shading)
+    opacity = opacity * np.float32(obj.appearance.opacity)
+    color = shaded_color(obj, splats.color, eye_object, shading)
     turned = np.isfinite(wxyz).all(axis=1, keepdims=True)  # (N, 1)
     scales = np.where(turned, scales, np.nan)
-    if not obj.visible:
+    if not obj.seen:
         means = np.full_like(means, np.nan)
     with np.errstate(all="ignore"):  # splats that are not finite, or level with or behind the eye
         mean = means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres
@@ -173,19 +175,21 @@ def gate_object(
 
 
 def shaded_color(
-    model: Model, decoded: np.ndarray, eye: np.ndarray, shading: tuple[str, Shade] | None
+    obj: SceneObject, decoded: np.ndarray, eye: np.ndarray, shading: tuple[str, Shade] | None
 ) -> np.ndarray:
     """(N, 3) colours of splats towards an eye (3,) in the object's frame, or (N, 5) with heat."""
     way, shade = shading or ("", Shade(0.0))
+    model, grade = obj.model, obj.appearance.graded
 
     def color_at(control: Controls) -> np.ndarray:
         return evaluate(model, control, eye).color.astype(np.float64)
 
     if way == BESIDE:
-        return np.concatenate(split_colors(shade, model.splat_count, color_at), axis=1)
+        return np.concatenate(split_colors(shade, model.splat_count, color_at, grade), axis=1)
     if way == SPLATS:
-        return mixed_colors(shade, model.splat_count, color_at)
-    return np.asarray(decoded, np.float64)
+        return mixed_colors(shade, model.splat_count, color_at, grade)
+    color = np.asarray(decoded, np.float64)
+    return color if way == PICTURE else grade(color)
 
 
 def mip_compensation(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:

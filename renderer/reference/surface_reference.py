@@ -15,7 +15,7 @@ def reference_surface(scene: Scene, view: View, settings: RenderSettings | None 
     """The Surface of a view, float64: rays through ellipsoids by their inverses."""
     settings = settings or RenderSettings()
     eye = view.world_from_eye.position
-    found = [gate_object(o, view, settings, eye) for o in scene.objects if o.visible]
+    found = [gate_object(o, view, settings, eye) for o in scene.objects if o.seen]
     width, height = view.size
     metres, transmittance = np.zeros((height, width)), np.ones((height, width))
     normal = np.zeros((height, width, 3))

@@ -13,6 +13,7 @@ import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles, bin_tiles, sort_order
 from shapeshift.rasterizer.device import Device, open_device
+from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
@@ -30,11 +31,13 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
+from shapeshift.renderer.tiles.behind import behind
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import Model, SplatLayers, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View
 
 if TYPE_CHECKING:
@@ -50,6 +53,7 @@ class _Slot:
     evaluator: Evaluator
     sh: "Array | None"  # of coefficients; None: the colour comes from a network
     colors: ColorMemory
+    own_opacity: np.ndarray | None = None  # as decoded, where the arena has others
     placed: bool = False  # layers: the control value changes nothing but their opacity
 
 
@@ -116,7 +120,7 @@ class TilesDrawing(Drawing):
         seen: np.ndarray | None = None,
     ) -> None:
         slot = self._slots[i]
-        self._changed = True
+        self._changed, slot.own_opacity = True, None
         splats = slot.evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
         if slot.placed:
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
@@ -138,6 +142,7 @@ class TilesDrawing(Drawing):
         eye_object: np.ndarray,
         seen: np.ndarray | None = None,
         at_once: bool = False,
+        grade: Appearance | None = None,
     ) -> None:
         slot = self._slots[i]
         rows = slice(slot.start, slot.start + slot.count)
@@ -151,6 +156,8 @@ class TilesDrawing(Drawing):
             add_heat(self.device, *parts)
         if shade.rest is not None and not (shade.heats and slot.sh is not None):
             self._decode_color(slot, 0, shade.rest, eye_object, seen)
+        if grade is not None and shade.rest is not None:
+            grade_color(self.device, rows, self._color, grade.gain, grade.power)
         slot.colors.forget_after(self._set, len(shade.heats))
         if shade.heats:
             blend_heat(self.device, rows, self._color, kept, at_once)
@@ -167,6 +174,15 @@ class TilesDrawing(Drawing):
         else:
             key = (self._set, part)
             pack_color(self.device, slot.colors.at(key, x, eye, seen), slot.start, self._color)
+
+    def scale_opacity(self, i: int, factor: float) -> None:
+        slot = self._slots[i]
+        if slot.own_opacity is None:
+            rows = slice(slot.start, slot.start + slot.count)
+            slot.own_opacity = self.device.download(self._mean_opacity[rows])[:, 3].copy()
+        scaled = slot.own_opacity * np.float32(factor)
+        pack_opacity(self.device, scaled, slot.start, self._mean_opacity)
+        self._changed = True
 
     def wait_decoded(self) -> None:
         """Returns when what was decoded is there: once for all objects, not after each."""
@@ -318,10 +334,10 @@ class TilesDrawing(Drawing):
         return self._heat_images[i]
 
     def presentable_rgba8(
-        self, i: int, background: tuple[float, float, float], palette: np.ndarray | None = None
+        self, i: int, background: Background, view: View, palette: np.ndarray | None = None
     ) -> np.ndarray:
         heat = self._heat_images[i] if self.draws_heat else None
-        return resolve(self.device, self._images[i], background, palette, heat)
+        return resolve(self.device, self._images[i], behind(background, view), palette, heat)
 
     def presentable_depth(self, i: int) -> np.ndarray:
         return self._depths[i]

@@ -7,15 +7,22 @@ import re
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-import numpy as np
-
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
-from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, FirstView, SceneFile, SceneItem
+from shapeshift.scene.appearance import Appearance, Sky
+from shapeshift.scene.document.scene_file import (
+    BACKGROUND,
+    FAR_M,
+    FirstView,
+    NamedView,
+    SceneFile,
+    SceneItem,
+)
 from shapeshift.scene.pose import Pose
 
 LONGEST_NAME = 100  # letters, as the reader takes them
 MOST_OBJECTS = 1000  # as the reader takes them
+MOST_VIEWS = 100  # as the reader takes them
 DECIMALS, FINER = 6, 9  # of metres and of a quaternion: hands are no finer, files are short
 MOST_STEPS = 500  # that can be undone
 MOST_BYTES = 256 << 20  # of what the steps keep besides the file: painted regions of large scenes
@@ -119,13 +126,60 @@ def ground(file: SceneFile, floor_y: float | None) -> SceneFile:
     return file if floor_y == file.floor_y else replace(file, floor_y=floor_y)
 
 
-def look_from(file: SceneFile, eye: np.ndarray, target: np.ndarray, fov_y: float) -> SceneFile:
-    """With the first look from eye (3,) to target (3,).  ValueError for one straight up or down."""
-    first, second = (three(round(float(n), DECIMALS) for n in place) for place in (eye, target))
-    view = FirstView(first, second, fov_y)
-    if math.dist(view.eye[::2], view.target[::2]) < 1e-6:
-        raise ValueError("The first look goes not straight up or down; tilt it a little.")
+def look_from(file: SceneFile, view: FirstView) -> SceneFile:
+    """With another first look.  ValueError for one straight up or down."""
+    check_view(view)
     return file if view == file.view else replace(file, view=view)
+
+
+def keep_view(file: SceneFile, view: FirstView, name: str = "view") -> SceneFile:
+    """With one named view more, under a free name.  ValueError where there is no room."""
+    check_view(view)
+    if len(file.views) >= MOST_VIEWS:
+        raise ValueError(f"There are {len(file.views)} named views, the most a scene file has.")
+    taken = {each.name for each in file.views}
+    if name == "view" or name in taken:
+        name = next(f"{name} {n}" for n in range(1, MOST_VIEWS + 2) if f"{name} {n}" not in taken)
+    return replace(file, views=(*file.views, NamedView(name, view)))
+
+
+def rename_view(file: SceneFile, before: str, after: str) -> SceneFile:
+    """With a view under another name.  ValueError, one sentence, for one that it cannot have."""
+    after = " ".join(after.split())
+    if not 0 < len(after) <= LONGEST_NAME or not after.isprintable():
+        raise ValueError(f"A name has 1 to {LONGEST_NAME} letters on one line.")
+    if after != before and after in [each.name for each in file.views]:
+        raise ValueError(f"'{after}' is taken; choose another name.")
+    views = (replace(v, name=after) if v.name == before else v for v in file.views)
+    return replace(file, views=tuple(views))
+
+
+def remove_view(file: SceneFile, name: str) -> SceneFile:
+    return replace(file, views=tuple(each for each in file.views if each.name != name))
+
+
+def check_view(view: FirstView) -> None:
+    """ValueError for a view whose upper side nobody knows."""
+    if math.dist(view.eye[::2], view.target[::2]) < 1e-6:
+        raise ValueError("A view that is kept goes not straight up or down; tilt it a little.")
+
+
+def rounded(view: FirstView) -> FirstView:
+    """The view with places as a file has them."""
+    eye, target = (three(round(n, DECIMALS) for n in place) for place in (view.eye, view.target))
+    return replace(view, eye=eye, target=target)
+
+
+def set_appearance(file: SceneFile, name: str, appearance: Appearance) -> SceneFile:
+    """With another appearance of an object, or of all objects where the name is ""."""
+    if name:
+        return change(file, name, appearance=appearance)
+    return file if appearance == file.appearance else replace(file, appearance=appearance)
+
+
+def set_sky(file: SceneFile, sky: Sky | None) -> SceneFile:
+    """With another sky, or with none of its own."""
+    return file if sky == file.sky else replace(file, sky=sky)
 
 
 def item_named(file: SceneFile, name: str) -> SceneItem:

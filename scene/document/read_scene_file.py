@@ -9,12 +9,14 @@ from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import MODES
 from shapeshift.runtime_models.splats.plain_splats import AXES
 from shapeshift.scene.control import EASES
+from shapeshift.scene.document.appearance_rows import read_appearance, read_sky
 from shapeshift.scene.document.scene_file import (
     BACKGROUND,
     ENDING,
     FAR_M,
     FORMAT,
     FirstView,
+    NamedView,
     SceneFile,
     SceneItem,
 )
@@ -45,6 +47,8 @@ def read_scene_file(path: str | Path) -> SceneFile:
     background = file.optional_object(BACKGROUND)
     rows = file.rows("objects", MOST_OBJECTS, "object")
     view = read_view(file.optional_object("view"))
+    views = read_views(file)
+    appearance, sky = read_appearance(file), read_sky(file)
     file.refuse_unknown_keys()
     items = tuple(read_item(row, path.name) for row in rows)
     names = [item.name for item in items]
@@ -59,6 +63,9 @@ def read_scene_file(path: str | Path) -> SceneFile:
         floor_y=floor_y,
         gravity_m_s2=gravity,
         view=view,
+        views=views,
+        appearance=appearance,
+        sky=sky,
     )
 
 
@@ -106,6 +113,7 @@ def read_looks(row: Fields) -> dict:
         **read_pose(row.optional_object("pose")),
         "x": row.control("x", 0.0),
         "visible": row.flag("visible", True),
+        "appearance": read_appearance(row),
         "selectors": read_selectors(row),
         "collider": collider,
         "friction": row.number("friction", 0.6, "0 to 10", 0, FRICTION),
@@ -145,10 +153,25 @@ def read_view(row: Fields | None) -> FirstView | None:
         return None
     eye, target = row.numbers("eye", 3), row.numbers("target", 3)
     fov_y = row.number("fov_y", 0.8, "radians from 0.01 to 3", 0.01, 3.0)
+    parallel = row.flag("orthographic")
+    near_m = row.number("near_m", 0.0, "metres, 0 or more,", 0, FAR_M)
     row.refuse_unknown_keys()
     if math.dist(eye, target) < 1e-6 or math.dist(eye[::2], target[::2]) < 1e-6:
         raise row.error("target", "a place that is not straight above, below or in the eye")
-    return FirstView(three(eye), three(target), fov_y)
+    return FirstView(three(eye), three(target), fov_y, parallel, near_m)
+
+
+def read_views(file: Fields) -> tuple[NamedView, ...]:
+    """The list under "views": as "view", each with a name of its own."""
+    found: list[NamedView] = []
+    for row in file.rows("views", MOST_ROWS, "view"):
+        name = row.line("name")
+        if len(name) > LONGEST_NAME or name in [view.name for view in found]:
+            raise row.error("name", f"a name of its own, of at most {LONGEST_NAME} letters,")
+        view = read_view(row)
+        assert view is not None, "there is a row"
+        found.append(NamedView(name, view))
+    return tuple(found)
 
 
 def read_state(row: Fields) -> State:

@@ -15,7 +15,9 @@ from shapeshift.runtime_models.parts import find_label, part_of
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
+from shapeshift.scene.appearance import NEUTRAL, Appearance, Sky
 from shapeshift.scene.cameras.framing import frame_points, framing_view, scene_points, view_from
+from shapeshift.scene.orthographic import orthographic
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import UPRIGHT, Painted, Selector
@@ -44,6 +46,7 @@ class SceneItem:
     placed: bool = True  # False: a part without a pose, until `read_models` puts it in its place
     x: Control = 0.0
     visible: bool = True
+    appearance: Appearance = NEUTRAL
     selectors: tuple[Selector, ...] = ()
     collider: str | None = None  # a mesh's path, HULLS, or None: nothing can touch it
     static: bool = False  # touched, but never moved
@@ -68,6 +71,16 @@ class FirstView:
     eye: tuple[float, float, float]  # metres
     target: tuple[float, float, float]
     fov_y: float = 0.8  # radians
+    orthographic: bool = False  # parallel rays, to the scale that the target is seen in
+    near_m: float = 0.0  # metres from the eye before which nothing is drawn; 0: as usual
+
+
+@dataclass(frozen=True)
+class NamedView:
+    """A view of the scene to come back to."""
+
+    name: str
+    view: FirstView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +91,9 @@ class SceneFile:
     floor_y: float | None = None  # metres; None: no floor
     gravity_m_s2: float = 9.81
     view: FirstView | None = None
+    views: tuple[NamedView, ...] = ()  # to go to by their names
+    appearance: Appearance = NEUTRAL  # of all objects, after their own
+    sky: Sky | None = None  # behind everything; None: what the model or the program has there
 
     @property
     def all_items(self) -> tuple[SceneItem, ...]:
@@ -136,7 +152,10 @@ def read_models(
 
 def scene_of(file: SceneFile, models: Mapping[str, Model]) -> Scene:
     """What is drawn: every object with its model, where and how the file says.  Raises BadFile."""
-    return Scene(tuple(object_of(item, models[item.name], i) for i, item in labelled(file)))
+    appearance = file.appearance
+    return Scene(
+        tuple(object_of(item, models[item.name], i, appearance) for i, item in labelled(file))
+    )
 
 
 def labelled(file: SceneFile) -> list[tuple[int, SceneItem]]:
@@ -145,7 +164,21 @@ def labelled(file: SceneFile) -> list[tuple[int, SceneItem]]:
     return list(enumerate(file.all_items, first))
 
 
-def object_of(item: SceneItem, model: Model, label: int) -> SceneObject:
+def with_own_appearance(file: SceneFile) -> SceneFile:
+    """The same scene, in which each object has what the file says of all of them, too."""
+    if file.appearance == NEUTRAL:
+        return file
+    of_all, background = file.appearance, file.background
+    if background is not None:
+        background = replace(background, appearance=background.appearance.under(of_all))
+    items = tuple(replace(i, appearance=i.appearance.under(of_all)) for i in file.items)
+    return replace(file, items=items, background=background, appearance=NEUTRAL)
+
+
+def object_of(
+    item: SceneItem, model: Model, label: int, of_scene: Appearance = NEUTRAL
+) -> SceneObject:
+    """The object as it is drawn; of_scene: what the file says of all.  Raises BadFile."""
     count = len(model.means if isinstance(model, SplatLayers) else model.anchors)
     for selector in item.selectors:
         if isinstance(selector, Painted) and len(selector.weight) != count:
@@ -155,8 +188,9 @@ def object_of(item: SceneItem, model: Model, label: int) -> SceneObject:
             )
     try:
         return SceneObject(
-            item.name, model, item.pose, item.x, label, item.visible, selectors=item.selectors
-        )
+            item.name, model, item.pose, item.x, label, item.visible, item.selectors,
+            appearance=item.appearance.under(of_scene),
+        )  # fmt: skip
     except ValueError as error:  # a blend of stops that its model has not
         raise BadFile(f"object '{item.name}': 'x': {error}") from None
 
@@ -195,5 +229,13 @@ def first_view(file: SceneFile, scene: Scene, size: tuple[int, int]) -> View:
     if file.view is None:
         return framing_view(points, opacity, size)
     _, radius = frame_points(points, opacity)
-    eye, target = np.array(file.view.eye), np.array(file.view.target)
-    return view_from(eye, target, radius, size, file.view.fov_y)
+    return stated_view(file.view, radius, size)
+
+
+def stated_view(stated: FirstView, radius: float, size: tuple[int, int]) -> View:
+    """The view that a file states, of a scene that reaches so many metres."""
+    eye, target = np.array(stated.eye), np.array(stated.target)
+    view = view_from(eye, target, radius, size, stated.fov_y)
+    if stated.orthographic:
+        return orthographic(view, float(np.linalg.norm(target - eye)), radius, stated.near_m)
+    return replace(view, near=stated.near_m) if stated.near_m > 0 else view

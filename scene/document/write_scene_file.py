@@ -7,7 +7,9 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.files.whole_file import write_whole
-from shapeshift.scene.document.scene_file import FORMAT, HULLS, SceneFile, SceneItem
+from shapeshift.scene.appearance import NEUTRAL
+from shapeshift.scene.document.appearance_rows import appearance_row, sky_row
+from shapeshift.scene.document.scene_file import FORMAT, HULLS, FirstView, SceneFile, SceneItem
 from shapeshift.scene.selectors.selector_rows import selector_row
 from shapeshift.scene.world.reactions import Reaction
 
@@ -19,14 +21,27 @@ def write_scene_file(file: SceneFile, path: str | Path) -> None:
     path = Path(path)
     out: dict = {"format": FORMAT, "gravity_m_s2": file.gravity_m_s2, "floor_y": file.floor_y}
     if file.view:
-        view = file.view
-        out["view"] = {"eye": list(view.eye), "target": list(view.target), "fov_y": view.fov_y}
+        out["view"] = view_row(file.view)
+    if file.views:
+        out["views"] = [{"name": each.name} | view_row(each.view) for each in file.views]
+    if file.appearance != NEUTRAL:
+        out["appearance"] = appearance_row(file.appearance)
+    if file.sky:
+        out["sky"] = sky_row(file.sky)
     if file.background:
         row = item_row(file.background, file, path.parent)
         out["background"] = {k: v for k, v in row.items() if k not in ("name", "static")}
     out["objects"] = [item_row(item, file, path.parent) for item in file.items]
     text = json.dumps(out, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_whole(path, text.encode())
+
+
+def view_row(view: FirstView) -> dict:
+    row: dict = {"eye": list(view.eye), "target": list(view.target), "fov_y": view.fov_y}
+    for name in ("orthographic", "near_m"):
+        if getattr(view, name):
+            row[name] = getattr(view, name)
+    return row
 
 
 def item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
@@ -46,6 +61,8 @@ def item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
             row[name] = getattr(item, name)
     if "x" in row:
         row["x"] = control_row(item.x)
+    if item.appearance != NEUTRAL:
+        row["appearance"] = appearance_row(item.appearance)
     if item.selectors:
         row["selectors"] = [selector_row(selector) for selector in item.selectors]
     if item.states:

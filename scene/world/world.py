@@ -15,7 +15,12 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.model import Finding, Model
 from shapeshift.runtime_models.stop_weights import Control
-from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled
+from shapeshift.scene.document.scene_file import (
+    SceneFile,
+    SceneItem,
+    labelled,
+    with_own_appearance,
+)
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.grab import jumped
@@ -97,7 +102,7 @@ class World:
         self._part: float | None = None  # of the way from the step before to this one, in what is
         # drawn; None: this one as it is
         self._drawn = Scene(())
-        for label, item in labelled(file):
+        for label, item in labelled(with_own_appearance(file)):
             self.add(item, models[item.name], colliders.get(item.name), label)
 
     # ---- what there is

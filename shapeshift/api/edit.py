@@ -12,6 +12,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.appearance import NEUTRAL, Appearance
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.pose import Pose, View
@@ -58,8 +59,11 @@ def changed(
     wxyz: Sequence[float] | None,
     x: "X | None",
     visible: bool | None,
+    appearance: Appearance | None,
 ) -> Document:
-    """With one object elsewhere, or at another x, in what is drawn and in its scene file."""
+    """With one object elsewhere, at another x or appearing otherwise: in what is drawn and in its
+    scene file.
+    """
     before, file = obj.world_from_object, subject.file
     pose = Pose(
         np.array(before.position if position is None else position, np.float64),
@@ -72,10 +76,14 @@ def changed(
         (moved,) = placed([moved], x, "x", states)
     elif x is not None:
         moved = replace(moved, x=x if isinstance(x, StopWeights) else float(x))
+    own = {} if appearance is None else {"appearance": appearance}
+    if appearance is not None:
+        of_scene = file.appearance if file else NEUTRAL
+        moved = replace(moved, appearance=appearance.under(of_scene))
     objects = tuple(moved if each is obj else each for each in subject.scene.objects)
     if file is not None:  # as a simulation takes it
         place = {"position": tuple(map(float, pose.position)), "wxyz": tuple(map(float, pose.wxyz))}
-        file = edits.change(file, obj.name, x=moved.x, visible=shown, **place)
+        file = edits.change(file, obj.name, x=moved.x, visible=shown, **place, **own)
     return Document(DrawnScene(objects), file)
 
 

@@ -7,7 +7,9 @@ import numpy as np
 
 from shapeshift.api.arguments import X
 from shapeshift.runtime_models.model import Model
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.appearance import WHITE, Appearance
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 
@@ -24,6 +26,7 @@ class HoldsObjects(Protocol):
         wxyz: Sequence[float] | None = None,
         x: X | None = None,
         visible: bool | None = None,
+        appearance: Appearance | None = None,
     ) -> Any: ...
 
 
@@ -105,6 +108,22 @@ class NamedObject(Generic[S]):
         scene.objects["mug"].show(False).render()
         """
         return self._changed(visible=visible)
+
+    def appear(
+        self,
+        exposure: float = 0.0,
+        gamma: float = 1.0,
+        tint: Sequence[float] = WHITE,
+        opacity: float = 1.0,
+    ) -> S:
+        """The scene with it brighter, darker, of another colour, or see-through.
+
+        exposure: stops of light.  gamma: above 1 its darker tones are brighter.  tint: (3,) times
+        its colours as displayed.  opacity: 0..1 times that of its splats.  Raises ValueError.
+
+            scene.objects["motor"].appear(exposure=1, opacity=0.5).render()
+        """
+        return self._changed(appearance=Appearance(exposure, gamma, three(tint), opacity))
 
 
 class SceneObjects(tuple[SceneObject, ...], Generic[S]):

@@ -14,6 +14,7 @@ from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import Finding, Model, Stop
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
+from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.document import edits
 from shapeshift.scene.scene import Scene as DrawnScene
 from shapeshift.scene.scene import SceneObject
@@ -198,13 +199,16 @@ class OpenedScene:
         wxyz: Sequence[float] | None = None,
         x: X | None = None,
         visible: bool | None = None,
+        appearance: Appearance | None = None,
     ) -> Self:
         """The scene with an object elsewhere (metres, world), turned (quaternion, w first), at
-        another x, shown or hidden; what is None stays.  Raises UsageError, ValueError.
+        another x, shown or hidden, or with another Appearance; what is None stays.  Raises
+        UsageError, ValueError.
 
             room.with_object("cup", position=(0.0, 1.2, 0.0), x="fire")
         """
-        return self._with(changed(self._subject, self.object(name), position, wxyz, x, visible))
+        how = (position, wxyz, x, visible, appearance)
+        return self._with(changed(self._subject, self.object(name), *how))
 
     def without(self, *names: str) -> Self:
         """The scene without these objects.  Raises UsageError for a name that none has.

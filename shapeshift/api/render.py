@@ -12,6 +12,7 @@ import numpy as np
 from shapeshift.app.drawing import open_renderer
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.renderer.surface import Surface
+from shapeshift.scene.appearance import Background
 from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ def shared_renderer(
     drawing: Drawing,
     context: Context,
     settings: RenderSettings | None,
-    background: tuple[float, float, float],
+    background: Background,
 ) -> Iterator[Renderer]:
     """The renderer that stays open from one picture to the next; one thread at a time has it.
 

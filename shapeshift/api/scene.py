@@ -10,6 +10,7 @@ from shapeshift.api.opened import OpenedScene
 from shapeshift.app.document import Document
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.scene.appearance import Background
 from shapeshift.scene.pose import View
 from shapeshift.scene.selectors.selector import Selector
 
@@ -109,7 +110,7 @@ class Scene(OpenedScene):
         camera: Camera = "orbit",
         size: Size | None = None,
         *,
-        background: tuple[float, float, float] | None = None,
+        background: Background | None = None,
         select: Sequence["str | Selector"] = (),
         eye_distance: float = 0.0,
         output: Output = "picture",
@@ -121,7 +122,8 @@ class Scene(OpenedScene):
         """(H, W, 3) float32 display sRGB, row 0 on top, of the first view of a camera.
 
         x: as of `at`.  camera, size: as of `views`.  background: red, green, blue 0..1 as
-        displayed; None is what the scene was trained on, else black.  select: as of `with_regions`.
+        displayed, or a Sky; None: the scene file's sky, what the scene was trained on, else black.
+        select: as of `with_regions`.
         eye_distance: metres; above 0 the picture holds two eyes, side by side.  output: `depth`
         gives (H, W) metres along the view and `normal` (H, W, 3) directions in eye axes, NaN where
         nothing is; `coverage` (H, W) how much of the background is hidden.  show: of a scene with

@@ -13,6 +13,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.appearance import Background
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, moved
 from shapeshift.scene.cameras.framing import orbit_path
 from shapeshift.scene.pose import View
@@ -67,7 +68,7 @@ def read_cameras(scene: "OpenedScene", camera: str, size: Size | None) -> Camera
 def picture_of(
     scene: "OpenedScene",
     view: View,
-    background: tuple[float, float, float] | None,
+    background: Background | None,
     eye_distance: float,
     output: Output,
     settings: RenderSettings | None,

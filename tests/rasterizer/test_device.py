@@ -117,6 +117,21 @@ def test_programs_are_built_once_for_each_set_of_defines(tmp_path):
     assert d.download(array).tolist() == [2] * 3
 
 
+def test_kernels_take_plain_numbers_of_their_own_types(tmp_path):
+    """Whole numbers as floats, too; of uint the largest, of int the least; and no array."""
+    path = tmp_path / "numbers.cl"
+    path.write_text(
+        "__kernel void f(int a, uint b, float c, __global const int* no, __global float* x) {\n"
+        "  x[0] = a; x[1] = b; x[2] = c; x[3] = no ? 1 : 0;\n}\n"
+    )
+    d = device()
+    found, kernel = d.empty(4), d.program(path)["f"]
+    for a, b, c in ((3, 5, 2), (-(2**31), 2**32 - 1, 0.5), (True, np.uint32(7), np.float64(1e-3))):
+        d.launch(kernel, 1, 1, a, b, c, None, found)
+        wanted = np.array([a, b, c, 0], np.float32)
+        np.testing.assert_array_equal(d.download(found), wanted)
+
+
 def test_includes_are_taken_once_from_beside_the_file_and_from_the_kernels(tmp_path):
     (tmp_path / "near.cl").write_text('#include "common/record.cl"\n#define NEAR 1\n')
     (tmp_path / "main.cl").write_text('#include "near.cl"\n#include "common/record.cl"\nint x;\n')

@@ -158,3 +158,15 @@ def test_blocks_that_are_left_out_change_no_bit(longest, shape, opacity):
     assert found[0][1].min() < 1
     for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_the_cpu_form_goes_back_through_its_own_images_alone():
+    """It goes by the blocks that its forward pass wrote down."""
+    d, size = device(), (40, 30)
+    projected = ellipses([[20, 15]], [[3, 2]], np.zeros(1))
+    tiles = bin_tiles(d, projected, size)
+    grad = d.zeros((3, size[1], size[0]))
+    frame = rasterize(d, projected, tiles, size, form="cpu")
+    with pytest.raises(ValueError, match="CPU form"):
+        other = replace(frame, drawn_blocks=None)
+        rasterize_backward(d, projected, tiles, other, grad, form="cpu")

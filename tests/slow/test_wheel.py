@@ -16,7 +16,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-FOLDERS = ("app", "renderer", "runtime_models", "scene", "vr", "rasterizer", "training",
+FOLDERS = ("app", "web", "renderer", "runtime_models", "scene", "vr", "rasterizer", "training",
            "decomposition", "assets", "shapeshift")  # fmt: skip
 LEAST_SETUPTOOLS = 77  # as pyproject.toml says
 pytestmark = pytest.mark.slow

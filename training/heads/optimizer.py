@@ -75,11 +75,9 @@ class Adam:
                     int(group.rates.size > 1), group.rates, grads[name], *moments,
                 )  # fmt: skip
                 continue
-            width = group.value.shape[1]
-            count = len(chosen) * width
             self.device.launch(
-                self.kernels["adam_rows"], count, 64, count, width, chosen, first, second, scale,
-                group.rates, grads[name], *moments,
+                self.kernels["adam_rows"], len(chosen), 64, len(chosen), group.value.shape[1],
+                chosen, first, second, scale, group.rates, grads[name], *moments,
             )  # fmt: skip
 
     def state(self) -> dict[str, np.ndarray]:

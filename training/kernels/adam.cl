@@ -29,14 +29,17 @@ __kernel void adam(int count, float correct1, float correct2, float rate_scale, 
 }
 
 // The same of some rows of a table: grad has those alone, one after the other; the others rest.
-__kernel void adam_rows(int count, int width, __global const int *rows, float correct1,
+// One work-item a row: an item a number would divide by the width.
+__kernel void adam_rows(int rows_count, int width, __global const int *rows, float correct1,
                         float correct2, float rate_scale, __global const float *rates,
                         __global const float *grad, __global float *value, __global float *mean,
                         __global float *square) {
-  int i = get_global_id(0);
-  if (!(i < count)) return;
-  update(rows[i / width] * width + i % width, grad[i], correct1, correct2, rate_scale * rates[0],
-         value, mean, square);
+  int row = get_global_id(0);
+  if (!(row < rows_count)) return;
+  float rate = rate_scale * rates[0];
+  int at = rows[row] * width;
+  for (int c = 0; c < width; c++)
+    update(at + c, grad[row * width + c], correct1, correct2, rate, value, mean, square);
 }
 
 // The rows of a table (A, width) that are there, one after the other.  One work-item a row.

@@ -17,6 +17,8 @@
 
 #include "losses_shared.cl"
 
+#define UNROLL _Pragma("unroll")  // a window's taps: their weights become constants
+
 // Over the lanes, by halves: the same order always.
 inline float sum8(float8 v) {
   float4 a = v.lo + v.hi;
@@ -33,17 +35,21 @@ inline float8 inside(int x, int width) {
 // Eight pixels' windows at once, along a padded copy of the row: no test of borders.
 inline float8 along_row(const float *row, int x) {
   float8 sum = 0;
-  for (int k = 0; k < TAPS; k++) sum += WINDOW[k] * vload8(0, row + x + k);
+  UNROLL for (int k = 0; k < TAPS; k++) sum += WINDOW[k] * vload8(0, row + x + k);
   return sum;
 }
 
 // Rows beyond the image count as zeros: they are left out of the sum.
 inline float8 along_column(__global const float *plane, int x, int y, int height, int stride) {
   float8 sum = 0;
-  for (int k = 0; k < TAPS; k++) {
-    int row = y + k - REACH;
-    if (row >= 0 && row < height) sum += WINDOW[k] * vload8(0, plane + row * stride + x);
+  plane += x;
+  if (y >= REACH && y + REACH < height) {  // nearly all rows: the whole window, unrolled
+    UNROLL for (int k = 0; k < TAPS; k++)
+      sum += WINDOW[k] * vload8(0, plane + (y + k - REACH) * stride);
+    return sum;
   }
+  for (int k = max(0, REACH - y); k < min(TAPS, height + REACH - y); k++)
+    sum += WINDOW[k] * vload8(0, plane + (y + k - REACH) * stride);
   return sum;
 }
 

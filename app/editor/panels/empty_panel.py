@@ -3,11 +3,16 @@
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import tip
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label, tip
 from shapeshift.app.editor.panels.widgets.theme import Box
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 WIDTH = 420.0  # logical pixels
+WHAT = (
+    "A package of this program, splats of any known format, a folder of layers or of a training "
+    "run, or a scene file."
+)
 FORMATS = ".shift  .ply  .spz  .splat  .ksplat  .sog  .glb  .scene.json"
 DEMO_LABEL, TOUCH_LABEL, OPEN = "The demo", "Things to touch", "Open\u2026"
 CHOICES = {
@@ -26,11 +31,8 @@ def draw_empty(free: Box, ui_scale: float) -> tuple[Box, str]:
     flags = imgui.WindowFlags_
     imgui.begin("##empty", None, flags.no_decoration | flags.no_move | flags.no_saved_settings)
     imgui.push_text_wrap_pos(0)
-    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), "Drop a scene here")
-    imgui.text_unformatted(
-        "A package of this program, splats of any known format, a folder of layers or of a "
-        "training run, or a scene file."
-    )
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), said("Drop a scene here"))
+    imgui.text_unformatted(said(WHAT))
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))
     imgui.text_unformatted(FORMATS)
     imgui.pop_style_color()
@@ -41,7 +43,7 @@ def draw_empty(free: Box, ui_scale: float) -> tuple[Box, str]:
     for number, (label, what) in enumerate(CHOICES.items()):
         if number:
             imgui.same_line()
-        if imgui.button(label, Vec(each, 0)):
+        if imgui.button(item_label(label), Vec(each, 0)):
             clicked = label
         tip(what, ui_scale)
     box = theme.window_box()

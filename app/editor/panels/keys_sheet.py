@@ -5,11 +5,13 @@ from collections.abc import Mapping, Sequence
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import tip
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label, tip
 from shapeshift.app.editor.panels.widgets.theme import Box
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 Row = tuple[str, str]  # key, what it does
+KEY_NAMES = ("Delete",)  # as printed there, though the word is also on a button
 COLUMN = 330.0  # logical pixels, of a group
 KEY_PART = 0.38  # of a column, where what a key does begins
 MOUSE_AND_CAMERA = (
@@ -22,6 +24,7 @@ MOUSE_AND_CAMERA = (
     ("F", "frame everything"),
     ("Shift+F", "the first view"),
     ("numpad 1, 3, 7", "front, right, top; Ctrl: the other side"),
+    ("numpad 5", "parallel rays, or those of an eye"),
     ("N, P", "next, previous camera of a file"),
     ("K", "keep this view in a file"),
 )
@@ -40,6 +43,7 @@ REGIONS = (
 )
 PROGRAM = (
     ("Ctrl+O", "open; or drop files on the window"),
+    ("Ctrl+N", "an empty scene"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo an edit"),
     ("Ctrl+S", "save the scene; Shift: as"),
     ("F12", "save a picture"),
@@ -95,10 +99,10 @@ def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
 def _heading(ui_scale: float) -> bool:
     """What this is, and the button that closes it, at the right; True when it was clicked."""
     start, room = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
-    imgui.text_unformatted("Keys and mouse")
+    imgui.text_unformatted(said("Keys and mouse"))
     below, width = imgui.get_cursor_pos(), 80 * ui_scale
     imgui.set_cursor_pos(Vec(start.x + room - width, start.y))
-    closed = imgui.button("Close", Vec(width, 0))
+    closed = imgui.button(item_label("Close"), Vec(width, 0))
     tip("F1 or Esc.", ui_scale)
     imgui.set_cursor_pos(Vec(below.x, below.y + 10 * ui_scale))
     return closed
@@ -107,15 +111,15 @@ def _heading(ui_scale: float) -> bool:
 def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> None:
     """A heading and its rows, one below the other from the cursor on."""
     left, gap = imgui.get_cursor_pos_x(), 16 * ui_scale
-    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), name)
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), said(name))
     for key, what in rows:
         imgui.set_cursor_pos_x(left)
         y = imgui.get_cursor_pos_y()
-        imgui.text_unformatted(key)
+        imgui.text_unformatted(key if key in KEY_NAMES else said(key))
         imgui.set_cursor_pos(Vec(left + KEY_PART * width, y))
         imgui.push_text_wrap_pos(left + width - gap)
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))
-        imgui.text_unformatted(what)
+        imgui.text_unformatted(said(what))
         imgui.pop_style_color()
         imgui.pop_text_wrap_pos()
     imgui.set_cursor_pos(Vec(left, imgui.get_cursor_pos_y() + gap / 2))

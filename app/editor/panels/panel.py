@@ -6,16 +6,21 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import section, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label, section, tip
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.layout import Layout
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.
 ORDER = (
     "Scale", "Room", "Touch", "Stops", "Look", "Gallery", "Camera", "Film", "Objects", "Parts",
-    "Regions", "Export", "Performance",
+    "Regions", "Export", "Settings", "Performance",
 )  # fmt: skip
+
+
+LARGER = "Larger text: Ctrl +, Ctrl 0 as at first."
+SMALLER = "Smaller text: Ctrl \u2013, Ctrl 0 as at first."
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,8 @@ class PanelActions:
     fold: Callable[[bool], None]  # whether the panel is to be folded
     resize_text: Callable[[int], None]  # 1 larger, -1 smaller
     show_keys: Callable[[], None]
+    sections: dict[str, bool]  # that a hand has opened or folded, by name
+    keep: Callable[[], None]  # they have changed
 
 
 def draw_panel(
@@ -65,34 +72,50 @@ def draw_panel(
     _title(title, actions, ui_scale)
     for draw in top:
         draw(ui_scale)
-    _scrolling(sections, low, ui_scale)
+    if _scrolling(sections, low, actions.sections, ui_scale):
+        actions.keep()
     _foot(actions, ui_scale)
     box = theme.window_box()
     imgui.end()
     return box
 
 
-def _scrolling(sections: list[Section], low: float, ui_scale: float) -> None:
-    """The sections, which scroll where they reach below `low`: the foot stays in sight."""
+def _scrolling(sections: list[Section], low: float, kept: dict[str, bool], ui_scale: float) -> bool:
+    """The sections, which scroll where they reach below `low`: the foot stays in sight.
+
+    True: one was opened or folded.
+    """
     style = imgui.get_style()
     foot = imgui.get_frame_height() + 2 * style.item_spacing.y + 2 + style.window_padding.y
     room = low - imgui.get_cursor_screen_pos().y - foot
     imgui.set_next_window_size_constraints(Vec(0, 0), Vec(float("inf"), max(room, 1.0)))
     imgui.begin_child("##sections", Vec(0, 0), imgui.ChildFlags_.auto_resize_y)
-    draw_sections(sections, ui_scale)
+    toggled = draw_sections(sections, ui_scale, kept)
     imgui.end_child()
+    return toggled
 
 
-def draw_sections(sections: list[Section], ui_scale: float) -> None:
-    """Headings that fold, in their order, in the window that is being made."""
+def draw_sections(
+    sections: list[Section], ui_scale: float, kept: dict[str, bool] | None = None
+) -> bool:
+    """Headings that fold, in their order, in the window that is being made.
+
+    kept: those that were opened (True) or folded by hand before; what a hand does now is put there,
+    and the result tells whether it did.
+    """
+    kept, toggled = kept if kept is not None else {}, False
     for other in sorted(sections, key=_rank):
         if other.shown is not None and not other.shown():
             continue
         unfold = other.opens is not None and other.opens()
-        if section(other.name, other.open_first, unfold):
+        is_open = section(other.name, kept.get(other.name, other.open_first), unfold)
+        if imgui.is_item_toggled_open():
+            kept[other.name], toggled = is_open, True
+        if is_open:
             imgui.push_id(other.name)
             other.draw(ui_scale)
             imgui.pop_id()
+    return toggled
 
 
 def _rank(other: Section) -> float:
@@ -109,7 +132,7 @@ def _title(title: str, actions: PanelActions, ui_scale: float) -> None:
     imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), "Shapeshift")
     imgui.same_line()
     imgui.push_text_wrap_pos(start.x + room - side - 4 * ui_scale)
-    imgui.text_unformatted(title or "nothing is open")
+    imgui.text_unformatted(title or said("nothing is open"))
     imgui.pop_text_wrap_pos()
     below = imgui.get_cursor_pos()
     imgui.set_cursor_pos(Vec(start.x + room - side, start.y - 2 * ui_scale))
@@ -156,12 +179,11 @@ def _foot(actions: PanelActions, ui_scale: float) -> None:
     imgui.dummy(Vec(0, 2))
     gap, small = imgui.get_style().item_spacing.x, 34 * ui_scale
     room = imgui.get_content_region_avail().x
-    if imgui.button("Keys (F1)", Vec(room - 2 * (small + gap), 0)):
+    if imgui.button(item_label("Keys (F1)"), Vec(room - 2 * (small + gap), 0)):
         actions.show_keys()
     tip("All keys and what the mouse does.", ui_scale)
     for label, step in (("A\u2013", -1), ("A+", 1)):
         imgui.same_line()
         if imgui.button(label, Vec(small, 0)):
             actions.resize_text(step)
-        key = "Ctrl +" if step > 0 else "Ctrl \u2013"
-        tip(f"{'Larger' if step > 0 else 'Smaller'} text: {key}, Ctrl 0 as at first.", ui_scale)
+        tip(LARGER if step > 0 else SMALLER, ui_scale)

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets.question_box import answer_row, question_box
 from shapeshift.app.editor.state.files.saving import Saving
+from shapeshift.app.editor.texts.table import said
 
 OVER = "Over it"  # writes over the file that was opened
 SAVE, LOSE = "Save the scene", "Changes are not saved"
@@ -32,12 +33,12 @@ def _draw_name(saving: Saving, ui_scale: float) -> None:
     saving.retype(name)
     if saving.taken:
         imgui.push_text_wrap_pos(0)
-        imgui.text_unformatted(f"{Path(saving.name).name} is there already.")
+        imgui.text_unformatted(said("{name} is there already.", name=Path(saving.name).name))
         imgui.pop_text_wrap_pos()
     label, original = "Replace it" if saving.taken else "Save", saving.original
     words: tuple[str, ...] = (label, "Cancel")
     if original is not None and not saving.taken:
-        imgui.text_disabled(f"{original.name} was not written by you here.")
+        imgui.text_disabled(said("{name} was not written by you here.", name=original.name))
         words = (label, OVER, "Cancel")
     clicked = answer_row(words, ui_scale)
     if clicked == label or (entered and not saving.taken):
@@ -52,7 +53,7 @@ def _draw_name(saving: Saving, ui_scale: float) -> None:
 
 def _draw_lose(saving: Saving, scene_name: str, ui_scale: float) -> None:
     imgui.push_text_wrap_pos(0)
-    imgui.text_unformatted(f"{scene_name} has changes that are not saved.")
+    imgui.text_unformatted(said("{name} has changes that are not saved.", name=scene_name))
     imgui.pop_text_wrap_pos()
     clicked = answer_row(("Save", "Discard", "Cancel"), ui_scale)
     if clicked:

@@ -13,13 +13,19 @@ Vec = imgui.ImVec2
 WIDTH = 16.0  # logical pixels, of the colours
 PAD = 12.0
 STRIPES = 128
+# unit of temperature: kelvins a degree, and the kelvins of its zero
+KELVIN = {"\u00b0C": (1.0, 273.15), "\u00b0F": (5 / 9, 459.67 * 5 / 9), "K": (1.0, 0.0)}
 
 
 def draw_scale_bar(
-    scene: Scene, box: Box, ui_scale: float, draw: imgui.ImDrawList | None = None
+    scene: Scene,
+    box: Box,
+    ui_scale: float,
+    draw: imgui.ImDrawList | None = None,
+    wanted: str = "",
 ) -> None:
     """Draws the bar with its ticks into a box, over the picture or into a list that is given; it
-    fades in with the thermal stop.
+    fades in with the thermal stop.  wanted: a unit of temperature instead of the stop's own.
     """
     palette, weight, stop = thermal_blend(scene)
     weight = legend_opacity(weight)
@@ -32,17 +38,26 @@ def draw_scale_bar(
     draw.add_rect_filled(Vec(left, top), Vec(right, bottom), ground, 8 * ui_scale)
     ink = theme.color(theme.TEXT, weight)
     draw.push_clip_rect(Vec(left, top), Vec(right, bottom))
-    draw.add_text(Vec(left + pad, top + pad / 2), ink, stop.unit or stop.name)
+    unit, low, high = in_unit(stop.unit, *stop.value_range, wanted)
+    draw.add_text(Vec(left + pad, top + pad / 2), ink, unit or stop.name)
     first, last = top + line + 1.2 * pad, bottom - pad  # of the colours, top and bottom
     bar = left + pad + width
     _stripes(draw, palette, weight, Vec(left + pad, first), Vec(bar, last))
-    low, high = stop.value_range
     values = nice_ticks(low, high)
     for value, text in zip(values, tick_text(values), strict=True):
         y = last - (last - first) * (value - low) / (high - low if high > low else 1.0)
         draw.add_line(Vec(bar, y), Vec(bar + 5 * ui_scale, y), ink, max(1.0, ui_scale))
         draw.add_text(Vec(bar + 10 * ui_scale, y - line / 2), ink, text)
     draw.pop_clip_rect()
+
+
+def in_unit(unit: str, low: float, high: float, wanted: str) -> tuple[str, float, float]:
+    """A range of temperatures in the unit that is wanted; as it is where it is none."""
+    if unit not in KELVIN or wanted not in KELVIN:
+        return unit, low, high
+    (size, zero), (other, other_zero) = KELVIN[unit], KELVIN[wanted]
+    low, high = ((value * size + zero - other_zero) / other for value in (low, high))
+    return wanted, low, high
 
 
 def has_scale(scene: Scene) -> bool:

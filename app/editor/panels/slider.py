@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.sections.stops_panel import pace_button
+from shapeshift.app.editor.panels.sections.stops_panel import pace_button, stop_tip
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import tip
 from shapeshift.app.editor.panels.widgets.theme import Box
@@ -259,8 +259,7 @@ def _stop_names(
         if imgui.invisible_button(f"stop {number}", Vec(max(size.x, 1.0), line)):
             clicked = number
         hovered = imgui.is_item_hovered()
-        key = f", key {number + 1}" if number < 9 else ""
-        tip(f"{stop.name}: x {stop.x:.3f}{key}", line / theme.FONT_SIZE)
+        tip(stop_tip(stop, number), line / theme.FONT_SIZE)
         on = [ink for x, ink in zip(xs, KNOB_INKS, strict=False) if abs(stop.x - x) < 1e-3]
         ink = theme.color(theme.ACCENT if hovered else (on or [theme.TEXT])[0])
         draw.add_text(Vec(left, corner.y), ink, stop.name)

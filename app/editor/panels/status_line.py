@@ -9,6 +9,7 @@ from shapeshift.app.editor.panels.widgets.panel_rows import tip
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.messages import number
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.opening import sentence
 
 Vec = imgui.ImVec2
@@ -20,18 +21,22 @@ def scene_words(state: EditorState) -> list[str]:
     """Format, splats, degree of the harmonics, stops and bytes of what is shown."""
     objects, sources = state.scene.objects, state.sources
     if not objects:
-        return ["nothing is open"]
-    splats = f"{number(state.scene.splat_count)} splats"
+        return [said("nothing is open")]
+    splats = said("{count} splats", count=number(state.scene.splat_count))
     size = sum(source.facts.get("bytes", 0) for source in sources)
     size_words = [bytes_text(size)] if size else []
     if len(objects) > 1:
-        return [f"{len(objects)} objects", splats, *size_words]
+        return [said("{count} objects", count=len(objects)), splats, *size_words]
     facts = sources[0].facts if sources else {}
     degree = facts.get("sh_degree")
     stops = len(objects[0].model.stops)
     words = [str(facts["format"])] if "format" in facts else []
     words += [splats] + ([f"SH {degree}"] if degree is not None else [])
-    return [*words, f"{stops} stop{'s' * (stops != 1)}", *size_words]
+    return [
+        *words,
+        said("1 stop") if stops == 1 else said("{count} stops", count=stops),
+        *size_words,
+    ]
 
 
 def bytes_text(count: int) -> str:
@@ -64,15 +69,15 @@ def draw_status(state: EditorState, more: Sequence[str], box: Box, ui_scale: flo
         imgui.text_disabled(GAP)
         imgui.same_line(0, 0)
         count = len(findings)
-        words = f"{count} finding{'s' * (count > 1)}"
+        words = said("1 finding") if count == 1 else said("{count} findings", count=count)
         imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), words)
         tip("\n".join(sentence(finding) for finding in findings), ui_scale)
-    said = [words for words in more if words]
-    if said:
+    told = [words for words in more if words]
+    if told:
         imgui.same_line(0, 0)
         imgui.text_disabled(GAP)
         imgui.same_line(0, 0)
-        imgui.text_unformatted(GAP.join(said))
+        imgui.text_unformatted(GAP.join(told))
     box = theme.window_box()
     imgui.end()
     imgui.pop_style_var(3)

@@ -9,6 +9,7 @@ import numpy as np
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.film.timeline import FilmKeys
+from shapeshift.app.editor.state.scene_objects import with_background
 from shapeshift.app.editor.state.track import next_stop, stepped
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_weights import Control
@@ -76,6 +77,8 @@ def turn_to(state: EditorState, history: History) -> None:
         arrange(state, changed)
         if state.world is not world:  # a new one stands at its start
             state.follow_world()
+        if history.file.sky != before.file.sky:
+            state.settings = with_background(state.settings, history.file.sky, state.scene)
     except BadFile:
         state.edited.history = before
         state.bodies.follow(state.edited)
@@ -99,6 +102,7 @@ def arrange(state: EditorState, changed: Sequence[Change]) -> None:
             rows.append(fresh_row(state, item, label))
         else:
             obj = changed_object(state.scene.objects[index], item, change)
+            obj = appearing(obj, item, state.edited.file)
             rows.append((obj, state.filed[index], state.sweeps[index], state.sources[index]))
             moved[index] = number
     state.reorder_rows(rows, moved)
@@ -117,7 +121,8 @@ def fresh_row(
 ) -> tuple[SceneObject, object, Sweep, Source]:
     """What the state holds of an object that was not there."""
     source = state.edited.source(item)
-    obj = object_of(item, state.in_palette(source.model), label)
+    of_scene = state.edited.file.appearance
+    obj = object_of(item, state.in_palette(source.model), label, of_scene)
     sweep = Sweep.over(source.model.blend)
     sweep.resume_at(item.x)
     return obj, source.model, sweep, source
@@ -133,6 +138,12 @@ def changed_object(obj: SceneObject, item: SceneItem, change: Change | None) -> 
     if "x" in change.fields:
         values["x"] = item.x
     return replace(obj, **values)
+
+
+def appearing(obj: SceneObject, item: SceneItem, file: SceneFile) -> SceneObject:
+    """The object with the appearance that the file gives it; the very same where it has it."""
+    appearance = item.appearance.under(file.appearance)
+    return obj if obj.appearance == appearance else replace(obj, appearance=appearance)
 
 
 def steer(state: EditorState, index: int, x: Control) -> None:

@@ -16,18 +16,20 @@ from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.film.timeline import Timeline
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.regions import Regions
-from shapeshift.app.editor.state.scene_objects import origin_of, scene_of, stood_as, with_palette
+from shapeshift.app.editor.state.scene_objects import (
+    origin_of,
+    scene_of,
+    stood_as,
+    with_background,
+    with_palette,
+)
 from shapeshift.app.editor.state.shown_scene import ShownScene
 from shapeshift.app.editor.state.split_state import SplitState
 from shapeshift.app.editor.state.track import Grip
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
 from shapeshift.runtime_models.model import Finding, Model, Stop
 from shapeshift.runtime_models.stop_weights import Control
-from shapeshift.scene.cameras.framing import (
-    default_background,
-    fit_points,
-    frame_points,
-)
+from shapeshift.scene.cameras.framing import fit_points, frame_points
 from shapeshift.scene.control import SHIFT_S, Shift, Sweep
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import SceneItem, named_stops
@@ -105,9 +107,7 @@ class EditorState:
         self.edited = edited or edited_from_scene(scene, self.sources)
         self.bodies.forget()
         self.shown_scene.forget()
-        if scene.objects:
-            background = default_background(scene.objects[0].model, DARK)
-            self.settings = replace(self.settings, background=background)
+        self.settings = with_background(self.settings, self.edited.file.sky, scene)
         self.filed = tuple(obj.model for obj in scene.objects)
         self.palette = AS_FILED
         self.sweeps = [Sweep.over(obj.model.blend) for obj in scene.objects]

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
-
 from shapeshift.app.editor.state.arrange import as_it_stands, copy_offset, edit, redo, undo
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -96,11 +94,5 @@ class ObjectEdits:
         """The view of now, about the point that it turns around, is where the scene opens."""
         if self._viewpoint is None:
             return
-        view = self._viewpoint.plain_view()
-        eye = view.world_from_eye.position
-        ahead = -view.world_from_eye.matrix()[:3, 2]
-        far = float(np.dot(self.state.centre - eye, ahead))
-        target = eye + ahead * max(far, 0.1 * self.state.radius)
-        fov_y = float(np.arctan(view.tangents[3]) - np.arctan(view.tangents[2]))
-        if self.edit(edits.look_from, eye, target, fov_y, what="first look"):
+        if self.edit(edits.look_from, self._viewpoint.stated(), what="first look"):
             self.state.say("The scene opens with this view, once it is saved.")

@@ -5,9 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.app.document import DARK
 from shapeshift.app.editor.state.files.edited_file import first_stop
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import Model
+from shapeshift.scene.appearance import Sky, behind_of
+from shapeshift.scene.cameras.framing import default_background
 from shapeshift.scene.document.edits import free_name
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
@@ -36,6 +40,16 @@ def stood_as(obj: SceneObject, other: SceneObject | None) -> SceneObject:
     if same and obj.x == other.x:
         return obj
     return replace(obj, world_from_object=there, x=other.x)
+
+
+def with_background(settings: RenderSettings, sky: Sky | None, scene: Scene) -> RenderSettings:
+    """The settings with a file's sky behind everything, else what its first model was trained
+    before.
+    """
+    behind = behind_of(sky) or settings.background
+    if sky is None and scene.objects:
+        behind = default_background(scene.objects[0].model, DARK)
+    return replace(settings, background=behind)
 
 
 def origin_of(model: Model) -> np.ndarray:

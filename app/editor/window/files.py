@@ -4,17 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from shapeshift.app.camera_files import camera_reading, in_scene
 from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
-from shapeshift.app.editor.panels.open_row import OpenRow
+from shapeshift.app.editor.panels.open_row import NEW, OpenRow
 from shapeshift.app.editor.panels.widgets.path_box import PathBox
+from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import first_look, opened_scene, repair_notes
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, ReadModel, read_files
 from shapeshift.app.editor.state.user.recent import RecentFiles
+from shapeshift.app.editor.state.user.recent_pictures import RecentPictures
 from shapeshift.app.editor.window.window import Drop, Event, KeyDown
 from shapeshift.app.paths import DEMO, TOUCH, config_folder
 from shapeshift.runtime_models.model import BadFile
@@ -34,16 +38,19 @@ class Files:
     """Opens what is dropped or chosen; the scene changes when all of it has been read."""
 
     def __init__(
-        self, state: EditorState, viewpoint: Viewpoint, options: Options, actions: OpenActions
-    ) -> None:
+        self, state: EditorState, viewpoint: Viewpoint, options: Options, actions: OpenActions,
+        textures: Textures,
+    ) -> None:  # fmt: skip
         self._state, self._viewpoint = state, viewpoint
         self._options, self._actions = options, actions
         self._opener = Opener()
         self.recent: RecentFiles | None = None  # None: nothing is kept
+        self.pictures: RecentPictures | None = None  # of those
+        self.picture_due: Path | None = None  # what is open, of which a picture is wanted
         self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
         # Reads one scene, in the thread that opens; replaced where progress can be shown.
         self.read: ReadModel = lambda path, progress: state.read_model(path)
-        self._row = OpenRow()
+        self._row = OpenRow(textures)
         self._box = PathBox("Open a scene", "Open")
 
     @property
@@ -64,6 +71,7 @@ class Files:
         self._at_demo = not (options.scenes or options.touch)
         if options.screenshot is None:
             self.recent = RecentFiles.read(config_folder())
+            self.pictures = RecentPictures(config_folder())
             if options.scenes:
                 self.remember_all(found)
         self.use_cameras(found, look_through=options.camera is not None)
@@ -73,11 +81,35 @@ class Files:
         """Opens the box that takes a path; what is dropped meanwhile is opened as well."""
         self._box.ask()
 
+    def new(self) -> None:
+        """An empty scene, once nothing is lost by it."""
+        self._actions.before_losing(self._show_nothing)
+
+    def _show_nothing(self) -> None:
+        self._state.open_sources((), Scene(()))
+        self._actions.upload(Scene(()))
+        self._at_demo, self.picture_due = False, None
+        self._state.messages.problems = []
+        self._actions.opened()
+        self._viewpoint.follow_cameras(None, False)
+
+    def keep_picture(self, picture: np.ndarray) -> None:
+        """Of what is open, (H, W, 3) display sRGB, for the list of recent files."""
+        path, self.picture_due = self.picture_due, None
+        if path is None or self.pictures is None or self.recent is None:
+            return
+        try:
+            self.pictures.keep(path, picture, self.recent.paths)
+        except OSError:
+            self.pictures = None  # the list does without
+
     def handle_event(self, event: Event) -> bool:
-        """True for Ctrl+O, for keys while the box is open, and for what is dropped on it."""
+        """True for Ctrl+O and Ctrl+N, and while the box is open for keys and what is dropped."""
         match event:
             case KeyDown(shortcut="o") if not self._box.asking:
                 self.ask()
+            case KeyDown(shortcut="n") if not self._box.asking:
+                self.new()
             case KeyDown() if self._box.asking:
                 pass
             case Drop() if self._box.asking:
@@ -90,7 +122,7 @@ class Files:
     def poll(self) -> bool:
         """Takes over what has been read; True while something is being read or looked for."""
         busy = poll_opener(self._state, self._opener, self._ask_and_show)
-        return busy or self._box.browsing
+        return busy or self._box.browsing or self.picture_due is not None
 
     def _ask_and_show(self, found: OpenedFiles) -> None:
         if found.sources:
@@ -132,9 +164,11 @@ class Files:
         here = self._state.edited.path
         others = {TOUCH_LABEL: TOUCH} if self._at_demo else {DEMO_LABEL: DEMO}
         others = others if self._at_demo or here == TOUCH else {}
-        wants, chosen = self._row.draw(self.recent, others, ui_scale)
-        if wants:
+        clicked, chosen = self._row.draw(self.recent, self.pictures, others, ui_scale)
+        if clicked == OPEN:
             self.ask()
+        elif clicked == NEW:
+            self.new()
         elif chosen is not None:
             self.open_soon((chosen,))
 
@@ -168,6 +202,7 @@ class Files:
             return
         try:
             self.recent.add(path)
+            self.picture_due = path.absolute()
         except OSError as error:
             sentence = f"The list of recent files cannot be kept: {error.strerror}."
             self._state.messages.fail(sentence)

@@ -42,6 +42,8 @@ class InputActions:
     ) -> None:  # fmt: skip
         self._window, self._state, self._viewpoint = window, state, viewpoint
         self._hooks, self._open_soon = hooks, open_soon
+        self._pivot: np.ndarray | None = None  # (3,) metres, that a drag turns about
+        self.pad_push: Callable[[], Push] = Push  # what sticks ask for
 
     def handle_event(self, event: Event) -> None:
         """Lets one input event act."""
@@ -62,9 +64,15 @@ class InputActions:
                 self.handle_event(event)
             case Drag(button="middle") | Drag(button="right") if self.pans(event):
                 camera.pan(-event.dx / height, event.dy / height)
+            case Press(button="left"):
+                self._pivot = self._pressed_point(event)
             case Drag():
                 rate = LOOK if camera.flying else TURN
-                camera.turn(-event.dx * rate, -event.dy * rate)
+                yaw, pitch = -event.dx * rate, -event.dy * rate
+                if self._pivot is None or event.button != "left":
+                    camera.turn(yaw, pitch)
+                else:
+                    camera.turn_about(self._pivot, yaw, pitch)
             case Wheel():
                 camera.dolly(event.notches)
             case DoubleClick():
@@ -73,6 +81,14 @@ class InputActions:
                     camera.focus(hit.point)
             case Drop():
                 self._open_soon(event.paths)
+
+    def _pressed_point(self, event: Press) -> np.ndarray | None:
+        """(3,) metres: what lies where the mouse was pressed, if drags are to turn about that."""
+        camera = self._viewpoint.camera
+        if not camera.about_pointer or camera.flying:
+            return None
+        hit = self.point_at(event.x, event.y)
+        return None if hit is None else hit.point
 
     def press_key(self, event: KeyDown) -> None:
         """Keys that act once; the held ones are asked for in `push`."""
@@ -90,6 +106,8 @@ class InputActions:
                 viewpoint.frame_all()
             case key if key in VIEWS:
                 viewpoint.look_from(VIEWS[key][event.ctrl])
+            case glfw.KEY_KP_5:
+                viewpoint.toggle_orthographic()
             case glfw.KEY_SPACE:
                 state.toggle_play()
             case glfw.KEY_LEFT | glfw.KEY_RIGHT:
@@ -111,15 +129,16 @@ class InputActions:
 
     @property
     def push(self) -> Push:
-        """The movement keys that are held now."""
+        """The movement keys that are held now, else a stick."""
         held = self._window.held
         slow = held(glfw.KEY_LEFT_CONTROL) or held(glfw.KEY_RIGHT_CONTROL)
-        return Push(
+        keys = Push(
             right=held(glfw.KEY_D) - held(glfw.KEY_A),
             up=held(glfw.KEY_E) - held(glfw.KEY_Q),
             forward=held(glfw.KEY_W) - held(glfw.KEY_S),
             pace=FAST if self.shift else SLOW if slow else 1.0,
         )
+        return keys if keys.any else self.pad_push()
 
     @property
     def shift(self) -> bool:

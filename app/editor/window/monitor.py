@@ -1,8 +1,57 @@
-"""The monitor on which a window lies, as glfw tells of it."""
+"""A window of the desktop as glfw opens it, the monitor on which it lies, and its place there."""
 
+import warnings
 from typing import Any
 
 import glfw
+import moderngl
+from moderngl_window.context.glfw import Window as GlfwWindow
+
+from shapeshift.app.program import program
+from shapeshift.renderer.gl.context import NoContext
+
+Place = tuple[int, int, int, int]  # left, top, width, height of a window on the desktop
+LEAST_SEEN = 80  # pixels of a kept place, across and down, that a monitor has to show
+
+
+def open_window(title: str, size: tuple[int, int]) -> GlfwWindow:
+    """The glfw window, or NoContext in one sentence."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")  # pyGLFW reports through warnings
+        try:
+            return GlfwWindow(title=title, size=size, gl_version=(4, 3), vsync=True)
+        except (ValueError, moderngl.Error, OSError) as error:
+            reasons = [str(w.message).split(") ", 1)[-1].strip("'\" b") for w in said]
+            reason = (reasons or [str(error)])[0].rstrip(".")
+    raise NoContext(
+        f"no window with OpenGL 4.3 could be opened ({reason}); "
+        f"`{program()} headless` and `{program()} render` need none."
+    )
+
+
+def place_of(handle: Any) -> Place | None:
+    """Where a window is; None: nowhere of its own, or the desktop does not tell."""
+    filled = bool(glfw.get_window_monitor(handle))  # a pointer, which may be null
+    hidden = glfw.get_window_attrib(handle, glfw.ICONIFIED)
+    if filled or hidden or glfw.get_window_attrib(handle, glfw.MAXIMIZED) or not tells_places():
+        return None
+    return (*glfw.get_window_pos(handle), *glfw.get_window_size(handle))
+
+
+def put_window(handle: Any, place: Place) -> None:
+    """Back to where it was; only its size where no monitor shows enough of that place any more."""
+    left, top, width, height = place
+    glfw.set_window_size(handle, width, height)
+    if tells_places() and any(_shows(monitor, place) for monitor in glfw.get_monitors()):
+        glfw.set_window_pos(handle, left, top)
+
+
+def _shows(monitor: Any, place: Place) -> bool:
+    """Whether a monitor shows enough of the upper edge of a place for a hand to take it."""
+    left, top, width, _ = place
+    x, y, across, down = glfw.get_monitor_workarea(monitor)
+    wide = min(left + width, x + across) - max(left, x)
+    return wide >= LEAST_SEEN and y <= top <= y + down - LEAST_SEEN
 
 
 def monitor_height(handle: Any) -> tuple[float, float]:

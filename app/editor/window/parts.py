@@ -2,15 +2,15 @@
 
 import glfw
 import numpy as np
-from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.outlines import draw_brush, draw_segments, segments
 from shapeshift.app.editor.panels.panel import Section
-from shapeshift.app.editor.panels.sections.parts_panel import draw_parts
-from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.parts_marks import draw_drag
+from shapeshift.app.editor.panels.sections.parts_panel import DRAG_WORDS, draw_parts
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import ADD, REMOVE, REPLACE, PartsTool
+from shapeshift.app.editor.state.parts.selecting import COLOR, LASSO, SPHERE
 from shapeshift.app.editor.state.regions import Region
 from shapeshift.app.editor.window.hands import TURN
 from shapeshift.app.editor.window.hooks import Hooks
@@ -27,11 +27,11 @@ from shapeshift.app.editor.window.window import (
     Window,
 )
 
-Vec = imgui.ImVec2
 KEYS = (
     ("O", "take things out of the scene, on and off"),
     ("click", "choose the thing there; Shift adds, Alt removes"),
     ("drag", "a box: the thing in it; right drag orbits"),
+    ("U, Shift+U", "drag: a box of all, a lasso, a sphere; click: a colour"),
     ("Ctrl+wheel", "more, less of what lights up"),
     ("B + drag", "add anchors; Shift or Alt removes"),
     ("Enter", "make it an object"),
@@ -60,7 +60,9 @@ def attach_parts(
     hooks.sections.append(
         Section(
             "Parts",
-            lambda scale: draw_parts(tool, scale),
+            lambda scale: draw_parts(
+                tool, scale, mouse.how, viewpoint.view().world_from_eye.position
+            ),
             opens=mouse.opens,
             early=lambda: tool.on,
         )
@@ -77,7 +79,7 @@ class MouseParts:
     ) -> None:
         self._tool, self._state, self._window, self._viewpoint = tool, state, window, viewpoint
         self._pressed: tuple[float, float] | None = None  # logical pixels; None: no press is ours
-        self._corner: tuple[float, float] | None = None  # where a drag is now: a box is drawn
+        self._way: list[tuple[float, float]] = []  # of a drag, logical pixels: a box is drawn
         self._painting = self._turning = False
         self._pointed: tuple = ()  # where the mouse was looked up last, and from where
         self._was_on = False
@@ -100,6 +102,11 @@ class MouseParts:
         return REPLACE
 
     @property
+    def eye(self) -> np.ndarray:
+        """(3,) metres, world."""
+        return self._viewpoint.view().world_from_eye.position
+
+    @property
     def is_brush(self) -> bool:
         return self._tool.on and self._window.held(glfw.KEY_B)
 
@@ -111,7 +118,7 @@ class MouseParts:
             return False
         match event:
             case Press(button="left"):
-                self._pressed, self._corner = (event.x, event.y), None
+                self._pressed, self._way = (event.x, event.y), []
                 self._painting = self.is_brush
                 if self._painting:
                     self._paint(event.x, event.y, starts=True)
@@ -119,8 +126,8 @@ class MouseParts:
                 self._paint(event.x, event.y, starts=False)
             case Drag(button="left") if self._pressed is not None:
                 x, y = self._pressed
-                if self._corner or abs(event.x - x) + abs(event.y - y) > CLICK_PIXELS:
-                    self._corner = (event.x, event.y)
+                if self._way or abs(event.x - x) + abs(event.y - y) > CLICK_PIXELS:
+                    self._way.append((event.x, event.y))
             case Release(button="left"):
                 self._let_go()
             case Drag(button="right"):
@@ -144,6 +151,9 @@ class MouseParts:
         match event.key:
             case glfw.KEY_O if not event.ctrl:
                 tool.toggle()
+            case glfw.KEY_U if tool.on and not event.ctrl:
+                tool.selecting.next_drag(-1 if event.shift else 1)
+                state.say(DRAG_WORDS[tool.selecting.drag])
             case glfw.KEY_I if not event.ctrl:
                 show = state.shown_scene.next_view(-1 if event.shift else 1)
                 state.say(f"View: {show}")
@@ -164,8 +174,8 @@ class MouseParts:
     def _escape(self) -> None:
         """The box first, then the crop box, then what is chosen, then the tool."""
         tool = self._tool
-        if self._corner is not None:
-            self._pressed = self._corner = None
+        if self._way:
+            self._pressed, self._way = None, []
         elif tool.crop is not None:
             tool.crop = None
         elif tool.count:
@@ -174,18 +184,25 @@ class MouseParts:
             tool.toggle()
 
     def _let_go(self) -> None:
-        """A click, or the end of a box."""
-        pressed, corner = self._pressed, self._corner
-        self._pressed = self._corner = None
+        """A click, or the end of a drag."""
+        pressed, way = self._pressed, self._way
+        self._pressed, self._way = None, []
         if self._painting or pressed is None:
             self._painting = False
             return
-        view = self._viewpoint.view()
-        if corner is None:
-            self._tool.click(view, self._pixel(pressed), self.how)
+        tool, view, start = self._tool, self._viewpoint.view(), self._pixel(pressed)
+        drag, select = tool.selecting.drag, tool.selecting
+        if not way and drag == COLOR:
+            select.alike(view, start, self.how)
+        elif not way:
+            tool.click(view, start, self.how)
+        elif drag == LASSO:
+            outline = np.array([start, *map(self._pixel, way)])
+            select.lasso(view, outline, self.how)
+        elif drag == SPHERE:
+            select.sphere(view, start, self._pixel(way[-1]), self.how)
         else:
-            corners = (*self._pixel(pressed), *self._pixel(corner))
-            self._tool.box(view, corners, self.how)
+            tool.box(view, (*start, *self._pixel(way[-1])), self.how)
 
     def _paint(self, x: float, y: float, starts: bool) -> None:
         window = self._window
@@ -211,6 +228,7 @@ class MouseParts:
             tool.finder.eyes = [view.world_from_eye.position for view in cameras.views]
         view = self._viewpoint.view()
         idle = self._pressed is None and not self.is_brush and tool.crop is None
+        idle = idle and tool.selecting.drag != COLOR
         if idle and window.on_scene and not self._viewpoint.moving:
             key = (window.cursor, self.how, view.eye_from_world().tobytes(), self._state.scene)
             if key[:3] != self._pointed[:3] or key[3] is not self._pointed[3]:
@@ -227,12 +245,9 @@ class MouseParts:
         tool, window = self._tool, self._window
         if not tool.on:
             return
-        draw = imgui.get_background_draw_list()
-        if self._pressed is not None and self._corner is not None:
-            corners = np.array([self._pressed, self._corner])
-            low, high = corners.min(axis=0), corners.max(axis=0)
-            ink = theme.color(theme.TEXT if self.how == REMOVE else theme.ACCENT, 0.9)
-            draw.add_rect(Vec(*low), Vec(*high), ink, 0.0, 0, 1.5 * ui_scale)
+        if self._pressed is not None and self._way:
+            removes = self.how == REMOVE
+            draw_drag(tool.selecting.drag, self._pressed, self._way, removes, ui_scale)
         if self.is_brush and window.on_scene:
             erases = self.how != REPLACE
             draw_brush(window.cursor, self._state.regions.brush * ui_scale, erases, ui_scale)

@@ -1,4 +1,4 @@
-"""What concerns the window and no scene: text size, folded panel, sheet of keys, messages."""
+"""What concerns the window and no scene: text size, language, folded panel, keys, messages."""
 
 from collections.abc import Callable
 
@@ -7,9 +7,13 @@ import glfw
 from shapeshift.app.editor.panels.keys_sheet import Row, draw_keys
 from shapeshift.app.editor.panels.messages_panel import draw_messages
 from shapeshift.app.editor.panels.panel import PanelActions
+from shapeshift.app.editor.panels.sections.settings_panel import draw_settings
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.user.settings import ProgramSettings, other_text_size
+from shapeshift.app.editor.texts.fonts import is_offered, why_not
+from shapeshift.app.editor.texts.table import all_languages, use_language
+from shapeshift.app.editor.window.monitor import place_of
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 
 LARGER, SMALLER, AS_AT_FIRST = ("+", "="), ("-",), ("0",)  # with Ctrl
@@ -27,7 +31,9 @@ class Shell:
     ) -> None:
         self._window, self._settings, self._messages, self._now = window, settings, messages, now
         self.keys_open = False
-        self.actions = PanelActions(self.fold, self.resize_text, self.show_keys)
+        self.actions = PanelActions(
+            self.fold, self.resize_text, self.show_keys, settings.sections, self.keep
+        )
 
     def handle_event(self, event: Event) -> bool:
         """True for a key that is the shell's."""
@@ -56,14 +62,31 @@ class Shell:
         size = other_text_size(self._window.text_size, step) if step else None
         self._window.text_size = self._settings.text_size = size
         self._messages.say(f"Text size {self._window.text_size:.0%}", self._now())
-        self._keep()
+        self.keep()
+
+    def draw_settings(self, ui_scale: float) -> None:
+        """What the section Settings has."""
+        draw_settings(self._settings, self.speak, self.keep, ui_scale)
+
+    def speak(self, code: str) -> None:
+        """Texts of another language from the next frame on; kept for the next start."""
+        use_language(code)
+        self._settings.language = code
+        self._window.restyle()
+        self.keep()
+
+    def keep_place(self) -> None:
+        """Where the window is, for the next start; called when it closes."""
+        self._settings.place = place_of(self._window.handle) or self._settings.place
+        self.keep()
 
     def fold(self, folded: bool) -> None:
         """Folds or opens the panel; kept for the next start."""
         self._settings.panel_open = not folded
-        self._keep()
+        self.keep()
 
-    def _keep(self) -> None:
+    def keep(self) -> None:
+        """Writes the settings; what stands against that is said once."""
         try:
             self._settings.keep()
         except OSError as error:
@@ -78,3 +101,12 @@ class Shell:
             boxes.append(box)
             self.keys_open = not closed
         return boxes
+
+
+def speak_first(settings: ProgramSettings, messages: Messages) -> None:
+    """The language of the settings, before the window opens; English where no font has it."""
+    language = all_languages().get(settings.language)
+    if language is not None and not is_offered(language.code):
+        messages.fail(why_not(language))
+        language = None
+    use_language(language.code if language is not None else "")

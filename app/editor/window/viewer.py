@@ -1,6 +1,7 @@
 """The viewer: a window loop that draws only when something has changed."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +30,11 @@ from shapeshift.app.editor.state.frame_stats import FrameStatsView
 from shapeshift.app.editor.state.layout import Box, Layout, lay_out
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.quality_controller import FLOOR_DB, TARGET_MS, QualityController
+from shapeshift.app.editor.state.user.kept_palette import KeptPalette
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.adding import Adding
+from shapeshift.app.editor.window.devices.gamepads import attach_pads
 from shapeshift.app.editor.window.files import Files, OpenActions
 from shapeshift.app.editor.window.film.films import attach_films
 from shapeshift.app.editor.window.gizmo import Gizmo
@@ -69,9 +72,7 @@ class Viewer:
     ) -> None:  # fmt: skip
         self.window, self.renderer, self.state, self.options = window, renderer, state, options
         state.overlay = options.panel
-        self.settings = (
-            settings or ProgramSettings()
-        )  # of the program; state.settings are the picture's
+        self.settings = settings or ProgramSettings()  # state.settings are the picture's
         folders = WorkFolders.of(options.pictures)
         self._pictures = folders.pictures
         self.hooks = Hooks()
@@ -84,12 +85,11 @@ class Viewer:
         )
         self.viewpoint = Viewpoint(state, lambda: window.size, self._free_wanted, self._pictures)
         self.shown = Shown(renderer, self.readings)
-        self.dial = QualityController(
-            options.target_ms or TARGET_MS,
-            options.floor_db or FLOOR_DB,
-            wanted=(options.target_ms or options.floor_db) is not None,
-        )
+        target_ms, floor_db = options.target_ms or TARGET_MS, options.floor_db or FLOOR_DB
+        wanted = (options.target_ms or options.floor_db) is not None
+        self.dial = QualityController(target_ms, floor_db, wanted=wanted)
         self.hands = InputActions(window, state, self.viewpoint, self.hooks, self.open_soon)
+        self.pads = attach_pads(window, state, self.viewpoint, self.hands, self.hooks)
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
@@ -98,24 +98,24 @@ class Viewer:
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
         self._add_sections()
+        kept = KeptPalette(state, self.settings, self.shell.keep)
+        self.hooks.opened.append(kept.use)
+        self.hooks.each_frame.append(kept.poll)
         self._framed = Framed(self.viewpoint.free_size, self.viewpoint.refit)
         self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
         self.hooks.opened.append(self._framed.forget)
         self.hooks.event_handlers.insert(0, self.shell.handle_event)
         self._title = ""  # what the window's title says
-        self.frames = 0  # drawn since the window opened
-        self._overlay_ms = 0.0
+        self.frames, self._overlay_ms = 0, 0.0  # drawn since the window opened, of the last one
 
     # ---- the parts
 
     def _attach_files(self) -> Files:
         hooks, state = self.hooks, self.state
         actions = OpenActions(
-            self.shown.upload,
-            lambda then: self.objects.saving.before_losing(then),
-            self.show_scene,
+            self.shown.upload, lambda then: self.objects.saving.before_losing(then), self.show_scene
         )
-        files = Files(state, self.viewpoint, self.options, actions)
+        files = Files(state, self.viewpoint, self.options, actions, self.window.textures)
         hooks.each_frame += [files.poll, lambda: poll_bodies(state)]
         hooks.top.append(files.draw_row)
         hooks.marks.append(files.draw_box)
@@ -157,11 +157,11 @@ class Viewer:
     def _attach_cameras_and_export(self, folders: WorkFolders) -> None:
         hooks, state, viewpoint = self.hooks, self.state, self.viewpoint
         hooks.sections.append(
-            Section("Camera", lambda scale: draw_cameras(viewpoint, scale), open_first=True)
+            Section("Camera", lambda scale: draw_cameras(state, viewpoint, scale), open_first=True)
         )
         hooks.status.append(lambda: viewpoint.steps.text)
         hooks.marks.append(lambda scale: draw_edges(state, viewpoint, scale))
-        exporting = Exporting(state, viewpoint, folders.exports)
+        exporting = self.exporting = Exporting(state, viewpoint, folders.exports)
         hooks.sections.append(Section("Export", lambda scale: draw_export(exporting, state, scale)))
         hooks.each_frame.append(exporting.poll)
         hooks.opened.append(exporting.forget)
@@ -179,6 +179,7 @@ class Viewer:
                 lambda scale: draw_regions(state, scale),
                 open_first=bool(state.regions.items),
             ),
+            Section("Settings", self.shell.draw_settings),
             Section(
                 "Performance",
                 lambda scale: draw_performance(state, dial, readings, scale),
@@ -193,7 +194,8 @@ class Viewer:
         last = time.perf_counter()
         while not (self.window.closing and self.may_close()):
             busy = self.busy()
-            redraw = self.window.wait(0.0 if busy else POLL_S if self.polling else SLEEP_S)
+            watched = self.polling or self.pads.connected
+            redraw = self.window.wait(0.0 if busy else POLL_S if watched else SLEEP_S)
             now = time.perf_counter()
             if self.window.minimised:
                 last = now
@@ -202,7 +204,7 @@ class Viewer:
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
             due = self.state.messages.ended(now) or self.idle_work_due(now)
-            if busy or redraw or self.polling or due:
+            if busy or redraw or self.polling or due or self.pads.poll():
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
@@ -244,6 +246,8 @@ class Viewer:
             self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
             self.dial.seen((now - start) * 1e3, self._moving)
         self.readings.idle = not fresh
+        if self.files.picture_due is not None and not fresh:
+            self.files.keep_picture(self.renderer.resolved(0))
 
     def handle_event(self, event: Event) -> None:
         """Lets one input event act."""
@@ -283,11 +287,14 @@ class Viewer:
         """What the screen should show now."""
         state, view, moving = self.state, self.viewpoint.view(), self._moving
         settings = self.dial.while_moving(state.settings) if moving else state.settings
-        return FrameRequest(state.shown(view), view, settings, moving or self.dial.measuring)
+        if self.viewpoint.parallel:  # whose eye is far away from all
+            settings = replace(settings, max_distance=np.inf)
+        shown = state.shown(self.viewpoint.eye_view())
+        return FrameRequest(shown, view, settings, moving or self.dial.measuring)
 
     @property
     def _moving(self) -> bool:
-        by_hand = self.viewpoint.moving or self.hands.push.any
+        by_hand = self.viewpoint.moving or self.hands.push.any or self.pads.input.moving
         state = self.state
         living = state.world is not None and state.running and not state.world.resting
         return by_hand or state.playing or living
@@ -333,7 +340,7 @@ class Viewer:
             right = state.split.right(state.scene) if state.split.on else state.scene
             for scene, box in ((state.scene, layout.left_legend), (right, layout.legend)):
                 if box is not None:
-                    draw_scale_bar(scene, box, scale)
+                    draw_scale_bar(scene, box, scale, wanted=self.settings.temperature)
             debug, stats = state.settings.debug, self.readings.stats
             draw_legend(debug_legend(debug, stats), layout.free, scale)
             hooks, words = self.hooks, [words() for words in self.hooks.status]

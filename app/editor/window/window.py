@@ -1,6 +1,5 @@
 """The real window: glfw through moderngl-window, ImGui on top, input as a list of plain events."""
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,17 +7,20 @@ import glfw
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
-from moderngl_window.context.glfw import Window as GlfwWindow
 from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
 from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.app.editor.state.user.settings import default_text_size
-from shapeshift.app.editor.window.monitor import grow_window, monitor_height
+from shapeshift.app.editor.window.monitor import (
+    Place,
+    grow_window,
+    monitor_height,
+    open_window,
+    put_window,
+)
 from shapeshift.app.paths import plain
-from shapeshift.app.program import program
-from shapeshift.renderer.gl.context import NoContext
 from shapeshift.runtime_models.files.plain_text import one_line
 
 BUTTONS = {0: "left", 1: "right", 2: "middle"}
@@ -49,7 +51,7 @@ TEXT_KEYS = {  # what typing a number into a slider needs
     glfw.KEY_Y: imgui.Key.y,
     glfw.KEY_Z: imgui.Key.z,
 }
-SHORTCUTS = ("z", "y", "s", "d", "o", "+", "=", "-", "0")  # with Ctrl, as printed on the key
+SHORTCUTS = ("z", "y", "s", "d", "o", "n", "+", "=", "-", "0")  # with Ctrl, as printed on the key
 REPEATING = (glfw.KEY_LEFT, glfw.KEY_RIGHT)  # held down they go on
 MOVING = (glfw.KEY_W, glfw.KEY_A, glfw.KEY_S, glfw.KEY_D, glfw.KEY_Q, glfw.KEY_E)
 
@@ -109,7 +111,7 @@ class Window:
     """
 
     def __init__(self, title: str, size: tuple[int, int], text_size: float | None = None) -> None:
-        self._window = _open(title, size)
+        self._window = open_window(title, size)
         self.handle = self._window._window  # glfw's own, private in moderngl-window
         self._window.exit_key = None  # Escape belongs to the overlay
         self.ctx: moderngl.Context = self._window.ctx
@@ -166,7 +168,12 @@ class Window:
     @text_size.setter
     def text_size(self, size: float | None) -> None:
         """None: as the monitor asks for."""
-        self._chosen_size, self._restyle = size, True
+        self._chosen_size = size
+        self.restyle()
+
+    def restyle(self) -> None:
+        """The next frame has other letters: another language."""
+        self._restyle = True
         self._note()
 
     def _size_for_monitor(self) -> float:
@@ -179,9 +186,12 @@ class Window:
         """What input and overlay are measured in."""
         return self._window.size
 
-    def grow_with_text(self) -> None:
-        """A window as much larger as its text is, in the middle of its monitor."""
-        grow_window(self.handle, self.text_size)
+    def stand(self, place: Place | None) -> None:
+        """Where it was before; without that as much larger as its text is, in the middle."""
+        if place is not None:
+            put_window(self.handle, place)
+        else:
+            grow_window(self.handle, self.text_size)
 
     @property
     def closing(self) -> bool:
@@ -383,18 +393,3 @@ class Window:
         """
         inside = (left <= x < right and top <= y < low for left, top, right, low in self.covered)
         return self.popup_open or any(inside)
-
-
-def _open(title: str, size: tuple[int, int]) -> GlfwWindow:
-    """The glfw window, or NoContext in one sentence."""
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")  # pyGLFW reports through warnings
-        try:
-            return GlfwWindow(title=title, size=size, gl_version=(4, 3), vsync=True)
-        except (ValueError, moderngl.Error, OSError) as error:
-            reasons = [str(w.message).split(") ", 1)[-1].strip("'\" b") for w in said]
-            reason = (reasons or [str(error)])[0].rstrip(".")
-    raise NoContext(
-        f"no window with OpenGL 4.3 could be opened ({reason}); "
-        f"`{program()} headless` and `{program()} render` need none."
-    )

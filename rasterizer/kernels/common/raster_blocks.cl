@@ -3,7 +3,8 @@
 // numbered down their column first, then to the right, so that a column's blocks are neighbouring
 // bits of a mask.
 // Reads:   STOP (common/raster.cl), RECORD (common/record.cl); EVERY_BLOCK, for a test.
-// Defines: BLOCK_W, BLOCK_H, BLOCKS, BATCH; Batch and fetch(); inside(), lowest(), still_open().
+// Defines: BLOCK_W, BLOCK_H, BLOCKS, BATCH; copy_record(); Batch and fetch(); inside(), lowest(),
+//          still_open().
 // Units:   pixels, row 0 on top.
 #include "common/vector.cl"
 #include "common/raster.cl"
@@ -20,8 +21,7 @@
 #define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
 
-// A batch of intersections of one tile; the records as they are: the backward pass needs the conic
-// unscaled.
+// A batch of intersections of one tile; the records as they are.
 typedef struct {
   float splats[BATCH * RECORD];
   uint blocks[BATCH];  // those that the splat's ellipse touches
@@ -76,6 +76,12 @@ inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
   return mask;
 }
 
+inline void copy_record(__global const float* record, int splat, float* to) {
+  __global const float* from = record + (size_t)RECORD * splat;
+  vstore8(vload8(0, from), 0, to);
+  vstore4(vload4(0, from + 8), 0, to + 8);
+}
+
 // Fills a batch from the list [p, end) and returns how many it got.  Records are copied first:
 // independent loads, so that their misses overlap.  The masks are made eight at a time and ahead of
 // use: a mask that is late makes every mispredicted end of a block loop dear.
@@ -84,10 +90,8 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* intersectio
   const int n = min(BATCH, end - p);
   Columns e;
   for (int j = 0; j < n; j++) {
-    __global const float* from = record + (size_t)RECORD * intersections[p + j];
     float* s = batch->splats + RECORD * j;
-    vstore8(vload8(0, from), 0, s);
-    vstore4(vload4(0, from + 8), 0, s + 8);
+    copy_record(record, intersections[p + j], s);
     e.x[j] = s[MEAN_X];
     e.y[j] = s[MEAN_Y];
     e.a[j] = s[CONIC_A];

@@ -202,6 +202,20 @@ def test_controls():
             split_controls((text,))
 
 
+def test_exposure_opacity_and_a_sky(scene, tmp_path):
+    more = (*TINY, "--background", "0", "0", "0")
+    assert render(scene, "--out", tmp_path / "plain", *more) == 0
+    assert render(scene, "--out", tmp_path / "dark", "--exposure", "-2.2", *more) == 0
+    plain, dark = (picture(tmp_path / name / "0000_x0.000.png") for name in ("plain", "dark"))
+    unclipped = plain < 1  # before a black background half of everything; 8 bits each
+    assert np.abs(dark - plain / 2)[unclipped].max() <= 1.01 / 255
+    sky = ("--sky", "ff0000", "#00ff00", "0000FF", "--opacity", "0")
+    assert render(scene, "--out", tmp_path / "sky", *TINY, *sky) == 0
+    shown = picture(tmp_path / "sky" / "0000_x0.000.png")
+    # The camera looks down a little: green level with the eye, blue below it.
+    assert np.all(np.diff(shown[:, 20, 2]) >= 0) and np.abs(shown.sum(axis=2) - 1).max() < 0.01
+
+
 REFUSED = {
     ("--frames", "100001"): "--frames is 100001, expected 1 to 100000",
     ("--frames", "-1"): "--frames is -1",
@@ -209,6 +223,11 @@ REFUSED = {
     ("--stereo", "nan"): "--stereo is nan",
     ("--stereo", "-0.1"): "--stereo is -0.1",
     ("--background", "nan", "0", "0"): "--background",
+    ("--opacity", "1.1"): "--opacity is 1.1, expected a number from 0 to 1",
+    ("--gamma", "0"): "--gamma is 0.0, expected a number from 0.1 to 10",
+    ("--tint", "1", "1", "nan"): "--tint is",
+    ("--sky", "ffffff", "blue", "000000"): "--sky has the colour 'blue'",
+    ("--sky", "ffffff", "0000ff", "000000", "--background", "0", "0", "0"): "leave one of the two",
     ("--size", "16384x16384"): "134,217,728 pixels",
     ("--camera", "sideways"): "sideways does not exist; wanted is a list of cameras",
 }

@@ -1,7 +1,9 @@
 """The ticks of the thermal scale: round values, inside the range, written with one precision."""
 
 import pytest
+from pytest import approx
 
+from shapeshift.app.editor.panels import scale_bar
 from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
 
 
@@ -19,3 +21,12 @@ def test_scale_ticks_are_round_and_inside(low, high, want):
     values = nice_ticks(low, high)
     assert tick_text(values) == want
     assert all(low - 1e-9 <= value <= high + 1e-9 for value in values)
+
+
+def test_a_legend_in_another_unit():
+    """Water freezes and boils, and nothing is colder than 0 K."""
+    assert scale_bar.in_unit("\u00b0C", 0, 100, "\u00b0F") == ("\u00b0F", *map(approx, (32, 212)))
+    assert scale_bar.in_unit("\u00b0F", 32, 212, "K") == ("K", *map(approx, (273.15, 373.15)))
+    assert scale_bar.in_unit("K", 0, 273.15, "\u00b0C") == ("\u00b0C", *map(approx, (-273.15, 0)))
+    for unit, wanted in (("W/m\u00b2", "K"), ("\u00b0C", ""), ("\u00b0C", "furlong")):
+        assert scale_bar.in_unit(unit, 1, 2, wanted) == (unit, 1, 2)

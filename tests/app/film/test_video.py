@@ -1,14 +1,16 @@
 """film into videos and moving pictures: what FFmpeg and Pillow read back of them."""
 
 import importlib.util
+import os
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from shapeshift.app import cli
-from shapeshift.app.film.write_video import durations_ms, yuv420
+from shapeshift.app.film.write_video import durations_ms, encode, yuv420
 from shapeshift.scene.film.film_path import exact_fps
 from tests.support.three_stops import three_stop_package
 
@@ -64,6 +66,26 @@ def test_a_video_holds_every_frame(scene, tmp_path, name, codec, found):
         for path, image in zip(frames, shown, strict=True)
     ]
     assert 10 * np.log10(255**2 / np.mean(errors)) > 30
+
+
+@with_av
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are listed by Linux")
+def test_av1_leaves_no_thread_in_the_realtime_class(tmp_path):
+    """SVT-AV1 asks for SCHED_FIFO where it may: as root, which is where this can fail."""
+    paths = [tmp_path / f"{k}.png" for k in range(3)]
+    for k, path in enumerate(paths):
+        Image.fromarray(np.full((64, 64, 3), 80 * k, np.uint8)).save(path)
+    seen = []
+
+    def look(_: int) -> None:
+        tasks = [int(task.name) for task in Path("/proc/self/task").iterdir()]
+        seen.append({os.sched_getscheduler(task) for task in tasks})
+
+    encode(tmp_path / "a.mp4", paths, exact_fps(6), "av1", look)
+    # threads of other libraries may be in a class below: Mesa compiles shaders in SCHED_BATCH
+    assert len(seen) == 3
+    assert not set.union(*seen) - {os.SCHED_OTHER, os.SCHED_BATCH, os.SCHED_IDLE}
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
 
 
 @with_av

@@ -61,9 +61,9 @@ def decoded(renderer, monkeypatch) -> list[int]:
     """How many anchors each call of decode_color was asked for; filled while frames are drawn."""
     asked, whole = [], renderer.drawing.decode_color
 
-    def count(i, shade, eye, seen=None, at_once=False):
+    def count(i, shade, eye, seen=None, *how):
         asked.append(-1 if seen is None else int(np.count_nonzero(seen)))
-        whole(i, shade, eye, seen, at_once)
+        whole(i, shade, eye, seen, *how)
 
     monkeypatch.setattr(renderer.drawing, "decode_color", count)
     return asked

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapeshift.scene.appearance import Appearance, Sky
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.edits import Change, History, changes
 from shapeshift.scene.document.read_scene_file import read_scene_file
-from shapeshift.scene.document.scene_file import BACKGROUND, SceneFile, SceneItem
+from shapeshift.scene.document.scene_file import BACKGROUND, FirstView, SceneFile, SceneItem
 from shapeshift.scene.document.write_scene_file import write_scene_file
 from shapeshift.scene.pose import Pose
 
@@ -145,11 +146,37 @@ def test_the_scene_s_own_edits(file):
     assert edits.ground(file, None).floor_y is None and edits.ground(file, -0.7) is file
     with pytest.raises(ValueError, match="floor"):
         edits.ground(file, math.nan)
-    eye, target = np.array([0.1, 0.2, 1 / 3]), np.zeros(3)
-    view = edits.look_from(file, eye, target, 0.8).view
-    assert (view.eye, view.target, view.fov_y) == ((0.1, 0.2, 0.333333), (0, 0, 0), 0.8)
+    view = edits.rounded(FirstView((0.1, 0.2, 1 / 3), (0, 0, 0), 0.8, True, 0.25))
+    assert view == FirstView((0.1, 0.2, 0.333333), (0, 0, 0), 0.8, True, 0.25)
+    assert edits.look_from(file, view).view == view
     with pytest.raises(ValueError, match="straight"):
-        edits.look_from(file, np.array([0, 1.0, 0]), target, 0.8)
+        edits.look_from(file, FirstView((0, 1, 0), (0, 0, 0)))
+    sky = Sky((0, 0, 1), (1, 1, 1), (0.2, 0.2, 0.2))
+    assert edits.set_sky(file, sky).sky == sky and edits.set_sky(file, None) is file
+    look = Appearance(exposure=1.0)
+    assert edits.set_appearance(file, "", look).appearance == look
+    ball = edits.find(edits.set_appearance(file, "ball", look), "ball")
+    assert ball.appearance == look and edits.set_appearance(file, "", Appearance()) is file
+
+
+def test_named_views(file):
+    view, other = FirstView((0, 1, 2), (0, 0, 0)), FirstView((3, 1, 2), (0, 0, 0))
+    two = edits.keep_view(edits.keep_view(file, view), other)
+    assert [(v.name, v.view) for v in two.views] == [("view 1", view), ("view 2", other)]
+    named = edits.rename_view(two, "view 2", "  from \n the door ")
+    assert [v.name for v in named.views] == ["view 1", "from the door"]
+    assert edits.remove_view(named, "view 1").views == named.views[1:]
+    # A name that was freed is given again, one that is there never.
+    assert edits.keep_view(edits.remove_view(two, "view 1"), view).views[1].name == "view 1"
+    for bad in ("", "view 1", "x" * 101):
+        with pytest.raises(ValueError):
+            edits.rename_view(two, "view 2", bad)
+    with pytest.raises(ValueError, match="straight"):
+        edits.keep_view(file, FirstView((0, 1, 0), (0, 0, 0)))
+    for _ in range(98):
+        two = edits.keep_view(two, view)
+    with pytest.raises(ValueError, match="100 named views"):
+        edits.keep_view(two, view)
 
 
 # History

@@ -13,10 +13,12 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.appearance import Appearance, Sky
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import (
     FORMAT,
     FirstView,
+    NamedView,
     SceneFile,
     SceneItem,
     is_scene_file,
@@ -65,6 +67,7 @@ FULL = SceneItem(
     wxyz=(HALF, 0.0, -HALF, 0.0),
     x=StopWeights((("bone", THIRD), ("skin", 2 * THIRD))),
     visible=False,
+    appearance=Appearance(-1.5, 1.25, (1.0, 0.5, THIRD), 0.5),
     selectors=SELECTORS,
     collider="hulls",
     mass_kg=0.3,
@@ -85,7 +88,13 @@ def full(folder: Path) -> SceneFile:
         background=TABLE,
         floor_y=-0.25,
         gravity_m_s2=1.62,
-        view=FirstView((0, 1, 2), (0, 0.5, 0), 1.1),
+        view=FirstView((0, 1, 2), (0, 0.5, 0), 1.1, True, 0.25),
+        views=(
+            NamedView("from the dôor", FirstView((0, 1, 2), (0, 0.5, 0), 1.1)),
+            NamedView("plan", FirstView((0, 9, 0.1), (0, 0, 0), 0.5, True)),
+        ),
+        appearance=Appearance(opacity=0.25),
+        sky=Sky((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9)),
     )
 
 
@@ -240,7 +249,8 @@ def test_a_wrong_value_is_one_sentence_with_object_and_key(path, way, value, sai
     assert said in sentence
 
 
-INNER = [(), ("view",), ("background",), ("objects", 0), ("objects", 0, "pose"),
+INNER = [(), ("view",), ("background",), ("sky",), ("views", 0), ("appearance",),
+         ("objects", 0, "appearance"), ("objects", 0), ("objects", 0, "pose"),
          ("objects", 0, "two_axes"), ("objects", 0, "states", 0), ("objects", 0, "reactions", 0),
          ("objects", 0, "reactions", 3, "region"),
          *[("objects", 0, "selectors", i) for i in range(6)]]  # fmt: skip

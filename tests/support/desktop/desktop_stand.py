@@ -11,6 +11,7 @@ import numpy as np
 
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.scene.appearance import plain_color
 
 STOPS = (
     Stop("photo", 0.0),
@@ -67,7 +68,7 @@ class PlainRenderer:
 
     def present(self, framebuffer) -> None:
         self.presents += 1
-        framebuffer.clear(*self.settings.background)
+        framebuffer.clear(*plain_color(self.settings.background))
 
 
 def read_stub(path: Path):

@@ -43,10 +43,10 @@ def test_the_program_writes_rows_and_memory_is_what_is_said(scale, form, tmp_pat
 
 def test_bytes_follow_the_layout():
     five, ten = (step_memory(HeadLayout(splats=k)) for k in (5, 10))
-    assert five.slot == ten.slot == 52  # twelve gradients and an index
+    assert five.slot == ten.slot == 56  # twelve gradients, an index and a mask of blocks
     assert 0 < ten.anchor - five.anchor < five.anchor
     wide = step_memory(HeadLayout(splats=5, hidden=64))
     assert wide.anchor - five.anchor == 4 * 5 * 32
     total = five.total(1000, 5000, 120, photos=3)
-    by_hand = (five.rest, 1000 * five.anchor, 5000 * 52, 120 * (five.pixel + 3 * five.photo_pixel))
+    by_hand = (five.rest, 1000 * five.anchor, 5000 * 56, 120 * (five.pixel + 3 * five.photo_pixel))
     assert total == np.sum(by_hand)

@@ -2,9 +2,10 @@
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label, labelled_slider, tip
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.quality_controller import QualityController
+from shapeshift.app.editor.texts.table import said
 
 MS_RANGE = (2.0, 200.0)
 DB_RANGE = (20.0, 80.0)
@@ -34,14 +35,15 @@ def draw_budget(state: EditorState, dial: QualityController, ui_scale: float) ->
     if dial.measuring:
         _progress(dial, ui_scale)
     else:
-        label = "Measure again" if dial.rows else "Measure and choose"
-        if imgui.button(label, imgui.ImVec2(-1, 0)):
+        if imgui.button(
+            item_label("Measure again" if dial.rows else "Measure and choose"), imgui.ImVec2(-1, 0)
+        ):
             dial.wanted = True
         tip(
             "Times a dozen settings on this scene, on this machine, around this view. Then the "
             "dials above choose at once.", ui_scale,
         )  # fmt: skip
-    _, dial.dynamic = imgui.checkbox("fewer pixels while moving", dial.dynamic)
+    _, dial.dynamic = imgui.checkbox(item_label("fewer pixels while moving"), dial.dynamic)
     tip(
         "Dynamic resolution: where frames are slower than the dial says, moving pictures get "
         "fewer pixels, never below the floor once it is measured. At rest all are drawn.",
@@ -58,7 +60,7 @@ def _progress(dial: QualityController, ui_scale: float) -> None:
     gap = imgui.get_style().item_spacing.x
     width = imgui.get_content_region_avail().x
     button = 76 * ui_scale
-    imgui.progress_bar(dial.progress, imgui.ImVec2(width - button - gap, 0), "measuring")
+    imgui.progress_bar(dial.progress, imgui.ImVec2(width - button - gap, 0), said("measuring"))
     imgui.same_line()
-    if imgui.button("Cancel", imgui.ImVec2(button, 0)):
+    if imgui.button(item_label("Cancel"), imgui.ImVec2(button, 0)):
         dial.cancel()

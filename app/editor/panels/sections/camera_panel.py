@@ -3,6 +3,7 @@
 import numpy as np
 from imgui_bundle import imgui
 
+from shapeshift.app.editor.panels.sections.named_views_panel import draw_lens, draw_named_views
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import button_row, choice, tip
 from shapeshift.app.editor.state.camera.stepping import picture_box
@@ -47,7 +48,7 @@ def draw_edges(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> Non
     )
 
 
-def draw_cameras(viewpoint: Viewpoint, ui_scale: float) -> None:
+def draw_cameras(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> None:
     """Views from all sides, the camera's ways, cameras of a file, keeping views."""
     steps, kept = viewpoint.steps, viewpoint.kept
     sides = {name.title(): what for name, what in SIDES.items()}
@@ -66,6 +67,8 @@ def draw_cameras(viewpoint: Viewpoint, ui_scale: float) -> None:
     }
     if clicked := button_row(moves, ui_scale, len(moves)):
         deeds[clicked]()
+    draw_lens(viewpoint, ui_scale)
+    draw_named_views(state, viewpoint, ui_scale)
     if steps.count:
         imgui.text_disabled(steps.text)
         clicked = button_row(STEPS, ui_scale, 2)

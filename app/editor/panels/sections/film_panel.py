@@ -5,12 +5,19 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import button_row, choice, slider, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import (
+    button_row,
+    choice,
+    item_label,
+    slider,
+    tip,
+)
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.film.preview import Preview
 from shapeshift.app.editor.state.film.rendering import VIDEOS, Rendering
 from shapeshift.app.editor.state.film.timeline import CAMERA, STOP, Timeline
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 ROW = 22.0  # logical pixels of a row of keys
@@ -35,7 +42,7 @@ class FilmPanel:
         """The timeline, what adds keys, the clock, and the button that draws the film."""
         state, timeline = self.state, self.state.timeline
         if not state.scene.objects:
-            imgui.text_disabled("There is nothing to film.")
+            imgui.text_disabled(said("There is nothing to film."))
             return
         self._strip(ui_scale)
         plan = self.preview.plan
@@ -45,7 +52,7 @@ class FilmPanel:
             imgui.text_wrapped(timeline.problem)
         if plan is None and not timeline.problem:
             imgui.push_text_wrap_pos(0)
-            imgui.text_disabled("Key a view, or begin with a way around the scene.")
+            imgui.text_disabled(said("Key a view, or begin with a way around the scene."))
             imgui.pop_text_wrap_pos()
         if plan is not None:
             self._render(ui_scale)
@@ -124,7 +131,7 @@ class FilmPanel:
     def _keys(self, ui_scale: float) -> None:
         """Where the playhead is, playing, and keys."""
         timeline, steps = self.state.timeline, self.viewpoint.steps
-        words = f"{timeline.at_s:.2f} of {timeline.keys.seconds:.1f} s"
+        words = said("{now:.2f} of {all:.1f} s", now=timeline.at_s, all=timeline.keys.seconds)
         if timeline.chosen is not None and timeline.chosen[0] == STOP:
             words += f": {timeline.keys.stops[timeline.chosen[1]].word}"
         imgui.text_disabled(words)
@@ -141,7 +148,7 @@ class FilmPanel:
         }
         if clicked := button_row(tips, ui_scale, 3):
             deeds[clicked]()
-        around = "Past cameras" if steps.count > 1 else "Around"
+        around = PAST if steps.count > 1 else AROUND
         tips = {
             around: "Nine keys of a calm way past the cameras of the scene, or once around it, in "
             "place of the keys of the camera.",
@@ -155,7 +162,7 @@ class FilmPanel:
             elif clicked == "Clear":
                 timeline.clear()
             elif not timeline.delete():
-                self.state.say("Choose a key first: click on it.")
+                self.state.say(said("Choose a key first: click on it."))
 
     def _clock(self, timeline: Timeline, ui_scale: float) -> None:
         keys = timeline.keys
@@ -163,7 +170,9 @@ class FilmPanel:
         seconds = slider("length", keys.seconds, 1.0, LONGEST_S, "length: %.1f s")
         tip("Keys stay at their parts of it.", ui_scale)
         rates = RATES if keys.fps in RATES else (*RATES, keys.fps)
-        fps = choice("rate", keys.fps, rates, [f"{rate:g} frames a second" for rate in rates])
+        fps = choice(
+            "rate", keys.fps, rates, [said("{rate:g} frames a second", rate=r) for r in rates]
+        )
         tip("24 as in the cinema, 30 as on the web.", ui_scale)
         sizes = SIZES if keys.size in SIZES else (*SIZES, keys.size)
         size = choice("picture", keys.size, sizes, [f"{w} x {h}" for w, h in sizes])
@@ -177,7 +186,7 @@ class FilmPanel:
         if rendering.running:
             words, part = rendering.progress
             imgui.progress_bar(part, Vec(-1, 0), words)
-            if imgui.button("Cancel", Vec(-1, 0)):
+            if imgui.button(item_label("Cancel"), Vec(-1, 0)):
                 rendering.cancel()
             tip("Its frames stay, and the same command goes on with them.", ui_scale)
             return
@@ -194,6 +203,9 @@ class FilmPanel:
             rendering.start()
         elif clicked:
             rendering.save_path()
+
+
+PAST, AROUND = "Past cameras", "Around"
 
 
 def draw_film_edge(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> None:

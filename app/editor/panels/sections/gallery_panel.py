@@ -3,10 +3,17 @@
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import choice, labelled_slider, slider, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import (
+    choice,
+    item_label,
+    labelled_slider,
+    slider,
+    tip,
+)
 from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.app.editor.state.film.gallery import SIZE, Gallery
 from shapeshift.app.editor.state.film.style_work import SHAPES, StyleWork
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 COLUMNS = 3
@@ -21,7 +28,7 @@ def draw_gallery(gallery: Gallery, styles: StyleWork, textures: Textures, ui_sca
     if len(gallery.picked) == 2:
         _way(gallery, ui_scale)
     elif len(gallery.stops) > 1:
-        imgui.text_disabled("Pick two to go from one to the other.")
+        imgui.text_disabled(said("Pick two to go from one to the other."))
     if gallery.stops:
         _styles(gallery, styles, ui_scale)
 
@@ -48,7 +55,7 @@ def _way(gallery: Gallery, ui_scale: float) -> None:
         gallery.slide(part)
     tip("Straight from one to the other, at an even pace: no third stop is passed.", ui_scale)
     room = imgui.get_content_region_avail().x
-    if imgui.button("Stop" if gallery.sliding else "Slide", Vec((room - gap) / 2, 0)):
+    if imgui.button(item_label("Stop" if gallery.sliding else "Slide"), Vec((room - gap) / 2, 0)):
         gallery.toggle_sliding()
     tip("There and back by itself, as a film goes.", ui_scale)
     imgui.same_line()
@@ -67,7 +74,7 @@ def _styles(gallery: Gallery, styles: StyleWork, ui_scale: float) -> None:
     if styles.running:
         words, part = styles.progress
         imgui.progress_bar(part, Vec(-1, 0), words)
-        if imgui.button("Cancel", Vec(-1, 0)):
+        if imgui.button(item_label("Cancel"), Vec(-1, 0)):
             styles.cancel()
         tip("Nothing is left of it.", ui_scale)
         return
@@ -78,11 +85,14 @@ def _styles(gallery: Gallery, styles: StyleWork, ui_scale: float) -> None:
     imgui.pop_item_width()
     imgui.same_line()
     source = gallery.picked[-1] if gallery.picked else gallery.stops[0].name
-    if imgui.button("Add style", Vec(-1, 0)):
+    if imgui.button(item_label("Add style"), Vec(-1, 0)):
         styles.add(source, gallery.index or 0)
     tip(
-        f"A new stop that starts from {source}, in a new file, seconds to minutes; all other stops "
-        "stay as they are.",
+        said(
+            "A new stop that starts from {stop}, in a new file, seconds to minutes; all other "
+            "stops stay as they are.",
+            stop=source,
+        ),
         ui_scale,
     )
     imgui.push_item_width(-1)
@@ -90,7 +100,7 @@ def _styles(gallery: Gallery, styles: StyleWork, ui_scale: float) -> None:
     tip("How far the new stop is from the one that it starts from.", ui_scale)
     imgui.pop_item_width()
     if gallery.picked and len(gallery.stops) > 1:
-        if imgui.button(f"Take out {source}###take out", Vec(-1, 0)):
+        if imgui.button(said("Take out {stop}", stop=source) + "###take out", Vec(-1, 0)):
             styles.remove(source, gallery.index or 0)
         tip("The stop that was picked last, in a new file; this one stays.", ui_scale)
 
@@ -104,7 +114,10 @@ def _picture(
     corner = imgui.get_cursor_screen_pos()
     clicked = imgui.invisible_button(f"{stop.name}##picture {number}", Vec(width, height))
     hovered = imgui.is_item_hovered()
-    tip(f"{stop.name}: x {stop.x:.3f}. A click goes there and picks it.", ui_scale)
+    tip(
+        said("{name}: x {x:.3f}. A click goes there and picks it.", name=stop.name, x=stop.x),
+        ui_scale,
+    )
     drawing = imgui.get_window_draw_list()
     end = Vec(corner.x + width, corner.y + height)
     picture = gallery.thumbnails.pictures.get(stop.x)

@@ -1,9 +1,13 @@
-"""The panel's section "Look": the picture or a debug view of it, palette and background."""
+"""The panel's section "Look": palette, picture or debug view, appearance, background."""
 
 from dataclasses import replace
 
 from imgui_bundle import imgui
 
+from shapeshift.app.editor.panels.sections.appearance_panel import (
+    draw_appearance,
+    draw_background,
+)
 from shapeshift.app.editor.panels.widgets.panel_rows import choice, tip
 from shapeshift.app.editor.state.editor_state import AS_FILED, EditorState
 from shapeshift.renderer.colors.palette import PALETTES
@@ -20,7 +24,7 @@ DEBUG_NAMES = {
 
 
 def draw_look(state: EditorState, ui_scale: float) -> None:
-    """None of this is saved with a scene, and none of it is undone."""
+    """Palette and debug view are neither saved with a scene nor undone, the rest is both."""
     imgui.push_item_width(-1)
     if state.has_palettes:
         names = [AS_FILED, *PALETTES]
@@ -34,10 +38,7 @@ def draw_look(state: EditorState, ui_scale: float) -> None:
     tip("The picture, or what it is made of. Key G goes through these, Shift+G back.", ui_scale)
     if debug != state.settings.debug:
         state.settings = replace(state.settings, debug=debug)
+    if state.scene.objects:
+        draw_appearance(state, ui_scale)
+        draw_background(state, ui_scale)
     imgui.pop_item_width()
-    changed, background = imgui.color_edit3(
-        "background", list(state.settings.background), imgui.ColorEditFlags_.no_inputs
-    )
-    tip("The colour behind the scene: click it to choose another.", ui_scale)
-    if changed:
-        state.settings = replace(state.settings, background=tuple(background))

@@ -9,6 +9,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import (
     button_row,
     choice,
+    item_label,
     right_aligned,
     slider,
     tip,
@@ -18,6 +19,7 @@ from shapeshift.app.editor.state.editor_state import HANDLES, EditorState
 from shapeshift.app.editor.state.files.saving import Saving
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.object_edits import ObjectEdits
+from shapeshift.app.editor.texts.table import said
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneItem
 from shapeshift.scene.four_views import FOUR_VIEWS, has_objects
@@ -74,12 +76,12 @@ def _history(objects: ObjectEdits, saving: Saving, ui_scale: float) -> None:
         ("Redo", history.redoes, objects.redo),
     ):
         imgui.begin_disabled(not what)
-        if imgui.button(word, Vec(width, 0)):
+        if imgui.button(item_label(word), Vec(width, 0)):
             act()
         imgui.end_disabled()
-        tip(what or f"Nothing to {word.lower()}.", ui_scale)
+        tip(what or ("Nothing to undo." if word == "Undo" else "Nothing to redo."), ui_scale)
         imgui.same_line()
-    if imgui.button("Save" if saving.in_place else "Save\u2026", Vec(-1, 0)):
+    if imgui.button(item_label("Save" if saving.in_place else "Save\u2026"), Vec(-1, 0)):
         saving.save()
     tip("Ctrl+S writes the scene file; Ctrl+Shift+S asks for another name.", ui_scale)
 
@@ -110,7 +112,7 @@ def draw_four_views(state: EditorState, ui_scale: float) -> None:
     if not has_objects(state.scene):
         return
     imgui.push_item_width(-1)
-    names = [f"view: {FOUR_VIEW_NAMES[show]}" for show in FOUR_VIEWS]
+    names = [said("view: {what}", what=said(FOUR_VIEW_NAMES[show])) for show in FOUR_VIEWS]
     look.show = choice("four views", look.show, FOUR_VIEWS, names)
     tip("How objects are looked at; it changes nothing, and is not saved. Key I.", ui_scale)
     imgui.pop_item_width()
@@ -136,7 +138,8 @@ def _row(objects: ObjectEdits, index: int, ui_scale: float) -> None:
     if imgui.selectable(f"{obj.name}###name", chosen, 0, Vec(width, 0))[0]:
         state.chosen = "" if chosen else obj.name
     imgui.pop_style_color()
-    tip(f"{obj.name}: {number(obj.model.splat_count)} splats", ui_scale)
+    splats = number(obj.model.splat_count)
+    tip(said("{name}: {count} splats", name=obj.name, count=splats), ui_scale)
     imgui.same_line()
     right_aligned(f"x {obj.slider_x:.2f}")
     imgui.pop_id()
@@ -151,7 +154,7 @@ def _chosen(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
         lit = objects.state.handles == mode
         if lit:
             imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
-        if imgui.button(word, Vec((room - gap) / 2, 0)):
+        if imgui.button(item_label(word), Vec((room - gap) / 2, 0)):
             objects.state.handles = "" if lit else mode
         if lit:
             imgui.pop_style_color()
@@ -201,7 +204,9 @@ def _body(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     item = found
     mesh = item.collider if item.collider not in (None, HULLS) else None
     kinds = [NONE, HULLS] + [mesh] * (mesh is not None)
-    names = ["cannot be touched", "touched: its splats", f"touched: {mesh}"][: len(kinds)]
+    names = ["cannot be touched", "touched: its splats", said("touched: {mesh}", mesh=mesh)][
+        : len(kinds)
+    ]
     now = item.collider or NONE
     chosen = choice("collider", now, kinds, names)
     tip("What hands and other objects touch: nothing, or pieces made from its splats.", ui_scale)
@@ -210,7 +215,7 @@ def _body(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
         objects.change(item, f"body of {item.name}", collider=collider)
     if item.collider is None or item.name == BACKGROUND:
         return
-    changed, moves = imgui.checkbox("moves", not item.static)
+    changed, moves = imgui.checkbox(item_label("moves"), not item.static)
     if changed:
         objects.change(item, f"body of {item.name}", static=not moves)
     tip("What does not move is touched all the same: a table, a wall.", ui_scale)
@@ -226,7 +231,7 @@ def _scene(objects: ObjectEdits, ui_scale: float) -> None:
     """What belongs to no object: the floor, the first look, where everything starts."""
     state = objects.state
     floor_y = state.edited.file.floor_y
-    changed, on = imgui.checkbox("floor", floor_y is not None)
+    changed, on = imgui.checkbox(item_label("floor"), floor_y is not None)
     tip("An endless floor that is not seen; without it what falls goes on for ever.", ui_scale)
     if changed:
         low = float(state.centre[1] - state.radius) if on else None
@@ -239,10 +244,10 @@ def _scene(objects: ObjectEdits, ui_scale: float) -> None:
         tip("How high the floor lies. Drag, or double click to type.", ui_scale)
         if moved and np.isfinite(y):
             objects.edit(edits.ground, float(y), what="move the floor", together="floor")
-    if imgui.button("Look from here first", Vec(-1, 0)):
+    if imgui.button(item_label("Look from here first"), Vec(-1, 0)):
         objects.look_from_here()
     tip("The scene opens with the view of now.", ui_scale)
     if stands_elsewhere(state):
-        if imgui.button("Keep as it stands", Vec(-1, 0)):
+        if imgui.button(item_label("Keep as it stands"), Vec(-1, 0)):
             objects.keep_standing()
         tip("Where everything is now, and its x, becomes where it starts.", ui_scale)

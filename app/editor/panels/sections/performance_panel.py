@@ -18,6 +18,7 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.quality_controller import QualityController
+from shapeshift.app.editor.texts.table import said
 from shapeshift.renderer.settings import CULL_REASONS, FrameStats
 
 Vec = imgui.ImVec2
@@ -50,8 +51,8 @@ def _frame(readings: FrameStatsView, ui_scale: float) -> None:
     ms = readings.meter.ms
     if not ms > 0:
         return
-    rate = "at rest" if readings.idle else f"{1e3 / ms:.0f} fps"
-    mode = "fly" if readings.flying else "orbit"
+    rate = said("at rest") if readings.idle else f"{1e3 / ms:.0f} fps"
+    mode = said("fly" if readings.flying else "orbit")
     imgui.text(f"{ms_text(ms)} ms")
     tip("The whole frame, median of the last second. At rest nothing is drawn.", ui_scale)
     imgui.same_line()
@@ -59,7 +60,7 @@ def _frame(readings: FrameStatsView, ui_scale: float) -> None:
     stats = readings.stats
     imgui.text(number(stats.drawn))
     imgui.same_line()
-    imgui.text_disabled(f"of {number(stats.splats)} splats drawn")
+    imgui.text_disabled(said("of {count} splats drawn", count=number(stats.splats)))
 
 
 def _passes(ms_of_pass: Mapping[str, float], ui_scale: float) -> None:
@@ -97,7 +98,7 @@ def _counts(readings: FrameStatsView, ui_scale: float) -> None:
         [
             ("slowest of a second", f"{ms_text(meter.slowest_ms)} ms"),
             ("sorts a second", f"{meter.per_second('sorts', now):.0f}"),
-            ("age of the order", f"{readings.stats.order_age} frames"),
+            ("age of the order", said("{count} frames", count=readings.stats.order_age)),
             ("shapes decoded a second", f"{shapes:.0f}"),
             ("colours decoded a second", f"{colors:.0f}"),
             ("of all frames", f"{number(meter.geometry_runs)}, {number(meter.color_runs)}"),
@@ -110,5 +111,5 @@ def _splats(stats: FrameStats) -> None:
     """Why splats were not drawn: the first gate that each one failed, in the gates' order."""
     counts = [("in the scene", stats.splats), ("drawn", stats.drawn)]
     known = [why for why in CULL_REASONS if why in stats.culled]
-    counts += [(f"culled: {why}", stats.culled[why]) for why in known]
+    counts += [(said("culled: {why}", why=said(why)), stats.culled[why]) for why in known]
     rows([(name, number(count)) for name, count in counts])

@@ -8,6 +8,7 @@ from shapeshift.app.charts.comparison import exact, is_exact, shortcuts
 from shapeshift.app.editor.panels.widgets.panel_rows import (
     choice,
     db_text,
+    item_label,
     labelled_slider,
     open_slider,
     right_aligned,
@@ -17,6 +18,7 @@ from shapeshift.app.editor.panels.widgets.panel_rows import (
 )
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
+from shapeshift.app.editor.texts.table import said
 from shapeshift.renderer.settings import ORDERS, TARGETS, RenderSettings
 
 MAX_LAMBDA = 512.0  # pixels; the slider's end means no limit
@@ -59,7 +61,7 @@ def _cost(state: EditorState, readings: FrameStatsView, ui_scale: float) -> None
     """Error against exact, of the order too when one is kept, and the buttons."""
     settings = state.settings
     at_exact = is_exact(settings, readings.drawing)
-    imgui.text_disabled("error against exact")
+    imgui.text_disabled(said("error against exact"))
     tip(
         "PSNR of what you see against the exact picture of the same view: nothing left out, "
         "sorted anew, float32. Measured once when all is still.", ui_scale,
@@ -67,21 +69,21 @@ def _cost(state: EditorState, readings: FrameStatsView, ui_scale: float) -> None
     imgui.same_line()
     right_aligned(error_text(readings, at_exact))
     if readings.stale_db is not None:
-        imgui.text_disabled("of the kept order")
+        imgui.text_disabled(said("of the kept order"))
         tip("PSNR of this frame, with the order it kept, against one sorted anew.", ui_scale)
         imgui.same_line()
         right_aligned(db_text(readings.stale_db))
     gap = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - gap) / 2
     imgui.begin_disabled(not shortcuts(settings))
-    if imgui.button("Back to exact", imgui.ImVec2(width, 0)):
+    if imgui.button(item_label("Back to exact"), imgui.ImVec2(width, 0)):
         plain = exact(settings, "")
         state.settings = replace(plain, debug=settings.debug, target=RenderSettings().target)
     imgui.end_disabled()
     tip("Every control below to the setting that leaves nothing out.", ui_scale)
     imgui.same_line()
     imgui.begin_disabled(at_exact)
-    if imgui.button("Measure now", imgui.ImVec2(width, 0)):
+    if imgui.button(item_label("Measure now"), imgui.ImVec2(width, 0)):
         state.measure_now = True
     imgui.end_disabled()
     tip("Draws this view exactly and as set, once each.", ui_scale)
@@ -187,7 +189,7 @@ def _color(settings: RenderSettings, ui_scale: float) -> RenderSettings:
         "Colours are computed again only after the eye has gone so far around an object. Saves "
         "the colour network; highlights lag behind. At rest they are right.", ui_scale,
     )  # fmt: skip
-    _, skip = imgui.checkbox("only what is in view", settings.skip_unseen)
+    _, skip = imgui.checkbox(item_label("only what is in view"), settings.skip_unseen)
     tip(
         "Anchors that no view sees keep the colours they had. Costs nothing in the picture; "
         "saves where most of a scene is outside.", ui_scale,

@@ -10,12 +10,14 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import (
     button_row,
     choice,
+    item_label,
     right_aligned,
     slider,
     tip,
 )
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.regions import KINDS, Region
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 LARGEST = 2.0  # scene radii, of a size
@@ -25,6 +27,7 @@ DIRECTIONS = {  # name -> the way out of a half-space's plane, into what it sele
     "up": (0, 1, 0), "down": (0, -1, 0), "right": (1, 0, 0), "left": (-1, 0, 0),
     "front": (0, 0, 1), "back": (0, 0, -1),
 }  # fmt: skip
+HALVES = ("half width", "half height", "half depth")
 PAINTED = {"None": "Paint nothing.", "All": "Paint everything.", "Invert": "The other part."}
 KIND_TIPS = {
     "box": "A box with its own x; click into the picture to place it.",
@@ -38,7 +41,7 @@ KIND_TIPS = {
 def draw_regions(state: EditorState, ui_scale: float) -> None:
     """Buttons that add, the list, and the controls of the chosen one."""
     if not state.scene.objects:
-        imgui.text_disabled("There is no object to select from.")
+        imgui.text_disabled(said("There is no object to select from."))
         return
     for number, kind in enumerate(KINDS):
         _add_button(state, number, kind, ui_scale)
@@ -64,7 +67,8 @@ def _add_button(state: EditorState, number: int, kind: str, ui_scale: float) -> 
         width -= gap * (2 - number % 3) / (3 - number % 3)
     else:
         width = (imgui.get_content_region_avail().x - 2 * gap) / 3
-    if imgui.button(f"+ {'plane' if kind == 'half-space' else kind}", Vec(width, 0)):
+    word = "plane" if kind == "half-space" else kind
+    if imgui.button(f"+ {said(word)}###add {kind}", Vec(width, 0)):
         state.add_region(kind)
     tip(KIND_TIPS[kind], ui_scale)
 
@@ -82,7 +86,7 @@ def _row(state: EditorState, number: int, ui_scale: float) -> None:
     ink = theme.ACCENT if chosen else theme.TEXT
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*ink, 1))
     width = imgui.get_content_region_avail().x - 56 * ui_scale
-    if imgui.selectable(region.name or "(no name)", chosen, 0, Vec(width, 0))[0]:
+    if imgui.selectable(region.name or said("(no name)"), chosen, 0, Vec(width, 0))[0]:
         regions.choose(-1 if chosen else number)
     imgui.pop_style_color()
     tip("Choose it to edit it; click again to leave it.", ui_scale)
@@ -100,8 +104,8 @@ def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
     if changed:
         regions.edit(number, name=name[:LONGEST_NAME])
     if len(objects) > 1 and region.kind != "painted":
-        names = [f"of {obj.name}" for obj in objects]
-        index = choice("object", region.index, range(len(objects)), names)
+        names = [said("of {name}", name=obj.name) for obj in objects]
+        index = choice("object", region.index, range(len(objects)), names, names=True)
         tip("The object whose part it is.", ui_scale)
         regions.edit(number, index=index)
     if region.is_placed:
@@ -117,7 +121,7 @@ def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
         regions.edit(number, x=moved.x)
     elif moved.stop is not None:
         regions.edit(number, x=stops[moved.stop].x)
-    if imgui.button("Remove", Vec(-1, 0)):
+    if imgui.button(item_label("Remove"), Vec(-1, 0)):
         regions.remove(number)
     tip("Ctrl+Z brings it back.", ui_scale)
 
@@ -125,7 +129,7 @@ def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
 def _place(state: EditorState, ui_scale: float) -> None:
     """The button after which a click into the picture sets the place."""
     regions = state.regions
-    label = "Click into the picture \u2026" if regions.placing else "Place"
+    label = said("Click into the picture \u2026" if regions.placing else "Place")
     if regions.placing:
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
     clicked = imgui.button(f"{label}###place", Vec(-1, 0))
@@ -141,10 +145,9 @@ def _sizes(state: EditorState, region: Region, ui_scale: float) -> None:
     regions, number = state.regions, state.regions.chosen
     low, high = 0.01 * state.radius, LARGEST * state.radius
     if region.kind == "box":
-        names = ("half width", "half height", "half depth")
         half = []
-        for name, metres in zip(names, region.half, strict=True):
-            half.append(slider(name, float(metres), low, high, f"{name}: %.2f m"))
+        for name, metres in zip(HALVES, region.half, strict=True):
+            half.append(slider(name, float(metres), low, high, f"{said(name)}: %.2f m"))
             tip("From the middle of the box to its side.", ui_scale)
         regions.edit(number, half=np.array(half))
     elif region.kind == "sphere":
@@ -169,7 +172,9 @@ def _direction(state: EditorState, region: Region, ui_scale: float) -> None:
     names = list(DIRECTIONS)
     near = [float(np.dot(region.normal, DIRECTIONS[name])) for name in names]
     at = names[int(np.argmax(near))]
-    chosen = choice("direction", at, names, [f"towards: {name}" for name in names])
+    chosen = choice(
+        "direction", at, names, [said("towards: {side}", side=said(name)) for name in names]
+    )
     tip("The side of the plane that it selects.", ui_scale)
     if chosen != at:
         regions.edit(regions.chosen, normal=np.array(DIRECTIONS[chosen], float))
@@ -183,7 +188,7 @@ def _brush(state: EditorState, region: Region, ui_scale: float) -> None:
     if region.painted is None:
         return
     count = int(region.painted.sum())
-    imgui.text_disabled(f"{count:,} of {len(region.painted):,} painted")
+    imgui.text_disabled(said("{count:,} of {all:,} painted", count=count, all=len(region.painted)))
     clicked = button_row(PAINTED, ui_scale, 3)
     if clicked:
         new: Any = {"None": np.zeros_like, "All": np.ones_like, "Invert": np.logical_not}[clicked]

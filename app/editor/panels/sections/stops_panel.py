@@ -3,10 +3,12 @@
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import choice, slider, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import choice, item_label, slider, tip
 from shapeshift.app.editor.state.arrange import go_to_stop
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.track import is_blend
+from shapeshift.app.editor.texts.table import said
+from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.control import EASES, MODES, Sweep
 
 Vec = imgui.ImVec2
@@ -28,7 +30,7 @@ def draw_stops(state: EditorState, ui_scale: float) -> None:
         playing = state.sweeps[index].playing
         gap = imgui.get_style().item_spacing.x
         width = (imgui.get_content_region_avail().x - gap) / 2
-        if imgui.button("Pause" if playing else "Play", Vec(width, 0)):
+        if imgui.button(item_label("Pause" if playing else "Play"), Vec(width, 0)):
             state.toggle_play(index)
         tip("Key Space plays and pauses all objects.", ui_scale)
         imgui.same_line()
@@ -38,7 +40,7 @@ def draw_stops(state: EditorState, ui_scale: float) -> None:
         nothing = (
             "There is one stop: nothing to slide." if state.scene.objects else "Nothing is open."
         )
-        imgui.text_disabled(nothing)
+        imgui.text_disabled(said(nothing))
 
 
 def _stop_buttons(state: EditorState, index: int, ui_scale: float) -> None:
@@ -58,15 +60,21 @@ def _stop_buttons(state: EditorState, index: int, ui_scale: float) -> None:
             go_to_stop(state, index, number)
         if lit:
             imgui.pop_style_color()
-        key = f", key {number + 1}" if number < 9 else ""
-        tip(f"{stop.name}: x {stop.x:.3f}{key}", ui_scale)
+        tip(stop_tip(stop, number), ui_scale)
+
+
+def stop_tip(stop: Stop, number: int) -> str:
+    """Its name, its x, and its key where it has one."""
+    if number < 9:
+        return said("{name}: x {x:.3f}, key {key}", name=stop.name, x=stop.x, key=number + 1)
+    return f"{stop.name}: x {stop.x:.3f}"
 
 
 def pace_button(state: EditorState, index: int, width: float, words: str, ui_scale: float) -> None:
     """The seconds from stop to stop; a click opens all settings of playing."""
     seconds = f"{state.sweeps[index].leg_s:.3g} s"
-    fits = imgui.calc_text_size(f"{seconds} {words}").x < width
-    label = f"{seconds} {words}" if words and fits else seconds
+    fits = imgui.calc_text_size(f"{seconds} {said(words)}").x < width
+    label = f"{seconds} {said(words)}" if words and fits else seconds
     if imgui.button(f"{label}###pace", Vec(width, 0)):
         imgui.open_popup(MENU)
     tip("How playing goes: seconds from stop to stop, there and back, which stops.", ui_scale)
@@ -90,7 +98,9 @@ def _sweep(state: EditorState, index: int, ui_scale: float) -> None:
     tip("How long it stays at each stop.", ui_scale)
     sweep.mode = choice("mode", sweep.mode, MODES, [MODE_NAMES[mode] for mode in MODES])
     tip("What happens after the last stop.", ui_scale)
-    sweep.ease = choice("ease", sweep.ease, EASES, [f"pace: {name}" for name in EASES])
+    sweep.ease = choice(
+        "ease", sweep.ease, EASES, [said("pace: {name}", name=said(name)) for name in EASES]
+    )
     tip("How speed changes on the way from one stop to the next.", ui_scale)
     imgui.pop_item_width()
     _visited(state, index, sweep, ui_scale)

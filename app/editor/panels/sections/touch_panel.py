@@ -5,7 +5,7 @@ from typing import cast
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import button_row, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import button_row, item_label, tip
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.world.reactions import TwoAxes
@@ -31,7 +31,7 @@ def draw_touch(touch: TouchState, ui_scale: float, colliders: bool = True) -> No
     if clicked:
         deeds[clicked]()
     if colliders:
-        _, touch.colliders = imgui.checkbox("show colliders", touch.colliders)
+        _, touch.colliders = imgui.checkbox(item_label("show colliders"), touch.colliders)
         tip("Key J. What the physics touches: green moves, blue stays.", ui_scale)
     name = pad_object(touch)
     axes = world.objects[name].item.two_axes if name is not None else None

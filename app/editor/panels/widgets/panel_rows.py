@@ -7,10 +7,17 @@ import numpy as np
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 T = TypeVar("T")
 TIP_WIDTH = 300.0  # logical pixels; longer explanations wrap
+
+
+def item_label(name: str) -> str:
+    """What stands on an item in the language in use; which item it is does not depend on that."""
+    shown = said(name)
+    return name if shown == name else f"{shown}###{name}"
 
 
 def section(name: str, open_first: bool = False, unfold: bool = False) -> bool:
@@ -22,7 +29,7 @@ def section(name: str, open_first: bool = False, unfold: bool = False) -> bool:
     if open_first:
         flags |= imgui.TreeNodeFlags_.default_open
     imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(0, imgui.get_style().frame_padding.y))
-    is_open = imgui.tree_node_ex(name, flags)
+    is_open = imgui.tree_node_ex(item_label(name), flags)
     imgui.pop_style_var()
     return is_open
 
@@ -33,7 +40,7 @@ def subsection(name: str, lit: bool, muted: bool = True) -> bool:
     flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*ink, 1))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(0, 1))
-    is_open = imgui.tree_node_ex(name, flags)
+    is_open = imgui.tree_node_ex(item_label(name), flags)
     imgui.pop_style_var()
     imgui.pop_style_color()
     return is_open
@@ -42,7 +49,7 @@ def subsection(name: str, lit: bool, muted: bool = True) -> bool:
 def rows(pairs: Iterable[tuple[str, str]], share: float = 0.0) -> None:
     """Muted names, values: at the right, or from a `share` of the width on, where they wrap."""
     for name, value in pairs:
-        imgui.text_disabled(name)
+        imgui.text_disabled(said(name))
         if share:
             imgui.same_line(imgui.get_window_size().x * share)
             imgui.push_text_wrap_pos(0)
@@ -68,7 +75,7 @@ def tip(text: str, ui_scale: float) -> None:
         return
     imgui.begin_tooltip()
     imgui.push_text_wrap_pos(TIP_WIDTH * ui_scale)
-    imgui.text_unformatted(text)
+    imgui.text_unformatted(said(text))
     imgui.pop_text_wrap_pos()
     imgui.end_tooltip()
 
@@ -106,7 +113,8 @@ def labelled_slider(
     The two are one item for a tip.  No knob lies over its own number.
     """
     imgui.begin_group()
-    imgui.text_unformatted(text % value if "%" in text else text)
+    shown = said(text)
+    imgui.text_unformatted(shown % value if "%" in text else shown)
     imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(imgui.get_style().frame_padding.x, 0))
     imgui.push_style_var(imgui.StyleVar_.frame_rounding, imgui.get_text_line_height() / 2)
     imgui.push_style_var(imgui.StyleVar_.grab_rounding, imgui.get_text_line_height() / 2)
@@ -121,10 +129,16 @@ def labelled_slider(
     return moved, new
 
 
-def choice(name: str, value: T, values: Iterable[T], labels: Iterable[str]) -> T:
-    """A list to choose from; returns the value that is chosen now."""
-    values = list(values)
-    changed, chosen = imgui.combo(f"##{name}", values.index(value), list(labels))
+def choice(
+    name: str, value: T, values: Iterable[T], labels: Iterable[str], names: bool = False
+) -> T:
+    """A list to choose from; returns the value that is chosen now.
+
+    `names`: the labels are names out of files, which are the same in every language.
+    """
+    values, labels = list(values), list(labels)
+    shown = labels if names else [said(label) for label in labels]
+    changed, chosen = imgui.combo(f"##{name}", values.index(value), shown)
     return values[chosen] if changed else value
 
 
@@ -139,7 +153,7 @@ def button_row(tips: Mapping[str, str], ui_scale: float, columns: int) -> str:
     for index, (name, what) in enumerate(tips.items()):
         if index % columns:
             imgui.same_line()
-        if imgui.button(name, Vec(width, 0)):
+        if imgui.button(item_label(name), Vec(width, 0)):
             clicked = name
         tip(what, ui_scale)
     return clicked
@@ -151,4 +165,4 @@ def ms_text(value: float) -> str:
 
 def db_text(value: float) -> str:
     """Decibels; equal pictures have no number."""
-    return "equal" if value >= 200 else f"{value:.1f} dB"
+    return said("equal") if value >= 200 else f"{value:.1f} dB"

@@ -10,6 +10,7 @@ from imgui_bundle import imgui, portable_file_dialogs
 
 from shapeshift.app.editor.panels.widgets.panel_rows import tip
 from shapeshift.app.editor.panels.widgets.question_box import answer_row, question_box
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.paths import plain
 
 Vec = imgui.ImVec2
@@ -38,7 +39,7 @@ class PathBox:
         """Draws the box while it asks; returns what was chosen, () as long as nothing was."""
         if not self.asking or not question_box(self.title, ui_scale):
             return ()
-        imgui.text_wrapped("Drop a file or folder here, or name it:")
+        imgui.text_wrapped(said("Drop a file or folder here, or name it:"))
         imgui.push_item_width(-1)
         if imgui.is_window_appearing():
             imgui.set_keyboard_focus_here()

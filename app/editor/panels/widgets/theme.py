@@ -5,6 +5,8 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
+from shapeshift.app.editor.texts.fonts import more_letters
+
 Box = tuple[float, float, float, float]  # left, top, right, bottom in logical pixels
 
 FONT_SIZE = 15.0  # logical pixels
@@ -55,6 +57,10 @@ def apply(ui_scale: float, pixels_per_unit: float, keys: bool = True) -> None:
     io.fonts.clear()
     size = round(FONT_SIZE * ui_scale * pixels_per_unit)
     io.fonts.add_font_from_file_ttf(str(FONT), size, glyph_ranges_as_int_list=GLYPHS)
+    if (more := more_letters()) is not None:
+        config = imgui.ImFontConfig()
+        config.merge_mode = True
+        io.fonts.add_font_from_file_ttf(str(more.path), size, config, more.ranges)
     io.font_global_scale = 1 / pixels_per_unit
 
     style = imgui.get_style()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.scene.cameras.framing import FAR_RADII, FOV_Y, NEAR_RADII
+from shapeshift.scene.orthographic import orthographic
 from shapeshift.scene.pose import Pose, View
 
 POLE = 1.5  # radians of pitch; straight up or down would lose which way is right
@@ -48,7 +49,7 @@ def fov_y_of(view: View) -> float:
 
 @dataclass(frozen=True)
 class Push:
-    """What the movement keys ask for: -1, 0 or 1 along the eye's right, up and forward."""
+    """What keys or a stick ask for: -1 to 1 along the eye's right, up and forward."""
 
     right: float = 0.0
     up: float = 0.0
@@ -76,6 +77,10 @@ class EditorCamera:
         self._velocity = np.zeros(3)  # metres a second
         self.radius = radius
         self.fov_y = FOV_Y
+        self.orthographic = False  # parallel rays, while it orbits
+        self.about_pointer = False  # a drag turns about what it began on
+        self.near_m = 0.0  # before which nothing is drawn; 0: by the scene's size
+        self.speed = 1.0  # times that of flight
         self.reset()
         self._lag[:] = 0
 
@@ -105,6 +110,19 @@ class EditorCamera:
         return bool(metres > STILL * self.radius or np.abs(self._lag[3:]).max() > STILL)
 
     def view(self, size: tuple[int, int], free: Box | None = None) -> View:
+        """What is seen now in size (W, H) pixels, as `eye_view`; by parallel rays where wanted."""
+        view = self.eye_view(size, free)
+        if not self.parallel:
+            return view
+        distance = float(np.exp((self._goal - self._lag)[LOG_DISTANCE]))
+        return orthographic(view, distance, self.radius, self.near_m)
+
+    @property
+    def parallel(self) -> bool:
+        """Whether rays are parallel; those of flight come from the eye."""
+        return self.orthographic and not self.flying
+
+    def eye_view(self, size: tuple[int, int], free: Box | None = None) -> View:
         """What the eye sees now in size (W, H) pixels.
 
         The field of view fits `free` (left, top, right, bottom in pixels), the part of the picture
@@ -116,7 +134,8 @@ class EditorCamera:
         world_from_eye[:3, :3] = np.stack([right, up, -forward], axis=1)
         world_from_eye[:3, 3] = self._eye(shown)
         distance = float(np.exp(shown[LOG_DISTANCE]))
-        near, far = NEAR_RADII * self.radius, FAR_RADII * self.radius + distance
+        near = self.near_m or NEAR_RADII * self.radius
+        far = max(FAR_RADII * self.radius + distance, 2 * near)
         pose = Pose.from_matrix(world_from_eye)
         return View(pose, _tangents(self.fov_y, size, free or (0, 0, *size)), near, far, size)
 
@@ -127,6 +146,22 @@ class EditorCamera:
         limit = max(POLE, abs(goal[PITCH]))  # from straight above it turns on without a jump
         goal[PITCH] = np.clip(goal[PITCH] + self._upright * pitch, -limit, limit)
         self._move_to(goal)
+
+    def turn_about(self, point: np.ndarray, yaw: float, pitch: float) -> None:
+        """Orbits around a world point (3,), which stays where it is in the picture."""
+        if self.flying:
+            self.turn(yaw, pitch)
+            return
+        before, anchor = self._turned_axes(), self._goal[ANCHOR].copy()
+        self.turn(yaw, pitch)
+        turn = self._turned_axes() @ before.T  # (3, 3) of the world
+        goal = self._goal.copy()
+        goal[ANCHOR] = point + turn @ (anchor - point)
+        self._move_to(goal)
+
+    def _turned_axes(self) -> np.ndarray:
+        """(3, 3) axes of where the camera is going, as columns."""
+        return np.stack(self._axes(), axis=1)
 
     def look_from(self, name: str) -> None:
         """From one of DIRECTIONS, level, at the same distance from what is orbited.
@@ -151,7 +186,8 @@ class EditorCamera:
         """Nearer to the anchor (positive) or away from it; straight ahead when flying."""
         goal = self._goal.copy()
         if self.flying:
-            goal[ANCHOR] += notches * FLY_STEP_RADII * self.radius * axes_of(*goal[3:5])[2]
+            metres = notches * FLY_STEP_RADII * self.speed * self.radius
+            goal[ANCHOR] += metres * axes_of(*goal[3:5])[2]
         else:
             goal[LOG_DISTANCE] = self._bounded(goal[LOG_DISTANCE] + notches * np.log(DOLLY_STEP))
         self._move_to(goal)
@@ -162,9 +198,9 @@ class EditorCamera:
         right, _, forward = self._axes()
         up = np.array([0, self._upright, 0])
         wanted = push.right * right + push.up * up + push.forward * forward
-        length = np.linalg.norm(wanted)
+        length = float(np.linalg.norm(wanted))
         if length > 0:
-            wanted *= SPEED_RADII * self.radius * push.pace / length
+            wanted *= SPEED_RADII * self.speed * self.radius * push.pace / max(length, 1.0)
         # v' = (wanted - v) / BRAKE_S solved exactly: two short steps equal a long one
         keep = np.exp(-seconds / BRAKE_S)
         gap = self._velocity - wanted
@@ -226,6 +262,17 @@ class EditorCamera:
         self._lag[:] = 0
         self._lag[ROLL] = level - roll
         self._velocity[:] = 0
+
+    def go_to(self, eye: np.ndarray, target: np.ndarray, fov_y: float) -> None:
+        """Flies to eye (3,), level, from where it looks at target (3,) and orbits about it."""
+        ahead = np.asarray(target, np.float64) - eye
+        distance = np.exp(self._bounded(np.log(max(float(np.linalg.norm(ahead)), 1e-9))))
+        ahead /= np.linalg.norm(ahead)
+        yaw = float(np.arctan2(-ahead[0], -ahead[2]))
+        yaw = self._goal[YAW] + _half_turn_at_most(yaw - self._goal[YAW])
+        pitch = float(np.arcsin(np.clip(ahead[1], -1, 1)))
+        self.fov_y = fov_y
+        self._stand(eye + distance * ahead, yaw, pitch, distance)
 
     def reset(self) -> None:
         """Back to the first view of the scene."""

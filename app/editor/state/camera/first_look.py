@@ -26,7 +26,8 @@ class FirstLook:
         if self.home is not None:
             return replace(self.home, tangents=perspective(fov_y_of(self.home), size), size=size)
         if file.view is not None:
-            return first_view(file, scene, size)
+            plain = replace(file.view, orthographic=False)  # the camera makes its rays parallel
+            return first_view(replace(file, view=plain), scene, size)
         if len(scene.objects) == 1:
             model = scene.objects[0].model
             if self.front is None or model.provenance.get("view"):

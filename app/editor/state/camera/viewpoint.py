@@ -16,9 +16,13 @@ from shapeshift.app.editor.state.camera.kept_views import KeptViews
 from shapeshift.app.editor.state.camera.stepping import Steps, fitted
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.cameras.camera_list import CameraList, moved
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import FirstView
 from shapeshift.scene.pose import View
 
+STRAIGHT = 1e-3  # sine of the angle from straight up or down, where a file knows no upper side
 NEAR_FREE = 0.5  # pixels: nearer to where the overlay leaves room is there
 
 
@@ -46,11 +50,18 @@ class Viewpoint:
         """The camera of a new scene: on its floor where one is given, else the whole in view."""
         state = self._state
         camera = EditorCamera(state.first_view(self.free_size()), state.first_target, state.radius)
+        self._take_lens(camera)
         home = state.first_look.home
         if home is not None:
             camera.toggle_flying()
             camera.stand(home.world_from_eye, fov_y_of(home))
         return camera
+
+    def _take_lens(self, camera: EditorCamera) -> None:
+        """Parallel rays and near plane as the file states them for its first view."""
+        stated = self._state.edited.file.view
+        camera.orthographic = stated is not None and stated.orthographic
+        camera.near_m = stated.near_m if stated is not None else 0.0
 
     def start_anew(self) -> None:
         """The state has another scene."""
@@ -68,6 +79,39 @@ class Viewpoint:
         if self.steps.at_camera:
             return self.steps.view(view.size, tuple(self.free), view.near, view.far)
         return view
+
+    @property
+    def parallel(self) -> bool:
+        """Whether rays are parallel: never those of a film or of a file's camera."""
+        return self.flown is None and not self.steps.at_camera and self.camera.parallel
+
+    def eye_view(self) -> View:
+        """As `view`, but of rays that meet in the eye: what regions and lenses follow."""
+        if not self.parallel:
+            return self.view()
+        return self.camera.eye_view(self._size(), tuple(self.free))
+
+    def stated(self) -> FirstView:
+        """The view of now as a scene file states it."""
+        free = self.flown is None and not self.steps.at_camera
+        view = self.camera.eye_view(self.free_size()) if free else self.plain_view()
+        eye, axes = view.world_from_eye.position, view.world_from_eye.matrix()[:3, :3]
+        ahead = -axes[:, 2]
+        far = float(np.dot((self.camera.target if free else self._state.centre) - eye, ahead))
+        target = eye + ahead * max(far, 0.01 * self._state.radius)
+        if np.hypot(ahead[0], ahead[2]) < STRAIGHT:  # a little towards where the upper side points
+            target = target + axes[:, 1] * STRAIGHT * float(np.linalg.norm(target - eye))
+        flags = (self.camera.parallel, self.camera.near_m) if free else (False, 0.0)
+        return edits.rounded(FirstView(three(eye), three(target), fov_y_of(view), *flags))
+
+    def go_to(self, stated: FirstView) -> None:
+        """Flies to a view that the scene file states."""
+        self.leave_camera()
+        camera = self.camera
+        if camera.flying and stated.orthographic:
+            camera.toggle_flying()
+        camera.orthographic, camera.near_m = stated.orthographic, stated.near_m
+        camera.go_to(np.array(stated.eye), np.array(stated.target), stated.fov_y)
 
     def plain_view(self) -> View:
         """The same without what the overlay covers: a camera as filed, or centred."""
@@ -136,7 +180,17 @@ class Viewpoint:
     def go_home(self) -> None:
         """To the first view."""
         self.leave_camera()
+        self._take_lens(self.camera)
         self.camera.come_home(self._state.first_view(self.free_size()))
+
+    def toggle_orthographic(self) -> None:
+        """Parallel rays, or those that meet in the eye; what is orbited keeps its size."""
+        self.leave_camera()
+        if self.camera.flying:
+            self.camera.toggle_flying()
+            self.camera.orthographic = True
+        else:
+            self.camera.orthographic = not self.camera.orthographic
 
     def toggle_flying(self) -> None:
         self.leave_camera()

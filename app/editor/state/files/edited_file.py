@@ -122,9 +122,8 @@ def compared(saved: SceneFile, file: SceneFile) -> tuple[bool, bool]:
     if saved is file:
         return False, False
     changed = edits.changes(saved, file)
-    scene = (file.floor_y, file.view, file.gravity_m_s2) != (
-        saved.floor_y, saved.view, saved.gravity_m_s2,
-    )  # fmt: skip
+    names = ("floor_y", "view", "views", "gravity_m_s2", "appearance", "sky")
+    scene = any(getattr(file, name) != getattr(saved, name) for name in names)
     return bool(changed) or scene, scene or any(change.fields != {"x"} for change in changed)
 
 

@@ -1,5 +1,6 @@
 """What is shown now, as a file for other programs, written in a thread."""
 
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -8,13 +9,14 @@ from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.messages import number
+from shapeshift.app.editor.state.parts.write_pieces import write_labelled
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.evaluate import follows_eye
-from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.shapes import three
-from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
+PACKAGE = ".shift"  # no splats of one x: the model itself, with its slider
 EVERYTHING, REGIONS = -1, -2  # what is exported, other than one object by its index
 
 
@@ -28,7 +30,7 @@ class Exporting:
         self.sh_degree = 3
         self.palette = True
         self._thread = ThreadPoolExecutor(1, "export")
-        self._work: Future[PlainSplats] | None = None
+        self._work: Future[int] | None = None  # how many splats were written
         self._path = Path()
         self.progress = ("", 0.0)  # what is being done, part done
 
@@ -56,6 +58,14 @@ class Exporting:
             labels.append("inside the regions")
         return values, labels
 
+    @property
+    def package(self) -> AnchorModel | None:
+        """The one model that a package can be written of, as it is now; None: there is none."""
+        seen = [i for i, obj in enumerate(self._state.scene.objects) if obj.visible]
+        index = seen[0] if self.what == EVERYTHING and len(seen) == 1 else self.what
+        model = self._state.filed[index] if 0 <= index < len(self._state.filed) else None
+        return model if isinstance(model, AnchorModel) else None
+
     def parts(self) -> list[Part]:
         """The objects as they are shown now, or what lies in their regions."""
         objects = self._state.shown(self._viewpoint.view()).objects
@@ -77,7 +87,11 @@ class Exporting:
             state.problem = str(error)
             return
         self.progress = ("", 0.0)
-        self._work = self._thread.submit(export, parts, look, self._path, self._show_progress)
+        if self.ending == PACKAGE:
+            assert self.package is not None, "the panel offers it where there is one"
+            self._work = self._thread.submit(write_whole_model, self.package, self._path)
+            return
+        self._work = self._thread.submit(write_splats, parts, look, self._path, self._show_progress)
 
     def _show_progress(self, what: str, part: float) -> None:
         self.progress = (what, part)
@@ -94,8 +108,22 @@ class Exporting:
             self._state.problem = f"Nothing was exported: {error}"
         else:
             size = self._path.stat().st_size / 1e6
-            self._state.say(f"{self._path}: {number(len(splats.means))} splats, {size:.1f} MB")
+            self._state.say(f"{self._path}: {number(splats)} splats, {size:.1f} MB")
         return True  # one frame more, so that it is seen
+
+
+def write_splats(
+    parts: list[Part], look: ExportLook, path: Path, progress: Callable[[str, float], None]
+) -> int:
+    """Plain splats at one x; how many."""
+    return len(export(parts, look, path, progress).means)
+
+
+def write_whole_model(model: AnchorModel, path: Path) -> int:
+    """A package of what is left of a model, at every x; how many splats it draws."""
+    path.unlink()  # the claim: no package, so nothing that one may be written over
+    write_labelled(model, path)
+    return model.splat_count
 
 
 def claim_name(folder: Path, parts: list[Part], ending: str) -> Path:
@@ -103,7 +131,8 @@ def claim_name(folder: Path, parts: list[Part], ending: str) -> Path:
     make_folder(folder)
     obj = parts[0].obj
     more = f" and {len(parts) - 1} more" * (len(parts) > 1)
-    name = f"{file_name(obj.name)}{more}-x{obj.slider_x:.2f}"
+    name = f"{file_name(obj.name)}{more}"
+    name += f"-x{obj.slider_x:.2f}" * (ending != PACKAGE)
     count = 1
     while True:
         path = folder / f"{name}{f'-{count}' * (count > 1)}{ending}"

@@ -183,6 +183,7 @@ def item_of_piece(
         flip=item.flip,
         **standing(obj, place),
         visible=pick.visible and obj.visible,
+        appearance=item.appearance,
         selectors=split_selectors(item.selectors, pick.rows, place),
         collider=pick.collider,
     )

@@ -8,16 +8,16 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.parts.cutting import delete_rows, hide_rows, make_object
 from shapeshift.app.editor.state.parts.finder import Finder, Found, Query, in_box
+from shapeshift.app.editor.state.parts.lit import Lighting, same, same_look
+from shapeshift.app.editor.state.parts.selecting import ALL, Selecting
 from shapeshift.app.editor.state.regions import brushed
+from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import SceneObject, Tint
 
 REPLACE, ADD, REMOVE = "replace", "add", "remove"  # what is done with what was met
-# Colours that neither surfaces nor the palettes of heat have much of, so that they are told apart.
-CHOSEN_INK, HOVER_INK, LESS_INK = (0.1, 1.0, 0.7), (0.65, 1.0, 0.9), (1.0, 0.1, 0.45)
-CHOSEN, HOVER = 0.75, 0.5  # how much of that colour lies over the object's own
 GROWS = 1.2  # more or fewer anchors with every notch of the wheel
 LARGEST = 40.0  # times what a click takes, or less by as much
 HOW = (
@@ -34,7 +34,6 @@ class PartsTool:
         """`count_changed` hears that the scene has more or fewer objects, or others."""
         self.state, self._count_changed = state, count_changed
         self.on = False
-        self.takes_all = False  # a box takes everything in it, not the thing in it
         self.name = ""  # of the object whose anchors are chosen
         self.chosen = np.zeros(0, bool)  # (A,)
         self.found: Found | None = None  # what a click would take
@@ -42,6 +41,7 @@ class PartsTool:
         self.factor = 1.0  # of what a click takes, by the wheel
         self.crop: np.ndarray | None = None  # (2, 3) metres, object frame: low and high corner
         self.finder = Finder()
+        self.selecting = Selecting(state, self.choose, self._meant)
         self._asked: Query | None = None  # whose answer is to be taken at once
         self._undone: list[tuple[str, np.ndarray]] = []  # what was chosen before
         self._lit: tuple = ()  # what the tint was made of
@@ -54,12 +54,13 @@ class PartsTool:
         self.clear()
         self.crop = None
         if self.on:
-            self.state.say(HOW, 8.0)
+            self.state.say(said(HOW), 8.0)
         self.light()
 
     def forget(self) -> None:
         """Another scene."""
         self.finder.forget()
+        self.selecting.measuring.forget()
         self.on, self.crop, self.name = False, None, ""
         self.clear()
 
@@ -73,11 +74,13 @@ class PartsTool:
         """Words for the status line."""
         if not self.on:
             return ""
-        if self.finder.status:
-            return f"{self.finder.status} \u2026"
+        if status := self.finder.status or self.selecting.measuring.status:
+            return f"{status} \u2026"
         if self.count:
-            return f"{number(self.count)} anchors of {self.name} chosen"
-        return "parts: point at a thing"
+            return said(
+                "{count} anchors of {name} chosen", count=number(self.count), name=self.name
+            )
+        return said("parts: point at a thing")
 
     @property
     def count(self) -> int:
@@ -133,14 +136,13 @@ class PartsTool:
         left, top, right, low = corners
         corners = (min(left, right), min(top, low), max(left, right), max(top, low))
         shown = self.state.shown(view)
-        if not self.takes_all:
+        if self.selecting.drag != ALL:
             self._asked = Query(shown, view, corners, self._against(how))
             self.finder.ask(self._asked)
             return
-        index = self.index if self.index is not None else self._largest()
-        if index is not None:
-            obj = shown.objects[index]
-            self._choose(obj, in_box(view, anchor_places(obj.model), obj, corners), how)
+        obj = self._meant()
+        if obj is not None:
+            self.choose(obj, in_box(view, anchor_places(obj.model), obj, corners), how)
 
     def _against(self, how: str) -> tuple[str, np.ndarray] | None:
         """What is chosen already is no part of what a click adds."""
@@ -152,17 +154,21 @@ class PartsTool:
         counts = [len(anchor_places(obj.model)) if obj.visible else -1 for obj in objects]
         return int(np.argmax(counts)) if counts and max(counts) > 0 else None
 
+    def _meant(self) -> SceneObject | None:
+        """Whose anchors a box, a brush or a histogram means: the object of those chosen now."""
+        index = self.index if self.index is not None else self._largest()
+        return None if index is None else self.state.scene.objects[index]
+
     def brush(
         self, view: View, cursor: tuple[float, float], radius: float, how: str, starts: bool
     ) -> None:
         """Adds or removes the anchors of the nearest surface under a brush, pixels of the view."""
-        index = self.index if self.index is not None else self._largest()
-        if index is None:
+        obj = self._meant()
+        if obj is None:
             return
-        obj = self.state.scene.objects[index]
         rows = np.zeros(len(anchor_places(obj.model)), bool)
         rows[brushed(view, anchor_places(obj.model), obj, cursor, radius)] = True
-        self._choose(obj, rows, how, starts)
+        self.choose(obj, rows, how, starts)
 
     def grow(self, notches: float) -> None:
         """More of what is pointed at, or less."""
@@ -183,20 +189,23 @@ class PartsTool:
                 elif query.is_click and self.how == REPLACE:
                     self._keep()
                     self.chosen = np.zeros(0, bool)
-        if self.finder.problem:
-            self.state.problem, self.finder.problem = self.finder.problem, ""
+        measuring = self.selecting.measuring
+        measures = measuring.poll()
+        for part in (self.finder, measuring):
+            if part.problem:
+                self.state.problem, part.problem = part.problem, ""
         self.light()
-        return self.finder.busy
+        return self.finder.busy or measures
 
     def _take_found(self, found: Found) -> None:
         for obj in self.state.scene.objects:
             if obj.name == found.name and len(found.owner) == len(anchor_places(obj.model)):
-                self._choose(obj, found.rows(self.factor), self.how)
+                self.choose(obj, found.rows(self.factor), self.how)
         if not found.query.is_click:
             self.found = None
         self.factor = 1.0
 
-    def _choose(self, obj: SceneObject, rows: np.ndarray, how: str, starts: bool = True) -> None:
+    def choose(self, obj: SceneObject, rows: np.ndarray, how: str, starts: bool = True) -> None:
         """Does with some anchors (A,) bool of an object what was meant."""
         if starts:
             self._keep()
@@ -331,20 +340,19 @@ class PartsTool:
         if obj is None:
             return None
         count = len(anchor_places(obj.model))
-        colors, strength = np.tile(np.array(CHOSEN_INK), (count, 1)), np.zeros(count)
         mine = self.name == obj.name and len(self.chosen) == count
-        if mine:
-            strength[self.chosen] = CHOSEN
+        hover = None
         if found is not None and found.name == obj.name and len(found.owner) == count:
-            rows = found.rows(self.factor)
+            hover = found.rows(self.factor)
             if self.how == REMOVE:  # of what is chosen alone
-                rows = rows & self.chosen if mine else np.zeros(count, bool)
-            colors[rows] = LESS_INK if self.how == REMOVE else HOVER_INK
-            strength[rows] = np.maximum(HOVER, strength[rows])
-        if self.crop is not None and mine:
-            gone = self.outside()
-            colors[gone], strength[gone] = LESS_INK, CHOSEN
-        return obj.name, Tint(colors.astype(np.float32), strength.astype(np.float32))
+                hover = hover & self.chosen if mine else None
+        lighting = Lighting(
+            chosen=self.chosen if mine else None,
+            hover=hover,
+            removes=self.how == REMOVE,
+            gone=self.outside() if self.crop is not None and mine else None,
+        )
+        return obj.name, lighting.tint(count)
 
     def _lit_object(self, found: Found | None) -> SceneObject | None:
         wanted = found.name if found is not None and self.how != REMOVE else self.name
@@ -355,22 +363,3 @@ class PartsTool:
             return objects[wanted]
         index = self._largest()
         return None if index is None else self.state.scene.objects[index]
-
-
-def same_look(one: tuple[str, Tint] | None, other: tuple[str, Tint] | None) -> bool:
-    """Whether two tints look alike: then nothing has to be drawn anew."""
-    if one is None or other is None:
-        return one is other
-    (name, tint), (old_name, old) = one, other
-    if name != old_name or not np.array_equal(tint.strength, old.strength):
-        return False
-    rows = np.asarray(tint.strength) > 0
-    return np.array_equal(np.asarray(tint.color)[rows], np.asarray(old.color)[rows])
-
-
-def same(one: tuple, other: tuple) -> bool:
-    """Whether all of two tuples is the very same, or equal where it is no array."""
-    return len(one) == len(other) and all(
-        a is b or (isinstance(a, str | float | bool | bytes) and a == b)
-        for a, b in zip(one, other, strict=True)
-    )

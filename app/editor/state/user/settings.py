@@ -1,7 +1,7 @@
-"""What a person has set and finds again at the next start: the size of the text, the panel."""
+"""What a person has set and finds again at the next start: text, panel, language, window."""
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from shapeshift.runtime_models.files.json_fields import is_number, saved_object
@@ -10,6 +10,9 @@ from shapeshift.runtime_models.files.whole_file import write_whole
 FILE = "settings.json"
 LARGEST = 1 << 16  # bytes; a few numbers are never so long
 TEXT_SIZES = (0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
+LONGEST_WORD = 40  # letters
+MOST_SECTIONS = 50
+FARTHEST_PX, LEAST_SIDE_PX = 32_000, 200  # of a window's place and size
 PLAIN_DPI = 110.0  # pixels an inch up to which text of 15 pixels is read without leaning forward
 HIGH_PX = 1440.0  # of a monitor: above, such text is small, whatever inches the monitor tells
 PLAUSIBLE_MM = (120.0, 1500.0)  # height of a monitor; projectors and screens in memory say 0 or 1
@@ -17,11 +20,16 @@ PLAUSIBLE_MM = (120.0, 1500.0)  # height of a monitor; projectors and screens in
 
 @dataclass
 class ProgramSettings:
-    """In a file of the folder; a broken or missing one counts as empty."""
+    """In a file of the folder; a broken or missing one counts as empty, and so does each value."""
 
     folder: Path | None = None  # None: nothing is kept
     text_size: float | None = None  # None: by the monitor
     panel_open: bool | None = None  # None: as there is room
+    language: str = "en"  # code of a table of texts
+    temperature: str = ""  # unit of legends; "": as the scene has it
+    palette: str = ""  # of thermal stops; "": the scene's own
+    place: tuple[int, int, int, int] | None = None  # left, top, width, height of the window
+    sections: dict[str, bool] = field(default_factory=dict)  # of the panel, that a hand has moved
 
     @staticmethod
     def read(folder: Path) -> "ProgramSettings":
@@ -33,6 +41,11 @@ class ProgramSettings:
             folder,
             None if size is None else float(size),
             panel if isinstance(panel, bool) else None,
+            a_word(found.get("language")) or "en",
+            a_word(found.get("temperature")),
+            a_word(found.get("palette")),
+            a_place(found.get("place")),
+            some_sections(found.get("sections")),
         )
 
     def keep(self) -> None:
@@ -42,6 +55,29 @@ class ProgramSettings:
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "folder"}
         self.folder.mkdir(parents=True, exist_ok=True)
         write_whole(self.folder / FILE, json.dumps(values, indent=1).encode())
+
+
+def a_word(value: object) -> str:
+    """A short text; "" for anything else."""
+    return value if isinstance(value, str) and len(value) <= LONGEST_WORD else ""
+
+
+def a_place(value: object) -> tuple[int, int, int, int] | None:
+    """Left, top, width, height of a window that some desktop could have shown."""
+    if not (isinstance(value, list) and len(value) == 4 and all(type(n) is int for n in value)):
+        return None
+    left, top, width, height = value
+    near = max(abs(left), abs(top)) <= FARTHEST_PX
+    sized = LEAST_SIDE_PX <= min(width, height) and max(width, height) <= FARTHEST_PX
+    return (left, top, width, height) if near and sized else None
+
+
+def some_sections(value: object) -> dict[str, bool]:
+    """Which sections are open, by name."""
+    if not isinstance(value, dict):
+        return {}
+    good = {k: v for k, v in value.items() if a_word(k) and isinstance(v, bool)}
+    return dict(list(good.items())[:MOST_SECTIONS])
 
 
 def default_text_size(high_px: float, high_mm: float, desktop_scale: float) -> float:

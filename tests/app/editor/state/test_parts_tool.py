@@ -11,6 +11,7 @@ from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source
 from shapeshift.app.editor.state.parts.finder import Finder, Query, in_box
 from shapeshift.app.editor.state.parts.parts_tool import ADD, REMOVE, REPLACE, PartsTool
+from shapeshift.app.editor.state.parts.selecting import ALL
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
@@ -98,7 +99,7 @@ def test_a_click_beside_everything_chooses_nothing(tool):
 
 
 def test_a_box_of_all_and_its_parts(tool):
-    tool.takes_all = True
+    tool.selecting.drag = ALL
     tool.box(VIEW, (200, 200, -200, -200), REPLACE)
     assert tool.count == 300
     tool.box(VIEW, (-200, -200, 45, 200), REMOVE)

@@ -5,7 +5,12 @@ import pytest
 
 from shapeshift.app.editor.panels import panel
 from shapeshift.app.editor.panels.keys_sheet import GROUPS, spread
-from shapeshift.app.editor.panels.sections import performance_panel, quality_panel
+from shapeshift.app.editor.panels.sections import (
+    appearance_panel,
+    named_views_panel,
+    performance_panel,
+    quality_panel,
+)
 from shapeshift.app.editor.panels.widgets.path_box import can_browse
 from shapeshift.app.paths import TOUCH
 from tests.support.desktop.desktop_stand import run_frames, until_opened
@@ -24,7 +29,7 @@ def unfolded(monkeypatch):
         return True
 
     monkeypatch.setattr(panel, "section", opened)
-    for module in (performance_panel, quality_panel):
+    for module in (appearance_panel, named_views_panel, performance_panel, quality_panel):
         monkeypatch.setattr(module, "subsection", opened)
     return seen
 
@@ -48,7 +53,7 @@ def test_first_comes_what_a_first_visitor_needs(viewer, unfolded):
     sections = [name for name in unfolded if name in panel.ORDER]
     assert sections == [
         "Stops", "Look", "Gallery", "Camera", "Film", "Objects", "Parts", "Regions", "Export",
-        "Performance",
+        "Settings", "Performance",
     ]  # fmt: skip
     inside = unfolded[unfolded.index("Performance") + 1 :]
     assert [n for n in inside if n in ("Budget", "Quality", "Passes", "Counts", "Machine")] == [
@@ -119,7 +124,7 @@ def test_every_key_that_does_something_stands_on_the_sheet(viewer):
     names = {
         "SPACE": "Space", "TAB": "Tab", "ESCAPE": "Esc", "DELETE": "Delete", "COMMA": ",",
         "PERIOD": ".", "LEFT": "left", "RIGHT": "right", "KP_1": "numpad 1", "KP_3": "3",
-        "KP_7": "7", "1": "1", "9": "9",
+        "KP_7": "7", "KP_5": "numpad 5", "1": "1", "9": "9",
     }  # fmt: skip
     parts = (hands, objects, shell, split, touch, two_pictures)
     source = "".join(inspect.getsource(part) for part in parts)

@@ -13,6 +13,7 @@ from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, read_files
+from shapeshift.app.editor.state.parts.selecting import ALL
 from shapeshift.app.paths import DEMO
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.read_scene import read_model
@@ -151,11 +152,10 @@ def test_a_box_takes_the_thing_in_it_or_all(viewer, hands, truth):
     hands.drag(tuple(low), tuple(high))
     settle(viewer)
     assert iou(tool.chosen, truth, "can") > 0.8
-    tool.takes_all = True
+    tool.selecting.drag = ALL
     hands.drag(tuple(high), tuple(low))  # from any corner
     assert tool.chosen[truth == LABELS["can"]].mean() > 0.9
     assert iou(tool.chosen, truth, "can") < 0.9  # and what lies behind it
-    tool.takes_all = False
 
 
 def test_the_wheel_takes_more_or_less(viewer, hands, truth):

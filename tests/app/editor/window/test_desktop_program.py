@@ -145,7 +145,7 @@ def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_fi
 
 def test_no_context_is_the_error_of_the_window(monkeypatch):
     monkeypatch.setattr(
-        "shapeshift.app.editor.window.window.GlfwWindow",
+        "shapeshift.app.editor.window.monitor.GlfwWindow",
         lambda **_: (_ for _ in ()).throw(ValueError("no")),
     )
     with pytest.raises(NoContext, match=r"no window with OpenGL 4.3 could be opened \(no\)"):

@@ -1,0 +1,117 @@
+"""The tables of texts: nothing is missing, placeholders agree, letters have a font."""
+
+import re
+import string
+from collections import Counter
+
+import pytest
+from PIL import ImageFont
+
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.texts import fonts, table
+from shapeshift.app.editor.texts.fonts import (
+    font_files,
+    has_letters,
+    is_offered,
+    missing_letters,
+    why_not,
+)
+from shapeshift.app.editor.texts.table import all_languages, said, use_language
+from tests.support.desktop.overlay_texts import overlay_texts
+
+OTHERS = [code for code in all_languages() if code != table.ENGLISH]
+PERCENT = re.compile(r"%[-+.\d]*[a-z%]")
+# Buttons that stand three to a row: (268 - 28 - 16) / 3 - 2 * 8 units of the overlay.
+NARROW, FONT_PX = 58.0, 15
+THREE_TO_A_ROW = (
+    "Object", "Hide", "Delete", "None", "Invert", "Crop\u2026", "Undo", "Redo", "Save",
+    "Save\u2026", "Add", "Copy", "Open\u2026", "New", "Recent", "Frame all", "First view", "Fly",
+    "Orbit", "Preview", "Key view", "Key stop", "Delete key", "Clear", "Pause", "Step",
+)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _english():
+    yield
+    use_language(table.ENGLISH)
+
+
+def placeholders(text: str) -> tuple[Counter, Counter]:
+    """{names} with their formats, and %-formats."""
+    named = [(name, form) for _, name, form, _ in string.Formatter().parse(text) if name]
+    return Counter(named), Counter(PERCENT.findall(text))
+
+
+@pytest.mark.parametrize("code", OTHERS)
+def test_no_text_is_missing_and_none_is_left_over(code):
+    texts, wanted = all_languages()[code].texts, overlay_texts()
+    assert len(wanted) > 400
+    assert not sorted(wanted - texts.keys()), "these are not in the table"
+    assert not sorted(texts.keys() - wanted), "nobody says these any more"
+
+
+@pytest.mark.parametrize("code", OTHERS)
+def test_placeholders_agree(code):
+    wrong = [
+        (english, other)
+        for english, other in all_languages()[code].texts.items()
+        if placeholders(english) != placeholders(other) or not other.strip()
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize("code", OTHERS)
+def test_nothing_of_a_text_changes_what_item_it_is(code):
+    """## parts a label from its identity, and a line break would leave its button."""
+    texts = all_languages()[code].texts.values()
+    assert not [text for text in texts if "##" in text or "\n" in text]
+
+
+def test_the_letters_of_german_are_in_our_own_font():
+    german = all_languages()["de"]
+    assert not missing_letters(german) and is_offered("de")
+    assert has_letters(theme.FONT, german.letters)  # by FreeType: a second reader of the file
+
+
+def width_px(text: str) -> float:
+    """Of a line in our own font; what that lacks is a square, as Japanese letters are."""
+    font = ImageFont.truetype(str(theme.FONT), FONT_PX)
+    wide = [letter for letter in text if ord(letter) >= 0x2E80]
+    plain = "".join(letter for letter in text if ord(letter) < 0x2E80)
+    return font.getlength(plain) + FONT_PX * len(wide)
+
+
+@pytest.mark.parametrize("code", OTHERS)
+def test_labels_fit_their_buttons(code):
+    """Three to a row of the panel; a long one may take the space at its sides, and no more."""
+    texts = all_languages()[code].texts
+    said_so = {texts.get(name, name): name for name in THREE_TO_A_ROW}
+    wide = {text: round(width_px(text)) for text in said_so if width_px(text) > NARROW + FONT_PX}
+    assert not wide
+
+
+def test_what_no_table_has_is_said_as_it_is():
+    use_language("de")
+    assert said("Delete") == "L\u00f6schen"
+    assert said("my {odd} file.ply") == "my {odd} file.ply"
+    assert said("{count} splats", count=3) == "3 Splats"
+    use_language("xx")
+    assert said("Delete") == "Delete"
+
+
+def test_japanese_is_offered_where_a_font_has_its_letters(tmp_path, monkeypatch):
+    """An empty folder of fonts, and one whose file of the right name has no such letters."""
+    fonts.font_for.cache_clear()
+    monkeypatch.setattr(fonts, "font_folders", lambda: [tmp_path])
+    (tmp_path / "NotoSansCJK-Regular.ttc").write_bytes(b"no font")
+    (tmp_path / "ipag.ttf").write_bytes(theme.FONT.read_bytes())
+    assert [path.name for path in font_files([tmp_path])] == ["NotoSansCJK-Regular.ttc", "ipag.ttf"]
+    assert not is_offered("ja")
+    assert "no font here has its letters; install one" in why_not(all_languages()["ja"])
+    fonts.font_for.cache_clear()
+    monkeypatch.setattr(fonts, "has_letters", lambda path, letters: path.name == "ipag.ttf")
+    assert is_offered("ja") and fonts.font_for("ja") == tmp_path / "ipag.ttf"
+    use_language("ja")
+    more = fonts.more_letters()
+    assert more is not None and 0x3057 in more.ranges and more.ranges[-1] == 0
+    fonts.font_for.cache_clear()

@@ -1,0 +1,121 @@
+"""Every text of the overlay that is to be in the tables, read from the program's own source."""
+
+import ast
+import importlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+EDITOR = ROOT / "app" / "editor"
+PANELS = "shapeshift.app.editor.panels"
+# function: which of its positional arguments are texts (None: all)
+SAYING: dict[str, tuple[int, ...] | None] = {
+    "said": (0,), "tip": (0,), "item_label": (0,), "subsection": (0,), "Section": (0,),
+    "rows": None, "answer_row": None, "question_box": (0,), "choice": (3,), "slider": (4, 5),
+    "labelled_slider": (4,), "open_slider": (4, 5), "pace_button": (3,), "PathBox": None,
+}  # fmt: skip
+# Tables of texts that functions are handed: what of a dictionary is a text, by module.
+KEYS, VALUES, ALL = "keys", "values", "all"
+TABLES = {
+    "empty_panel": {"CHOICES": ALL, "WHAT": ALL},
+    "keys_sheet": {"GROUPS": ALL},
+    "open_row": {"NEW": ALL},
+    "panel": {"LARGER": ALL, "SMALLER": ALL, "ORDER": ALL},
+    "save_boxes": {"OVER": ALL, "SAVE": ALL, "LOSE": ALL},
+    "sections.camera_panel": {"STEPS": ALL, "KEEP": ALL, "SIDES": VALUES},
+    "sections.export_panel": {"DEGREES": ALL, "FORMAT_TIPS": VALUES},
+    "sections.film_panel": {"AROUND": ALL, "PAST": ALL},
+    "sections.histogram_panel": {"EXPLAINED": ALL},
+    "sections.objects_panel": {"MODES": VALUES, "FOUR_VIEW_NAMES": VALUES, "DEEDS": ALL},
+    "sections.parts_panel": {
+        "AXES": ALL, "DEEDS": ALL, "SIZES": ALL, "CHOICES": ALL, "FLOATERS": ALL,
+        "DRAG_WORDS": VALUES,
+    },
+    "sections.quality_panel": {"GROUPS": KEYS, "ORDER_NAMES": VALUES},
+    "sections.regions_panel": {"DIRECTIONS": KEYS, "HALVES": ALL, "PAINTED": ALL, "KIND_TIPS": ALL},
+    "sections.stops_panel": {"MODE_NAMES": VALUES},
+}  # fmt: skip
+ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
+KEY_TABLES = ("objects", "parts", "split", "touch")  # of app/editor/window: KEYS of the sheet
+PARTS_TOOL = "shapeshift.app.editor.state.parts.parts_tool"
+LETTERS = re.compile(r"[A-Za-z]{2}")
+KEY = r"(Ctrl|Shift|Alt|Esc|Enter|Space|Tab|[A-Z]|F\d+|\d|[+\u2013])"
+NAMES = re.compile(rf"[.\w]*\.\w+|{KEY}([ ,+]+{KEY})*|%\.\d+f .?m")  # the same in all tables
+
+
+def is_text(text: object) -> bool:
+    """Whether it has words; a number with a unit or the name of a key has none."""
+    return isinstance(text, str) and bool(LETTERS.search(text)) and not NAMES.fullmatch(text)
+
+
+def literals(node: ast.AST) -> Iterator[str]:
+    """Strings of an expression, without the pieces of f-strings and without what calls are given:
+    calls have arguments of their own.
+    """
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif not isinstance(node, ast.JoinedStr | ast.Call | ast.Compare | ast.Subscript):
+        children = list(ast.iter_child_nodes(node))
+        if isinstance(node, ast.IfExp):
+            children = [node.body, node.orelse]
+        for child in children:
+            yield from literals(child)
+
+
+def said_in(path: Path) -> set[str]:
+    """Texts that a file hands to one of SAYING."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef):
+            found |= rows_in(node)
+        name = getattr(getattr(node, "func", None), "id", "")
+        if not isinstance(node, ast.Call) or name not in SAYING:
+            continue
+        which = SAYING[name]
+        for place, argument in enumerate(node.args):
+            if which is None or place in which:
+                found |= set(literals(argument))
+    return found
+
+
+def rows_in(function: ast.FunctionDef) -> set[str]:
+    """Of the dictionaries that a function makes for a row of buttons: names and what they do."""
+    found: set[str] = set()
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict):
+            if any(isinstance(target, ast.Name) and target.id in ROWS for target in node.targets):
+                for each in (*node.value.keys, *node.value.values):
+                    found |= set(literals(each)) if each is not None else set()
+    return found
+
+
+def texts_of(value: object, what: str = ALL) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        if what != VALUES:
+            yield from value
+        if what != KEYS:
+            for each in value.values():
+                yield from texts_of(each)
+    elif isinstance(value, list | tuple):
+        for each in value:
+            yield from texts_of(each)
+
+
+def overlay_texts() -> set[str]:
+    """All of them, in English."""
+    found: set[str] = set()
+    for folder in ("panels", "state", "window"):
+        for path in (EDITOR / folder).rglob("*.py"):
+            found |= said_in(path)
+    for name, tables in TABLES.items():
+        module = importlib.import_module(f"{PANELS}.{name}")
+        for table, what in tables.items():
+            found |= set(texts_of(getattr(module, table), what))
+    found |= set(texts_of(importlib.import_module(PARTS_TOOL).HOW))
+    for name in KEY_TABLES:
+        module = importlib.import_module(f"shapeshift.app.editor.window.{name}")
+        found |= set(texts_of(module.KEYS))
+    return {text.split("##")[0] for text in found if is_text(text.split("##")[0])}
