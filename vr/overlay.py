@@ -109,13 +109,18 @@ class Overlay:
 
     def write_depth(self, framebuffer: moderngl.Framebuffer, play_view: View, drawn: Drawn) -> None:
         """The hands into a framebuffer that has nothing but the depth of the splats."""
+        ctx = self._ctx
+        before = ctx.fbo or ctx.detect_framebuffer(0)
         framebuffer.use()
-        framebuffer.depth_mask = True
-        self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        clip_from_play = play_view.clip_from_eye() @ play_view.eye_from_world()
-        bind_depth(self._capsule, None, SOLID_SLACK)
-        self._draw_capsules(drawn.hands, play_view, clip_from_play, True, framebuffer.size)
-        self._ctx.enable_only(moderngl.NOTHING)
+        try:
+            framebuffer.depth_mask = True
+            ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+            clip_from_play = play_view.clip_from_eye() @ play_view.eye_from_world()
+            bind_depth(self._capsule, None, SOLID_SLACK)
+            self._draw_capsules(drawn.hands, play_view, clip_from_play, True, framebuffer.size)
+        finally:
+            ctx.enable_only(moderngl.NOTHING)
+            before.use()
 
     def _draw_things(
         self, size: tuple[int, int], view: View, drawn: Drawn, box: PixelBox,

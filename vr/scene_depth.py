@@ -49,11 +49,16 @@ class SceneDepth:
         ctx, program = self._ctx, self._program
         bind_depth(program, depth, NO_SLACK)
         program["near_m"].value, program["far_m"].value = play_view.near, play_view.far
+        before = ctx.fbo or ctx.detect_framebuffer(0)
         framebuffer.use()
-        framebuffer.depth_mask = True
-        framebuffer.clear(depth=1.0)
-        ctx.enable_only(moderngl.DEPTH_TEST)
-        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        try:
+            framebuffer.depth_mask = True
+            framebuffer.clear(depth=1.0)
+            ctx.enable_only(moderngl.DEPTH_TEST)
+            self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        finally:
+            ctx.enable_only(moderngl.NOTHING)
+            before.use()  # the runtime may take its texture away, and with it the framebuffer
 
     def _upload(self, source: np.ndarray) -> moderngl.Texture:
         size = (source.shape[1], source.shape[0])

@@ -150,16 +150,19 @@ def test_a_panel_apart_and_the_eyes_make_the_picture_that_they_made_together(
     np.testing.assert_array_equal(hole[pixel_of(EYE, np.add(middle, (0.2, -0.15, -0.3)))], 0)
 
 
-def test_the_compositor_gets_metres_as_a_depth_buffer_has_them(ctx, overlay, scene_depth):
+def test_the_compositor_gets_metres_as_a_depth_buffer_has_them(ctx, overlay, scene_depth, target):
     near, far = NEAR_M, FAR_M
+    target.use()
     eye = replace(EYE, near=near, far=far)
     texture = ctx.depth_texture(SIZE)
     made = DepthFramebuffers(ctx)
     framebuffer = made.around(texture.glo)
     framebuffer.viewport = (0, 0, *SIZE)
     scene_depth.write(framebuffer, eye, scene_depth.of(half_a_wall(metres=3 * WALL_M), 3.0))
+    assert ctx.fbo is target  # what was bound is bound again: the runtime may take its own away
     ball = np.add(EYE.world_from_eye.position, (0.3, 0.0, -1.0))
     overlay.write_depth(framebuffer, eye, Drawn((Capsule(ball, ball, (0.1, 0.1), INK),)))
+    assert ctx.fbo is target
     stored = read_depth(framebuffer, SIZE)
     metres = far * near / (far - stored * (far - near))
     np.testing.assert_allclose(metres[:, : SIZE[0] // 2 - 1], WALL_M, rtol=1e-3)  # 24 bits
@@ -178,5 +181,3 @@ def test_a_texture_that_is_no_depth_is_refused(ctx):
         made.around(texture.glo)
     made.release()
     texture.release()
-    while ctx.error != "GL_NO_ERROR":
-        pass

@@ -40,7 +40,8 @@ class DepthFramebuffers:
         whole = self._call("glCheckFramebufferStatus", c_uint, (c_uint,), GL_FRAMEBUFFER)
         before.use()
         if whole != GL_FRAMEBUFFER_COMPLETE:
-            raise NoDepth(f"the driver does not draw into the runtime's depth (0x{whole:x}).")
+            told = f"0x{whole:x}, {self._ctx.error}"  # which clears the error, too
+            raise NoDepth(f"the driver does not draw into the runtime's depth ({told}).")
         return self._ctx.detect_framebuffer(number.value)
 
     def _call(self, name: str, result, kinds: tuple, *arguments):
