@@ -227,7 +227,7 @@ class XrApp:
                 hidden = self.renderer.coverage(i)
                 floor = self.eyes.floor
                 floor.draw(framebuffer, play_views[i], self.state.play_space, hidden, grid, behind)
-            self.eyes.overlay.draw(framebuffer, play_views[i], over, depths and depths[i])
+            self.eyes.overlay.draw(framebuffer, play_views[i], over, depths[i] if depths else None)
         return depths
 
     def _hand_over(

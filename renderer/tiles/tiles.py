@@ -17,8 +17,8 @@ from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
-from shapeshift.rasterizer.project import CULL_REASONS, Camera, Projected
-from shapeshift.rasterizer.project_arena import Limits, SortFrames, project_arena
+from shapeshift.rasterizer.project import CULL_REASONS, Projected
+from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
 from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
 from shapeshift.rasterizer.resolve import resolve
@@ -32,6 +32,8 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.tiles.behind import behind
+from shapeshift.renderer.tiles.depth import depth_picture, surface_picture
+from shapeshift.renderer.tiles.view_camera import camera_of, limits_of
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
@@ -222,10 +224,8 @@ class TilesDrawing(Drawing):
         if settings.depth_scale > 0:
             with timer.time("depth", on_gpu=False):
                 for i, view in enumerate(views):
-                    drawn = self._blend_depth(self._projected[i], tiles[i], view)
-                    depth = self._depths[first + i] = np.zeros((*view.size[::-1], 4), np.float32)
-                    depth[..., 0] = self.device.download(drawn.metres)
-                    depth[..., 3] = 1 - self.device.download(drawn.frame.transmittance)
+                    blended = self._blend_depth(self._projected[i], tiles[i], view)
+                    self._depths[first + i] = depth_picture(self.device, blended)
 
     def _blend_depth(self, projected: Projected, tiles: Tiles, view: View) -> DepthFrame:
         """Depth, and normals in place of colours, which the records lose."""
@@ -373,16 +373,11 @@ class TilesDrawing(Drawing):
         """Depth, normals and coverage from a view; the last frame stays as it is."""
         if not self.splats:
             return Surface.empty(view.size)
-        camera = camera_of(view)
-        sort = SortFrames((camera.camera_from_world,), settings.order == "distance")
+        sort = SortFrames((camera_of(view).camera_from_world,), settings.order == "distance")
         (projected,) = self._launch([view], settings, sort)
         order = sort_order(self.device, projected.in_tiles)
         tiles = bin_tiles(self.device, projected, view.size, order=order)
-        drawn = self._blend_depth(projected, tiles, view)
-        normal = self.device.download(drawn.frame.image)
-        transmittance = self.device.download(drawn.frame.transmittance)
-        metres = self.device.download(drawn.metres)
-        return Surface(metres, np.ascontiguousarray(np.moveaxis(normal, 0, 2)), 1 - transmittance)
+        return surface_picture(self.device, self._blend_depth(projected, tiles, view))
 
     def image(self, i: int) -> np.ndarray:
         return self._images[i]
@@ -396,20 +391,3 @@ class TilesDrawing(Drawing):
         self._images.clear()
         self._heat_images.clear()
         self.device.pool.free_held()
-
-
-def camera_of(view: View) -> Camera:
-    """The view as rasterizer/ takes it."""
-    return Camera(*view.pinhole(), view.size, view.near, view.widest_tangents())
-
-
-def limits_of(settings: RenderSettings) -> Limits:
-    """The culls of the settings as projection takes them."""
-    return Limits(
-        settings.min_alpha,
-        settings.max_pixels,
-        settings.max_distance,
-        settings.min_pixels,
-        settings.fade,
-        settings.low_pass,
-    )

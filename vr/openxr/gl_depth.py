@@ -79,7 +79,7 @@ def find_loader() -> Callable[[str], int | None]:
 
 def _windows_loader() -> Callable[[str], int | None]:
     """wglGetProcAddress knows what came after OpenGL 1.1, the library itself what was there."""
-    opengl = ctypes.WinDLL("opengl32")
+    opengl = getattr(ctypes, "WinDLL")("opengl32")  # noqa: B009  only there
     opengl.wglGetProcAddress.restype = c_void_p
     opengl.wglGetProcAddress.argtypes = [c_char_p]
 

@@ -6,6 +6,7 @@ sharp as its own pixels at any size of the eyes' pictures, and what is nearer st
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import moderngl
@@ -38,7 +39,7 @@ class QuadPicture:
     size_m: tuple[float, float]
 
 
-class Layers:
+class FrameLayers:
     """The runtime's images of a session; `depth`: the format of the eyes' depths, "" for none."""
 
     def __init__(
@@ -128,7 +129,7 @@ class Layers:
             return []
         deep = []
         for i, chain in enumerate(self._depths):
-            kept = chain.fill(lambda framebuffer, i=i: write_depth(i, framebuffer), self.keep)
+            kept = chain.fill(partial(write_depth, i), self.keep)
             if self.keep:
                 self.kept_depth.append(kept)
             info = xr.CompositionLayerDepthInfoKHR(chain.whole, 0.0, 1.0, NEAR_M, FAR_M)

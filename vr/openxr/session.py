@@ -31,7 +31,7 @@ from shapeshift.vr.openxr.events import (
 from shapeshift.vr.openxr.graphics import bind_current, check_requirements
 from shapeshift.vr.openxr.hands import Hands, pose_of
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
-from shapeshift.vr.openxr.layers import Layers, QuadPicture, WriteDepth
+from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
 from shapeshift.vr.openxr.life import BEGIN, END, Life
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import choose_format
@@ -88,7 +88,7 @@ class Session:
                 "the headset hangs on another graphics card, or another runtime should be active."
             ) from None
 
-    def _make_layers(self, part: float, pixels: str) -> Layers:
+    def _make_layers(self, part: float, pixels: str) -> FrameLayers:
         xr, instance = self._xr, self._instance
         stereo = xr.ViewConfigurationType.PRIMARY_STEREO
         system = (instance.handle, instance.system, stereo)
@@ -100,7 +100,7 @@ class Session:
         except ValueError as none:
             raise NoHeadset(f"{instance.runtime}: {none}") from None
         sizes = [eye_size(view, part) for view in views]
-        return Layers(instance, self._handle, self._ctx, sizes, self.pixels)
+        return FrameLayers(instance, self._handle, self._ctx, sizes, self.pixels)
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
