@@ -110,6 +110,15 @@ class Drawing(ABC):
     def presentable_heat(self, i: int) -> np.ndarray | moderngl.Texture:
         """What resolve takes in addition, of a frame with heat."""
 
+    @abstractmethod
+    def presentable_depth(self, i: int) -> np.ndarray | moderngl.Texture:
+        """Of view i where settings.depth_scale is above 0: metres along the view times coverage in
+        red, coverage in alpha, (H, W, 4) with row 0 on top, or on the GPU, row 0 at the bottom.
+
+        Metres over coverage is the expected depth: each splat where the ray is halfway through its
+        ellipsoid, weighed by alpha times transmittance.
+        """
+
     def presentable_rgba8(
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None
     ) -> np.ndarray:
@@ -149,6 +158,10 @@ class Drawing(ABC):
     @abstractmethod
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""
+
+    @abstractmethod
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray:
+        """(H, W, 4) of view i, just drawn: splats as one of settings.EDGES, for a debug view."""
 
     @abstractmethod
     def surface(self, view: View, settings: RenderSettings) -> Surface:
