@@ -16,7 +16,6 @@ from shapeshift.scene.inspection.marks import (
     MOST_MARKS,
     MOST_POINTS,
     Isotherm,
-    Kind,
     Mark,
 )
 
@@ -109,7 +108,7 @@ def _mark(row: Fields) -> Mark:
     note = row.line("note", "")
     row.refuse_unknown_keys()
     try:
-        return Mark(name, cast(Kind, kind), np.array(points, np.float64), radius, note)
+        return Mark(name, kind, np.array(points, np.float64), radius, note)
     except ValueError as error:
         raise BadFile(f"{row.where}: {error}") from None
 
