@@ -110,6 +110,15 @@ class Drawing(ABC):
     def presentable_heat(self, i: int) -> np.ndarray | moderngl.Texture:
         """What resolve takes in addition, of a frame with heat."""
 
+    @abstractmethod
+    def presentable_depth(self, i: int) -> np.ndarray | moderngl.Texture:
+        """Of view i where settings.depth_scale is above 0: metres along the view times coverage in
+        red, coverage in alpha, (H, W, 4) with row 0 on top, or on the GPU, row 0 at the bottom.
+
+        Metres over coverage is the expected depth: each splat where the ray is halfway through its
+        ellipsoid, weighed by alpha times transmittance.
+        """
+
     def presentable_rgba8(
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None
     ) -> np.ndarray:

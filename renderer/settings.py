@@ -32,6 +32,9 @@ class RenderSettings:
     target: str = "auto"
     render_scale: float = 1.0  # of the view's width and height, then shown at full size
     min_transmittance: float = 1e-4  # tiles: a pixel with less left is done (3DGS)
+    # Depth beside the colours, expected along each ray: quads draw it at this part of the picture's
+    # width and height, tiles at all of it; 0: none.
+    depth_scale: float = 0.0
 
     # Culls
     max_pixels: float = math.inf  # tau_lambda: one sigma of a splat's longer axis, pixels
@@ -67,7 +70,7 @@ class RenderSettings:
             check_color(self.background, "background")
         for name, least, most in (
             ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
-            ("min_transmittance", 1e-6, 0.1),
+            ("min_transmittance", 1e-6, 0.1), ("depth_scale", 0.0, 1.0),
             ("max_pixels", 0.0, math.inf), ("max_distance", 0.0, math.inf),
             ("min_pixels", 0.0, math.inf), ("fade", 0.0, 1.0), ("resort_frames", 0, 1_000_000),
             ("resort_degrees", 0.0, 180.0), ("recolor_degrees", 0.0, 180.0),

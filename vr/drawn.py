@@ -34,6 +34,8 @@ class PanelQuad:
     texture: moderngl.Texture  # display sRGB, opaque, row 0 below; with its smaller levels
     play_from_panel: Pose
     size_m: tuple[float, float]
+    version: int = 0  # another one whenever the picture is
+    apart: bool = False  # the runtime shows it as a layer of its own; the eyes have a hole for it
 
 
 @dataclass(frozen=True)

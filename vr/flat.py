@@ -10,12 +10,12 @@ from shapeshift.vr.shown import SHADERS
 
 
 class Flats:
-    """The program for them and a texture a slot."""
+    """The program for them, whose uniforms of the depth others set, and a texture a slot."""
 
     def __init__(self, ctx: moderngl.Context, taps: int) -> None:
         self._ctx = ctx
-        self._program = compile_program(ctx, "panel.vert", "panel.frag", SHADERS, TAPS=taps)
-        self._corners = ctx.vertex_array(self._program, [])
+        self.program = compile_program(ctx, "panel.vert", "panel.frag", SHADERS, TAPS=taps)
+        self._corners = ctx.vertex_array(self.program, [])
         self._kept: dict[str, tuple[Hashable, moderngl.Texture]] = {}
 
     def draw(
@@ -37,20 +37,22 @@ class Flats:
 
     def show(
         self, texture: moderngl.Texture, clip_from_flat: np.ndarray, size_m: tuple[float, float],
-        corner_m: float,
+        corner_m: float, cut: bool = False,
     ) -> None:  # fmt: skip
-        """Draws a texture of somebody else's, opaque, row 0 below, with round corners."""
-        self._render(texture, clip_from_flat, size_m, 1.0, corner_m, False)
+        """Draws a texture of somebody else's, opaque, row 0 below, with round corners; cut: black,
+        with alpha where it is.
+        """
+        self._render(texture, clip_from_flat, size_m, 1.0, corner_m, False, cut)
 
     def _render(
         self, texture: moderngl.Texture, clip_from_flat: np.ndarray, size_m: tuple[float, float],
-        opacity: float, corner_m: float, top_first: bool,
+        opacity: float, corner_m: float, top_first: bool, cut: bool = False,
     ) -> None:  # fmt: skip
-        program = self._program
+        program = self.program
         texture.use(0)
         program["picture"].value = 0
         program["opacity"].value = opacity
-        program["corner"].value = corner_m
+        program["corner"].value, program["cut"].value = corner_m, cut
         program["top_first"].value = top_first
         program["clip_from_panel"].write(clip_from_flat.T.astype(np.float32).tobytes())
         program["half_size"].value = tuple(side / 2 for side in size_m)
@@ -74,4 +76,4 @@ class Flats:
             texture.release()
         self._kept.clear()
         self._corners.release()
-        self._program.release()
+        self.program.release()

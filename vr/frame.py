@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from shapeshift.scene.pose import Pose, View
 
 SIDES = ("left", "right")
+NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a PlaySpace
 
 
 @dataclass(frozen=True)

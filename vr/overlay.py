@@ -1,6 +1,6 @@
 """Draws hands, lines, the panel, cards and the vignette over the splats' picture of an eye."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import moderngl
@@ -10,9 +10,10 @@ from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.shader import compile_program
 from shapeshift.scene.pose import View
 from shapeshift.vr.card import card_picture
-from shapeshift.vr.drawn import Drawn
+from shapeshift.vr.drawn import Drawn, PanelQuad
 from shapeshift.vr.flat import Flats
 from shapeshift.vr.glove import Capsule
+from shapeshift.vr.scene_depth import LINE_SLACK, SOLID_SLACK, EyeDepth, bind_depth
 from shapeshift.vr.shown import SHADERS
 
 
@@ -35,6 +36,7 @@ CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])  # of a flat picture, h
 SPARE = 3  # pixels around what is drawn: lines are widened to nearly one
 PANEL_CORNER_M = 0.011  # radius
 OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+CUT = (moderngl.ZERO, moderngl.ONE_MINUS_SRC_ALPHA)
 
 
 PixelBox = tuple[int, int, int, int]  # left, bottom, width, height
@@ -60,23 +62,70 @@ class Overlay:
         self._target: moderngl.Framebuffer | None = None  # several samples a pixel
         self._resolved: moderngl.Framebuffer | None = None  # one
 
-    def draw(self, framebuffer: moderngl.Framebuffer, play_view: View, drawn: Drawn) -> None:
-        """Over what the framebuffer, display-encoded, shows of `play_view`, an eye in the room."""
+    def draw(
+        self, framebuffer: moderngl.Framebuffer, play_view: View, drawn: Drawn,
+        depth: EyeDepth | None = None,
+    ) -> None:  # fmt: skip
+        """Over what the framebuffer, display-encoded, shows of `play_view`, an eye in the room.
+
+        What lies behind the splats of `depth` is not seen.  A panel that is a layer of its own
+        leaves a hole, alpha 0.
+        """
         box = box_of(drawn, play_view, framebuffer.size)
-        if box is None and not (drawn.vignette > 0 or drawn.blink > 0):
+        dark = drawn.vignette > 0 or drawn.blink > 0
+        if box is None and not dark:
             return
         ctx = self._ctx
         before = ctx.fbo or ctx.detect_framebuffer(0)
+        hole = drawn.panel if drawn.panel is not None and drawn.panel.apart else None
         try:
-            objects = self._draw_things(framebuffer.size, play_view, drawn, box) if box else None
+            objects = None
+            if box:
+                objects = self._draw_things(framebuffer.size, play_view, drawn, box, depth)
+            if hole is not None and box:
+                if dark:
+                    self._lay_over(framebuffer, play_view, drawn, None, None)
+                    drawn = replace(drawn, vignette=0.0, blink=0.0)
+                self._cut_panel(framebuffer, play_view, hole, depth)
             self._lay_over(framebuffer, play_view, drawn, box, objects)
         finally:
             ctx.enable_only(moderngl.NOTHING)
             before.use()
 
+    def show_behind(
+        self, framebuffer: moderngl.Framebuffer, play_view: View, panel: PanelQuad
+    ) -> None:
+        """The panel in the hole that `draw` has left for it: what the runtime makes of both."""
+        ctx = self._ctx
+        before = ctx.fbo or ctx.detect_framebuffer(0)
+        framebuffer.use()
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE_MINUS_DST_ALPHA, moderngl.ONE
+        try:
+            self._place_panel(panel, framebuffer.size, play_view, None, False, corner_m=0.0)
+        finally:
+            ctx.enable_only(moderngl.NOTHING)
+            before.use()
+
+    def write_depth(self, framebuffer: moderngl.Framebuffer, play_view: View, drawn: Drawn) -> None:
+        """The hands into a framebuffer that has nothing but the depth of the splats."""
+        ctx = self._ctx
+        before = ctx.fbo or ctx.detect_framebuffer(0)
+        framebuffer.use()
+        try:
+            framebuffer.depth_mask = True
+            ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+            clip_from_play = play_view.clip_from_eye() @ play_view.eye_from_world()
+            bind_depth(self._capsule, None, SOLID_SLACK)
+            self._draw_capsules(drawn.hands, play_view, clip_from_play, True, framebuffer.size)
+        finally:
+            ctx.enable_only(moderngl.NOTHING)
+            before.use()
+
     def _draw_things(
-        self, size: tuple[int, int], view: View, drawn: Drawn, box: PixelBox
-    ) -> moderngl.Texture:
+        self, size: tuple[int, int], view: View, drawn: Drawn, box: PixelBox,
+        depth: EyeDepth | None,
+    ) -> moderngl.Texture:  # fmt: skip
         """Hands, the panel, then what may be seen through, each behind what is nearer."""
         (target, resolved), ctx = self._targets_of(size), self._ctx
         target.scissor = resolved.scissor = box
@@ -85,14 +134,16 @@ class Overlay:
         target.clear(viewport=box)
         ctx.blend_func = OVER
         clip_from_play = view.clip_from_eye() @ view.eye_from_world()
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._draw_capsules(drawn.hands, view, clip_from_play, True)
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
+        bind_depth(self._capsule, depth, SOLID_SLACK)
+        self._draw_capsules(drawn.hands, view, clip_from_play, True, size)
         if drawn.panel is not None or drawn.cards:
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
-            self._draw_flats(drawn, clip_from_play)
+            self._draw_flats(drawn, view, size, depth)
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         target.depth_mask = False
-        self._draw_capsules(drawn.lines, view, clip_from_play, False)
+        bind_depth(self._capsule, depth, LINE_SLACK)
+        self._draw_capsules(drawn.lines, view, clip_from_play, False, size)
         target.depth_mask = True
         if resolved is not target:
             resolved.use()  # its scissor bounds the copy
@@ -100,8 +151,9 @@ class Overlay:
         return resolved.color_attachments[0]
 
     def _draw_capsules(
-        self, capsules: tuple[Capsule, ...], view: View, clip_from_play: np.ndarray, lit: bool
-    ) -> None:
+        self, capsules: tuple[Capsule, ...], view: View, clip_from_play: np.ndarray, lit: bool,
+        size: tuple[int, int],
+    ) -> None:  # fmt: skip
         if not capsules:
             return
         rows = capsule_rows(capsules)
@@ -114,20 +166,48 @@ class Overlay:
         program["clip_from_play"].write(columns(clip_from_play))
         program["eye"].value = tuple(view.world_from_eye.position)
         program["tangent_px"].value = (view.tangents[1] - view.tangents[0]) / view.size[0]
-        program["lit"].value = lit
+        program["lit"].value, program["size"].value = lit, size
         self._capsules.render(moderngl.TRIANGLES, instances=len(rows))
 
-    def _draw_flats(self, drawn: Drawn, clip_from_play: np.ndarray) -> None:
+    def _draw_flats(
+        self, drawn: Drawn, view: View, size: tuple[int, int], depth: EyeDepth | None
+    ) -> None:
         """The panel, then the cards, over what lies behind them."""
         panel = drawn.panel
         if panel is not None:
-            clip = clip_from_play @ panel.play_from_panel.matrix()
-            self._flats.show(panel.texture, clip, panel.size_m, corner_m=PANEL_CORNER_M)
+            if panel.apart:
+                self._ctx.blend_func = CUT  # hands behind it are gone
+            self._place_panel(panel, size, view, depth, panel.apart)
+            self._ctx.blend_func = OVER
+        clip_from_play = view.clip_from_eye() @ view.eye_from_world()
+        self._bind_flats(size, depth)
         for number, card in enumerate(drawn.cards):
             clip = clip_from_play @ card.play_from_card.matrix()
             picture = partial(card_picture, card.lines)
             slot = f"card {number}"
             self._flats.draw(slot, card.lines, picture, clip, card.size_m, card.opacity)
+
+    def _place_panel(
+        self, panel: PanelQuad, size: tuple[int, int], view: View, depth: EyeDepth | None,
+        cut: bool, corner_m: float = PANEL_CORNER_M,
+    ) -> None:  # fmt: skip
+        clip = view.clip_from_eye() @ view.eye_from_world() @ panel.play_from_panel.matrix()
+        self._bind_flats(size, depth)
+        self._flats.show(panel.texture, clip, panel.size_m, corner_m, cut)
+
+    def _bind_flats(self, size: tuple[int, int], depth: EyeDepth | None) -> None:
+        bind_depth(self._flats.program, depth, SOLID_SLACK)
+        self._flats.program["size"].value = size
+
+    def _cut_panel(
+        self, framebuffer: moderngl.Framebuffer, view: View, panel: PanelQuad,
+        depth: EyeDepth | None,
+    ) -> None:  # fmt: skip
+        """A hole in the eye's picture where the panel is seen."""
+        framebuffer.use()
+        self._ctx.enable_only(moderngl.BLEND)
+        self._ctx.blend_func = CUT
+        self._place_panel(panel, framebuffer.size, view, depth, cut=True)
 
     def _lay_over(
         self, framebuffer: moderngl.Framebuffer, view: View, drawn: Drawn, box: PixelBox | None,

@@ -28,6 +28,7 @@ class Blit:
     ) -> None:
         """Fills the framebuffer's viewport with `part` of the texture; row 0 at the bottom."""
         as_it_is = part == WHOLE and texture.size == tuple(framebuffer.viewport[2:])
+        before = texture.filter
         texture.filter = (moderngl.NEAREST,) * 2 if as_it_is else (moderngl.LINEAR,) * 2
         texture.repeat_x = texture.repeat_y = False
         texture.use(0)
@@ -38,6 +39,7 @@ class Blit:
         self._ctx.enable_only(moderngl.NOTHING)
         self._ctx.disable_direct(GL_FRAMEBUFFER_SRGB)
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        texture.filter = before
 
     def release(self) -> None:
         self._triangle.release()

@@ -42,6 +42,11 @@ class Options(ReadingOptions):
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
     hints: bool = True
     """Name the buttons beside the gloves for ten seconds, and say when frames are late."""
+    depth: bool = True
+    """Hide hands and the panel behind nearer splats, and tell the runtime how deep the picture is,
+    so that late frames are moved and not torn; it costs a second, coarser drawing of the splats."""
+    panel_layer: Annotated[bool, EXPERT] = True
+    """Let the runtime place the panel itself, sharp at any size of the eyes' pictures."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     target_ms: Annotated[float | None, EXPERT] = None
@@ -111,11 +116,13 @@ def wear(options: Options) -> int:
     from shapeshift.app.cli import has_display
     from shapeshift.app.document import DARK
     from shapeshift.app.drawing import make_folder
+    from shapeshift.app.headset.eyes import Eyes
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
     from shapeshift.app.headset.open_xr import open_xr
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
-    from shapeshift.app.headset.xr_app import Eyes, XrApp
+    from shapeshift.app.headset.wearing import Wearing
+    from shapeshift.app.headset.xr_app import XrApp
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
     from shapeshift.vr.openxr.instance import Instance, Lost
@@ -138,11 +145,13 @@ def wear(options: Options) -> int:
             editor.bodies,
         ):
             rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
+            wearing = Wearing(
+                options.panel_hand, options.floor, options.hints, options.depth, options.panel_layer
+            )
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
-                session, renderer, eyes, mirror, document, editor, pacing, report, rules,
-                options.panel_hand, options.floor, options.hints,
+                session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
             )  # fmt: skip
             try:
                 with interrupting(xr_app), xr_app.state.parts.finder:
@@ -189,6 +198,7 @@ def describe(instance, session) -> dict:
         "profiles": session.profiles,
         "pixels": session.pixels.name,
         "eyes": session.sizes,
+        "depth": session.layers.depth,
         **session.pace.report(),
     }
 

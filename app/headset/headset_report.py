@@ -36,6 +36,7 @@ class DoneFrame:
     records: Sequence[Record]
     life: Life
     pace: FramePace
+    layers: Sequence[str] = ()  # that were handed to the compositor
 
 
 class Report:
@@ -51,6 +52,7 @@ class Report:
         self.ended = "by the runtime"
         self._path, self._pictures, self._every = path, pictures, every
         self._lines: IO[str] | None = None
+        self._lines_path = lines
         if lines is not None:
             self._lines = open_lines(lines)
 
@@ -70,7 +72,7 @@ class Report:
         if self._path is not None:
             text = json.dumps({**facts, "ended": self.ended}, indent=1) + "\n"
             write_whole(self._path, text.encode())
-        written = [self._path, self._lines and self._lines.name, self._pictures]
+        written = [self._path, self._lines and self._lines_path, self._pictures]
         if names := [full(path) for path in written if path]:
             say(f"written to {', '.join(names)}")
 
@@ -114,6 +116,7 @@ def frame_row(done: DoneFrame) -> dict:
             for obj in world.drawn().objects
         },
         "panel": done.panel(),
+        "layers": done.layers,
         "events": [event for record in done.records for event in record.events],
         "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in done.pulses],
         "own_ms": rounded(times[-1]) if times else None,

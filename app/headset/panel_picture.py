@@ -33,6 +33,7 @@ class PanelPicture:
         self.texture = ctx.texture((UNITS[0] * per_unit, UNITS[1] * per_unit), 4)
         self.texture.repeat_x = self.texture.repeat_y = False
         self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self.version = 0  # another one after each frame that was drawn
         self._framebuffer = ctx.framebuffer([self.texture])
         clean_texts()
         self.boxes: dict[str, Box] = {}  # of what can be hit and is in sight, by label
@@ -83,6 +84,7 @@ class PanelPicture:
         self._ctx.enable_only(moderngl.NOTHING)
         before.use()
         self.texture.build_mipmaps()
+        self.version += 1
 
     def _point(self, pointing: Pointing, notches: float, seconds: float) -> None:
         """The ray's place is the mouse's, and its press the left button."""

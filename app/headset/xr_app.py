@@ -11,13 +11,14 @@ from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
+from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
-from shapeshift.app.headset.panel_picture import PanelPicture
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.performance_section import Figures
+from shapeshift.app.headset.wearing import WEARING, Wearing
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.renderer.renderer import Renderer
@@ -27,7 +28,7 @@ from shapeshift.scene.pose import View
 from shapeshift.scene.world.record import Record
 from shapeshift.vr.card import Card
 from shapeshift.vr.drawn import Drawn, drawn_of
-from shapeshift.vr.floor import REST, Floor, Grid, clearness
+from shapeshift.vr.floor import REST, Grid, clearness
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.glove import Capsule
 from shapeshift.vr.hints import hints
@@ -35,38 +36,12 @@ from shapeshift.vr.locomotion.locomotion import RULES, Rules
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.openxr.session import Session
 from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
-from shapeshift.vr.overlay import Overlay
+from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.touching import strongest
 
 ANY_SIZE = (640, 360)  # of a view that only says where to stand
 FIGURES_EVERY_S = 1.0  # of the section Performance
 LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on the table
-
-
-class Eyes:
-    """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`.
-
-    And what is drawn behind its splats and over them, the panel's picture too.
-    """
-
-    def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
-        self.floor, self.overlay, self.panel = Floor(ctx), Overlay(ctx), PanelPicture(ctx)
-        self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
-
-    @property
-    def textures(self) -> list[moderngl.Texture]:
-        return [framebuffer.color_attachments[0] for framebuffer in self.framebuffers]
-
-    def __enter__(self) -> "Eyes":
-        return self
-
-    def __exit__(self, *failure) -> None:
-        self.floor.release()
-        self.overlay.release()
-        self.panel.release()
-        for framebuffer, texture in zip(self.framebuffers, self.textures, strict=True):
-            framebuffer.release()
-            texture.release()
 
 
 class XrApp:
@@ -83,22 +58,20 @@ class XrApp:
         pacing: Pacing,
         report: Report,
         rules: Rules = RULES,
-        panel_hand: str = "left",
-        floor: bool = True,
-        hints: bool = True,
+        wearing: Wearing = WEARING,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
-        self.report, self._hints = report, hints
+        self.report, self._wearing = report, wearing
         self.background = document.background_or(DARK)
         eye = document.view(ANY_SIZE).world_from_eye
         editor.settings = replace(editor.settings, background=self.background)
         user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
         touch = TouchState(editor, True, keys=False)
         parts = PartsTool(editor, lambda: None)
-        self.state = XrState(editor, touch, pacing, user, parts, floor_shown=floor)
+        self.state = XrState(editor, touch, pacing, user, parts, floor_shown=wearing.floor)
         self._parts_hand = PartsHand(parts)
         actions = MenuActions(self.recentre, self.leave, self.pulse)
-        self.menu = WristMenu(self.state, actions, eyes.panel, panel_hand)
+        self.menu = WristMenu(self.state, actions, eyes.panel, wearing.panel_hand)
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
         self._outlines, self._late = Outlines(), Late()
@@ -160,8 +133,8 @@ class XrApp:
         if frame.drawn:
             views = [self.state.play_space.view(view) for view in frame.views]
             self._choose_quality(views)
-            self.draw(views, frame.views, self._over(frame))
-            self.session.submit(self.eyes.textures)
+            over = self._over(frame)
+            self._hand_over(frame.views, over, self.draw(views, frame.views, over))
             self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
             if frame.seen_s - self._figured_s >= FIGURES_EVERY_S:
@@ -171,7 +144,14 @@ class XrApp:
             self.mirror.rest()
         session = self.session
         done = DoneFrame(
-            frame, self.state, self.menu.row, self.pulses, records, session.life, session.pace
+            frame,
+            self.state,
+            self.menu.row,
+            self.pulses,
+            records,
+            session.life,
+            session.pace,
+            session.layers.last if frame.drawn else (),
         )
         self.report.note(done, self.eyes.framebuffers)
 
@@ -189,7 +169,11 @@ class XrApp:
         outlines, cards = self._outlined(frame), self._cards(frame)
         panel = self.eyes.panel.texture
         touched, hands = person.touched, frame.hands
-        return drawn_of(hands, carried, person.comfort, touched, outlines, cards, panel)
+        over = drawn_of(hands, carried, person.comfort, touched, outlines, cards, panel)
+        if over.panel is None or not self._wearing.panel_layer:
+            return over
+        apart = replace(over.panel, version=self.eyes.panel.version, apart=True)
+        return replace(over, panel=apart)
 
     def _outlined(self, frame: Frame) -> list[Capsule]:
         """Around what hands would take, or their rays act on, that do not point at the panel."""
@@ -207,7 +191,7 @@ class XrApp:
 
     def _cards(self, frame: Frame) -> tuple[Card, ...]:
         """What buttons do, at first; and that frames are late."""
-        if not self._hints:
+        if not self._wearing.hints:
             return ()
         side, rules = self.menu.carried.home, self.state.user.rules
         cards = hints(frame, self._worn_s, self.session.profiles, rules, side)
@@ -215,17 +199,26 @@ class XrApp:
             cards += (late_card(frame.head, self.state.pacing.quality),)
         return cards
 
-    def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
-        """Splats with one sort for both eyes, the floor behind them, the room over them."""
-        look = self.state.editor.settings
+    def draw(
+        self, views: list[View], play_views: Sequence[View], over: Drawn
+    ) -> list[EyeDepth] | None:
+        """Splats with one sort for both eyes, the floor behind them, the room over them.
+
+        Returns how deep the splats are, where that was asked for.
+        """
+        look, deep = self.state.editor.settings, self._wearing.depth
         self.background = look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
+        settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0)
         self.renderer.settings = replace(settings, background=look.background)
         start = time.perf_counter()
         self.renderer.update(self.state.editor.shown(views[0]))
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
-        self._drawing_ms = (time.perf_counter() - start) * 1e3
+        taken_ms = (time.perf_counter() - start) * 1e3
+        # Depth is no part of what the chart of shortcuts has prices for.
+        self._drawing_ms = max(taken_ms - self.stats.ms.get("depth", 0.0), 0.0)
         self.session.pace.drew(self._drawing_ms)
+        depths = self.eyes.depths(self.renderer, self.state.play_space.scale) if deep else None
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
             if self.state.floor_shown:
@@ -234,7 +227,21 @@ class XrApp:
                 hidden = self.renderer.coverage(i)
                 floor = self.eyes.floor
                 floor.draw(framebuffer, play_views[i], self.state.play_space, hidden, grid, behind)
-            self.eyes.overlay.draw(framebuffer, play_views[i], over)
+            self.eyes.overlay.draw(framebuffer, play_views[i], over, depths[i] if depths else None)
+        return depths
+
+    def _hand_over(
+        self, play_views: Sequence[View], over: Drawn, depths: list[EyeDepth] | None
+    ) -> None:
+        """Both pictures, how deep they are and the panel, to the compositor."""
+        eyes = self.eyes
+
+        def write(i: int, framebuffer: moderngl.Framebuffer) -> None:
+            if depths is not None:
+                eyes.write_depth(i, framebuffer, play_views[i], depths[i], over)
+
+        self.session.submit(eyes.textures, write if depths else None, quad_of(over))
+        eyes.fill_panel(play_views, over)
 
     def _choose_quality(self, views: list[View]) -> None:
         """What of the picture can be had within the display's period: once that is known, and

@@ -24,7 +24,7 @@ from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter
 from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, StereoPairSplatter
-from shapeshift.renderer.gl.surface import draw_surface
+from shapeshift.renderer.gl.surface import DepthPictures, draw_surface
 from shapeshift.renderer.gl.target import brightest, choose_target
 from shapeshift.renderer.layout import MOST_VIEWS
 from shapeshift.renderer.settings import RenderSettings
@@ -50,6 +50,7 @@ class QuadsDrawing(Drawing):
         self._projector = Projector(gpu)
         self._splatter = Splatter(gpu)
         self.stereo_pair = StereoPairSplatter(gpu) if is_software(gpu.ctx) else None
+        self._depths = DepthPictures(gpu)
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._sort_policy = SortPolicy()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
@@ -153,6 +154,10 @@ class QuadsDrawing(Drawing):
                     self._sorter.sort(arena, settings.key_bits)
             with timer.time("splat"):
                 self._splat(group, first + i, settings)
+            if settings.depth_scale > 0:
+                with timer.time("depth"):
+                    for row, view in enumerate(group):
+                        self._depths.draw(arena, first + i + row, view, settings, row)
             i += len(group)
         self._last = len(groups[-1]) - 1
 
@@ -219,6 +224,9 @@ class QuadsDrawing(Drawing):
     def presentable_heat(self, i: int) -> moderngl.Texture:
         return self._splatter.texture(i, of=1)
 
+    def presentable_depth(self, i: int) -> moderngl.Texture:
+        return self._depths.texture(i)
+
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         arena = self.arena
         owner = np.repeat(np.arange(len(arena.starts) - 1), np.diff(arena.starts))
@@ -262,7 +270,7 @@ class QuadsDrawing(Drawing):
 
     def close(self) -> None:
         self._release_arena()
-        for part in (self._splatter, self._sorter, self._projector):
+        for part in (self._splatter, self._depths, self._sorter, self._projector):
             if part is not None:
                 part.release()
 

@@ -9,6 +9,7 @@ flat in vec4 depth_slope;
 flat in vec4 depth_square;
 flat in vec3 normal;
 uniform float min_alpha;
+uniform vec2 pixels_per_fragment;  // of the view: above 1 where the target is smaller than it
 uniform int output_kind;  // 0: depth, metres; 1: normal, eye axes
 out vec4 premultiplied;
 
@@ -25,6 +26,7 @@ float depth_under(vec2 d) {
 void main() {
     float alpha = min(MAX_ALPHA, opacity * exp(-0.5 * dot(sigmas, sigmas)));
     if (!(alpha >= min_alpha)) discard;
-    vec3 value = output_kind == 0 ? vec3(depth_under(gl_FragCoord.xy - center), 0.0, 0.0) : normal;
+    vec2 at = gl_FragCoord.xy * pixels_per_fragment;
+    vec3 value = output_kind == 0 ? vec3(depth_under(at - center), 0.0, 0.0) : normal;
     premultiplied = vec4(value * alpha, alpha);
 }

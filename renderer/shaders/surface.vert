@@ -9,7 +9,8 @@ layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  /
 layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
 layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
 layout(std430, binding = SLOT_SURFACES) readonly buffer Surfaces { vec4 surfaces[]; };
-uniform vec2 size;  // pixels
+uniform vec2 size;   // pixels
+uniform uint first;  // record of splat 0 in this view
 
 out vec2 sigmas;  // place in the ellipse's own axes
 flat out float opacity;
@@ -21,7 +22,8 @@ flat out vec3 normal;
 void main() {
     uint triangle = uint(gl_VertexID) / 3u, corner = uint(gl_VertexID) % 3u;
     uint i = order[counts[COUNT_SORTED] - 1u - triangle];  // the farthest first
-    Ellipse e = unpack_record(records[2u * i], records[2u * i + 1u]);
+    uint record = first + i;
+    Ellipse e = unpack_record(records[2u * record], records[2u * record + 1u]);
     sigmas = e.cutoff_sigmas * TRIANGLE[corner];
     opacity = e.opacity;
     center = e.center;

@@ -24,7 +24,7 @@ from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.rasterizer.splat_edges import draw_edges
-from shapeshift.rasterizer.surface import rasterize_depth, surface_arena
+from shapeshift.rasterizer.surface import DepthFrame, rasterize_depth, surface_arena
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
@@ -32,6 +32,7 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
+from shapeshift.renderer.tiles.depth import depth_picture, surface_picture
 from shapeshift.renderer.tiles.inputs import behind, camera_of, limits_of
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
@@ -82,6 +83,7 @@ class TilesDrawing(Drawing):
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self.draws_heat = False  # in addition to the colours, from the next frame on
         self._heat_images: dict[int, np.ndarray] = {}
+        self._depths: dict[int, np.ndarray] = {}
 
     def allocate(self, models: list[Model]) -> None:
         check_tiles(self.device, models)
@@ -200,6 +202,7 @@ class TilesDrawing(Drawing):
             for i, view in enumerate(views):
                 self._images[first + i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
                 self._heat_images[first + i] = np.zeros((*view.size[::-1], 2), np.float32)
+                self._depths[first + i] = np.zeros((*view.size[::-1], 4), np.float32)
             return
         with timer.time("project", on_gpu=False):
             self._project(views, settings)
@@ -218,6 +221,19 @@ class TilesDrawing(Drawing):
                 numbers = [first + i for i in same]
                 self._images.update(zip(numbers, images, strict=True))
                 self._heat_images.update(zip(numbers, heats, strict=False))
+        if settings.depth_scale > 0:
+            with timer.time("depth", on_gpu=False):
+                for i, view in enumerate(views):
+                    blended = self._blend_depth(self._projected[i], tiles[i], view)
+                    self._depths[first + i] = depth_picture(self.device, blended)
+
+    def _blend_depth(self, projected: Projected, tiles: Tiles, view: View) -> DepthFrame:
+        """Depth, and normals in place of colours, which the records lose."""
+        surfaces = surface_arena(
+            self.device, self._mean_opacity, self._covariance, self._object_index,
+            self._world_from_objects, camera_of(view), projected,
+        )  # fmt: skip
+        return rasterize_depth(self.device, projected, tiles, surfaces, view.size)
 
     def _heats_of(self, first: int, views: list[int]) -> list:
         """(N, 4) for each of the views: its own, or that of all; made where there is none yet."""
@@ -323,6 +339,9 @@ class TilesDrawing(Drawing):
         heat = self._heat_images[i] if self.draws_heat else None
         return resolve(self.device, self._images[i], behind(background, view), palette, heat)
 
+    def presentable_depth(self, i: int) -> np.ndarray:
+        return self._depths[i]
+
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         read = self.device.download
         return read(self._mean_opacity), read(self._object_index), read(self._covariance)
@@ -360,20 +379,11 @@ class TilesDrawing(Drawing):
         """Depth, normals and coverage from a view; the last frame stays as it is."""
         if not self.splats:
             return Surface.empty(view.size)
-        camera = camera_of(view)
-        sort = SortFrames((camera.camera_from_world,), settings.order == "distance")
+        sort = SortFrames((camera_of(view).camera_from_world,), settings.order == "distance")
         (projected,) = self._launch([view], settings, sort)
         order = sort_order(self.device, projected.in_tiles)
         tiles = bin_tiles(self.device, projected, view.size, order=order)
-        surfaces = surface_arena(
-            self.device, self._mean_opacity, self._covariance, self._object_index,
-            self._world_from_objects, camera, projected,
-        )  # fmt: skip
-        drawn = rasterize_depth(self.device, projected, tiles, surfaces, view.size)
-        normal = self.device.download(drawn.frame.image)
-        transmittance = self.device.download(drawn.frame.transmittance)
-        metres = self.device.download(drawn.metres)
-        return Surface(metres, np.ascontiguousarray(np.moveaxis(normal, 0, 2)), 1 - transmittance)
+        return surface_picture(self.device, self._blend_depth(projected, tiles, view))
 
     def image(self, i: int) -> np.ndarray:
         return self._images[i]

@@ -19,7 +19,7 @@ import numpy as np
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
-from shapeshift.vr.frame import Frame
+from shapeshift.vr.frame import FAR_M, NEAR_M, Frame
 from shapeshift.vr.openxr.display import display_period
 from shapeshift.vr.openxr.events import (
     ControllersChanged,
@@ -31,14 +31,13 @@ from shapeshift.vr.openxr.events import (
 from shapeshift.vr.openxr.graphics import bind_current, check_requirements
 from shapeshift.vr.openxr.hands import Hands, pose_of
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
+from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
 from shapeshift.vr.openxr.life import BEGIN, END, Life
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
-from shapeshift.vr.openxr.swapchain import Swapchain, choose_format
+from shapeshift.vr.openxr.swapchain import choose_format
 from shapeshift.vr.pace import FramePace
-from shapeshift.vr.shown import Blit
 
 REST_S = 0.01  # between two looks at what the runtime says while there is nothing to draw
-NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a PlaySpace
 MOST_ERRORS = 16  # of GL that a runtime may have left behind
 
 
@@ -59,8 +58,6 @@ class Session:
         self.life, self.pace = Life(), FramePace()
         self.recentrings = 0
         self.profiles: dict[str, str] = {}  # side -> what its controller is taken for
-        self.keep = False  # read the runtime's images back into `kept`
-        self.kept: list[np.ndarray] = []
         self._pending: list[Recentred] = []
         self._open: Any | None = None  # the runtime's state of the frame under way
         self._views: tuple = ()  # the runtime's, of the open frame
@@ -68,15 +65,13 @@ class Session:
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
-        self._shown = Blit(ctx)
-        self._swapchains: list[Swapchain] = []
         self.hands = Hands(instance.handle)
         self._handle = self._create()
         self.play = open_play_space(instance, self._handle)
         self._view_space = open_head_space(instance, self._handle)
         self.hands.attach(self._handle)
         self.pace.display_s = display_period(instance, self._handle)
-        self._make_swapchains(part, pixels)
+        self.layers = self._make_layers(part, pixels)
 
     def _create(self) -> Any:
         xr, instance = self._xr, self._instance
@@ -93,7 +88,7 @@ class Session:
                 "the headset hangs on another graphics card, or another runtime should be active."
             ) from None
 
-    def _make_swapchains(self, part: float, pixels: str) -> None:
+    def _make_layers(self, part: float, pixels: str) -> FrameLayers:
         xr, instance = self._xr, self._instance
         stereo = xr.ViewConfigurationType.PRIMARY_STEREO
         system = (instance.handle, instance.system, stereo)
@@ -104,14 +99,12 @@ class Session:
             self.pixels = choose_format(offered, pixels)
         except ValueError as none:
             raise NoHeadset(f"{instance.runtime}: {none}") from None
-        for view in views:
-            size = eye_size(view, part)
-            chain = Swapchain(instance, self._handle, self._ctx, size, self.pixels)
-            self._swapchains.append(chain)
+        sizes = [eye_size(view, part) for view in views]
+        return FrameLayers(instance, self._handle, self._ctx, sizes, self.pixels)
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
-        return [chain.size for chain in self._swapchains]
+        return self.layers.sizes
 
     def frames(self, resting: Callable[[], None] = lambda: None) -> Iterator[Frame]:
         """One frame after the other until the session is over; Lost where it went away.
@@ -133,22 +126,21 @@ class Session:
         if self.life.lost:
             raise Lost(f"{self._instance.runtime} ended the session.")
 
-    def submit(self, textures: Sequence[moderngl.Texture]) -> None:
-        """Shows one display-encoded RGBA8 picture an eye, of `sizes`, row 0 at the bottom."""
-        xr = self._xr
-        self.kept = []
-        for chain, texture in zip(self._swapchains, textures, strict=True):
-            picture = chain.show(texture, self._shown, self.keep)
-            if self.keep:
-                self.kept.append(picture)
-        views = []
-        for chain, view in zip(self._swapchains, self._views, strict=True):
-            whole = xr.Rect2Di(xr.Offset2Di(0, 0), xr.Extent2Di(*chain.size))
-            image = xr.SwapchainSubImage(chain.handle, whole, 0)
-            views.append(xr.CompositionLayerProjectionView(view.pose, view.fov, image))
-        none = xr.CompositionLayerFlags.NONE
-        layer = xr.CompositionLayerProjection(none, self.play.handle, views=views)
-        self._end([ctypes.byref(layer)])
+    def submit(
+        self,
+        textures: Sequence[moderngl.Texture],
+        write_depth: WriteDepth | None = None,
+        quad: QuadPicture | None = None,
+    ) -> None:
+        """Shows one display-encoded RGBA8 picture an eye, of `sizes`, row 0 at the bottom.
+
+        write_depth: draws how deep an eye's picture is.  quad: lies behind the eyes' pictures,
+        where their alpha is below 1.
+        """
+        made = self.layers.hand_over(
+            textures, self._views, self.play.handle, write_depth, quad, False
+        )
+        self._end([ctypes.byref(layer) for layer in made])
 
     def leave(self) -> None:
         """Asks the runtime to end the session; frames() goes on until it has."""
@@ -222,8 +214,8 @@ class Session:
         )
         self._eyes = left, right
         views = [
-            View(pose, tangents_of(view.fov), NEAR_M, FAR_M, chain.size)
-            for pose, view, chain in zip(self._eyes, self._views, self._swapchains, strict=True)
+            View(pose, tangents_of(view.fov), NEAR_M, FAR_M, size)
+            for pose, view, size in zip(self._eyes, self._views, self.sizes, strict=True)
         ]
         return tuple(views), turned
 
@@ -260,10 +252,7 @@ class Session:
 
     def close(self) -> None:
         """Gives all back, also what was lost with the runtime."""
-        for chain in self._swapchains:
-            chain.close()
-        self._swapchains = []
-        self._shown.release()
+        self.layers.close()
         ended = (self.hands.detach, self.hands.close)
         for end in (*ended, lambda: self._xr.destroy_session(self._handle)):
             try:

@@ -1,11 +1,13 @@
 // capsule: soft light from above and from the head for what is solid; lines shine by themselves.
-// Reads:   normal, towards_eye and color of capsule.vert; lit.
+// Reads:   normal, towards_eye and color of capsule.vert; lit; the splats' depth.
 // Writes:  shown, premultiplied.
 // Units:   display sRGB.
+#include "scene_depth.glsl"
 in vec3 normal;
 in vec3 towards_eye;
 in vec4 color;
 uniform bool lit;
+uniform vec2 size;  // pixels
 out vec4 shown;  // display sRGB, premultiplied
 
 void main() {
@@ -19,5 +21,8 @@ void main() {
         rgb *= 0.30 + 0.42 * sky + 0.28 * facing;
         rgb *= mix(0.72, 1.0, smoothstep(0.0, 0.45, facing));  // a darker outline parts the fingers
     }
-    shown = vec4(rgb * color.a, color.a);
+    // 1 / w of the clip space is the depth along the view.
+    float opacity = color.a * seen_before(gl_FragCoord.xy / size, 1.0 / gl_FragCoord.w);
+    if (!(opacity > 1.0 / 512.0)) discard;  // it would leave its depth
+    shown = vec4(rgb * opacity, opacity);
 }

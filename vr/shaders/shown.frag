@@ -2,7 +2,7 @@
 // FRAMEBUFFER_SRGB is off, so values arrive as they are written: an sRGB image of the runtime wants
 // them encoded, as they are; for a linear one they are decoded here, the one conversion there is.
 // Reads:   image, part, linear.
-// Writes:  shown, opaque.
+// Writes:  shown, premultiplied as the image is.
 // Units:   display sRGB, or light where linear.
 in vec2 place;
 uniform sampler2D image;  // display sRGB
@@ -16,6 +16,6 @@ vec3 linear_from_srgb(vec3 c) {
 }
 
 void main() {
-    vec3 color = texture(image, part.xy + part.zw * place).rgb;
-    shown = vec4(linear ? linear_from_srgb(color) : color, 1.0);
+    vec4 color = texture(image, part.xy + part.zw * place);
+    shown = vec4(linear ? linear_from_srgb(color.rgb) : color.rgb, color.a);
 }

@@ -44,6 +44,7 @@ class Played:
         self.grids, self.profiles = [], {}
         self.framebuffers, self.textures = ["left", "right"], ["left", "right"]
         self.ctx, self.scenes, self.views = None, [], []
+        self.layers, self.scales, self.written = SimpleNamespace(last=[]), [], []
 
     def frames(self, resting):
         for frame in self.queue:
@@ -53,8 +54,20 @@ class Played:
             yield frame
             self.left += self.left > 0
 
-    def submit(self, textures) -> None:
-        assert textures == ["left", "right"]
+    def depths(self, renderer, scale) -> list[str]:
+        self.scales.append(scale)
+        return ["left depth", "right depth"]
+
+    def write_depth(self, *given) -> None:
+        self.written.append(given)
+
+    def fill_panel(self, views, drawn) -> None:
+        self.asked.append("panel")
+
+    def submit(self, textures, write_depth, quad) -> None:
+        assert textures == ["left", "right"] and quad is None
+        if write_depth is not None:
+            write_depth(1, "framebuffer")
         self.asked.append("submit")
         self.pace.end(0.004)
 
@@ -114,7 +127,11 @@ def test_a_frame_goes_in_order_and_draws_both_eyes_at_once(wear):
     xr_app.loop()
     eyes = ["present left", "floor by coverage 0", "overlay",
             "present right", "floor by coverage 1", "overlay"]  # fmt: skip
-    assert played.asked == ["draw", *eyes, "submit", "mirror"] * 2
+    assert played.asked == ["draw", *eyes, "submit", "panel", "mirror"] * 2
+    assert played.settings.depth_scale > 0 and played.scales == [1.0] * 2
+    assert [(eye, into, depth) for eye, into, _, depth, _ in played.written] == [
+        (1, "framebuffer", "right depth")
+    ] * 2
     assert [len(views) for views in played.views] == [2, 2]
     assert played.settings.background == xr_app.background
     left = played.views[0][0].world_from_eye

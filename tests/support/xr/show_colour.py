@@ -31,12 +31,12 @@ def main(pixels: str, frames: int) -> None:
             row[: len(stripe), :3] = stripe
             picture = np.repeat(row[None] if i == 0 else row[None, ::-1], height, axis=0)
             textures.append(ctx.texture((width, height), 4, picture.tobytes()))
-        session.keep = True
+        session.layers.keep = True
         seen = []
         for frame in session.frames():
             if frame.drawn:
                 session.submit(textures)
-                seen.append([patches_of(eye) for eye in session.kept])
+                seen.append([patches_of(eye) for eye in session.layers.kept])
             if len(seen) == frames:
                 session.leave()
     told = {"format": session.pixels.name, "linear": session.pixels.linear, "eyes": seen[-1]}
@@ -48,7 +48,7 @@ def patches_of(picture: np.ndarray) -> list[list[float]]:
     height, width, _ = picture.shape
     size = width // len(PATCHES)
     middles = [picture[height // 2, size * i + size // 2] for i in range(len(PATCHES))]
-    return [[float(value) for value in each] for each in middles]
+    return [[float(value) for value in each[:3]] for each in middles]
 
 
 if __name__ == "__main__":

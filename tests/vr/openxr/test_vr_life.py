@@ -58,9 +58,9 @@ def test_every_period_without_a_frame_of_ours_is_a_dropped_one():
     pace = FramePace(display_s=PERIOD)
     run(pace, [1, 1, 2, 1, 4, 1])
     assert (pace.frames, pace.dropped, pace.over) == (6, 1 + 3, 0)
-    assert pace.report()["own_ms"] == {"p50": 4.0, "p95": 4.0}
+    assert pace.report()["own_ms"] == dict.fromkeys(("p50", "p95", "p99", "worst"), 4.0)
     run(pace, [1] * 3, own_s=0.02)
-    assert pace.over == 3
+    assert pace.over == 3 and pace.report()["own_ms"]["worst"] == 20.0
 
 
 def test_a_rest_of_the_session_drops_nothing():

@@ -1,0 +1,71 @@
+"""The pictures of both eyes, and what is drawn behind their splats and over them."""
+
+from collections.abc import Sequence
+
+import moderngl
+
+from shapeshift.app.headset.panel_picture import PanelPicture
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.pose import View
+from shapeshift.vr.drawn import Drawn
+from shapeshift.vr.floor import Floor
+from shapeshift.vr.openxr.layers import QuadPicture
+from shapeshift.vr.overlay import Overlay
+from shapeshift.vr.scene_depth import EyeDepth, SceneDepth
+
+DEPTH_SCALE = 0.5  # of an eye's width and height: edges of a hand behind a splat are soft anyway
+
+
+class Eyes:
+    """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`."""
+
+    def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
+        self.floor, self.overlay, self.panel = Floor(ctx), Overlay(ctx), PanelPicture(ctx)
+        self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
+        self._depths = [SceneDepth(ctx) for _ in sizes]
+
+    @property
+    def textures(self) -> list[moderngl.Texture]:
+        return [framebuffer.color_attachments[0] for framebuffer in self.framebuffers]
+
+    def depths(self, renderer: Renderer, scale: float) -> list[EyeDepth]:
+        """How deep the splats of the frame just drawn are; scale: metres of the world a metre of
+        the room.
+        """
+        drawing = renderer.drawing
+        return [each.of(drawing.presentable_depth(i), scale) for i, each in enumerate(self._depths)]
+
+    def write_depth(
+        self, i: int, framebuffer: moderngl.Framebuffer, play_view: View, depth: EyeDepth,
+        drawn: Drawn,
+    ) -> None:  # fmt: skip
+        """How deep an eye's picture is, hands among its splats, for the compositor."""
+        self._depths[i].write(framebuffer, play_view, depth)
+        self.overlay.write_depth(framebuffer, play_view, drawn)
+
+    def fill_panel(self, play_views: Sequence[View], drawn: Drawn) -> None:
+        """Once the pictures are handed over: the panel into its hole, for the mirror and PNGs."""
+        if drawn.panel is not None and drawn.panel.apart:
+            for framebuffer, view in zip(self.framebuffers, play_views, strict=True):
+                self.overlay.show_behind(framebuffer, view, drawn.panel)
+
+    def __enter__(self) -> "Eyes":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.floor.release()
+        self.overlay.release()
+        self.panel.release()
+        for depth in self._depths:
+            depth.release()
+        for framebuffer, texture in zip(self.framebuffers, self.textures, strict=True):
+            framebuffer.release()
+            texture.release()
+
+
+def quad_of(drawn: Drawn) -> QuadPicture | None:
+    """The panel as a layer of its own, where it is one."""
+    panel = drawn.panel
+    if panel is None or not panel.apart:
+        return None
+    return QuadPicture(panel.texture, panel.version, panel.play_from_panel, panel.size_m)

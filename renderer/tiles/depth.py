@@ -1,0 +1,24 @@
+"""What blending of depth left on the OpenCL device, as pictures in memory; row 0 on top."""
+
+import numpy as np
+
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.surface import DepthFrame
+from shapeshift.renderer.surface import Surface
+
+
+def depth_picture(device: Device, blended: DepthFrame) -> np.ndarray:
+    """(H, W, 4) float32: metres along the view times coverage, 0, 0, coverage."""
+    metres = device.download(blended.metres)
+    picture = np.zeros((*metres.shape, 4), np.float32)
+    picture[..., 0] = metres
+    picture[..., 3] = 1 - device.download(blended.frame.transmittance)
+    return picture
+
+
+def surface_picture(device: Device, blended: DepthFrame) -> Surface:
+    """Depth, normals and coverage."""
+    normal = device.download(blended.frame.image)
+    transmittance = device.download(blended.frame.transmittance)
+    metres = device.download(blended.metres)
+    return Surface(metres, np.ascontiguousarray(np.moveaxis(normal, 0, 2)), 1 - transmittance)
