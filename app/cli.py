@@ -21,7 +21,7 @@ COMMANDS = {
     ),
     "thermal": (
         "inspection.thermal",
-        "degrees at marks, alarms over the photo and tables of a thermal scene",
+        "degrees at marks, alarms over the photo, tables and reports of a thermal scene",
     ),
     "lint": ("commands.lint", "what is wrong with a file, and what opening it repairs"),
     "info": ("commands.info", "what is in a scene"),
