@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class ReportPages:
         """Writes the page."""
         held = self._held
         if self._figure is not None:
-            self._figure.savefig(held, format="pdf")
+            self._figure.savefig(held, format="pdf")  # type: ignore[arg-type]  # PdfPages, too
         self._figure = None
 
     def room(self, part: float) -> "Figure":
@@ -92,10 +92,14 @@ def write_pdf(report: InspectionReport, cameras_name: str, path: Path) -> None:
     import matplotlib
     from matplotlib.backends.backend_pdf import PdfPages
 
-    settings = {"text.parse_math": False, "pdf.fonttype": 42, "font.family": "DejaVu Sans"}
-    about = {"Title": report.head.title, "CreationDate": None, "Creator": "Shapeshift"}
-    with whole_file(path) as file, matplotlib.rc_context(settings):
-        with PdfPages(file, metadata=about) as held:
+    about: dict[str, Any] = {"Title": report.head.title, "CreationDate": None}
+    with (
+        whole_file(path) as file,
+        matplotlib.rc_context(
+            {"text.parse_math": False, "pdf.fonttype": 42, "font.family": ["DejaVu Sans"]}
+        ),
+    ):
+        with PdfPages(file, metadata=about | {"Creator": "Shapeshift"}) as held:
             pages = ReportPages(held)
             for number, view in enumerate(report.views):
                 pages.begin()
