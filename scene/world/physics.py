@@ -295,6 +295,7 @@ class Physics:
         for k in range(substeps):
             move_hands(self._world, starts, (k + 1) / substeps)
             rules.contact_clustering = not any_near(self._world, at_meshes)
+            rules.normalized_prediction_distance = physics_rules.prediction(speeds)
             self._world.step()
             events = self._events.drain_contact_force_events()
             if events:

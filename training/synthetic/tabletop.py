@@ -247,7 +247,7 @@ SCRIPT = """\
 {"t": 3.2, "do": "hand", "hand": "left", "position": [-0.26, 0.30, -0.02]}
 {"t": 3.3, "do": "ray", "origin": [0.0, 0.4, 0.9], "direction": [0.0, -0.34, -1.0]}
 {"t": 3.4, "do": "hand", "hand": "left", "position": [-0.26, 0.30, -0.02]}
-{"t": 3.75, "do": "hand", "hand": "left", "position": [-0.08, 0.30, -0.09]}
+{"t": 3.75, "do": "hand", "hand": "left", "position": [-0.05, 0.30, -0.09]}
 {"t": 3.75, "do": "release", "hand": "left"}
 {"t": 5.0, "do": "control", "object": "ring", "balance": 0.6, "power": 1.0}
 """
