@@ -6,8 +6,6 @@ from contextlib import contextmanager
 import numpy as np
 
 from shapeshift.scene.pose import Pose, View
-from shapeshift.vr.frame import Hand
-from shapeshift.vr.glove import fingertip
 from shapeshift.vr.locomotion.play_space import PlaySpace
 from tests.support.xr.remote import Controller, Remote
 from tests.support.xr.xr_stand import Program
@@ -77,8 +75,9 @@ class Person:
     def touch(self, side: str, room: np.ndarray, step_m: float = GLIDE_M) -> dict:
         """The tip of the hand's finger goes to a place (3,) of the room."""
         row = self.line["hands"][side]
-        tip = fingertip(side, Hand(True, pose_of(row["grip"]), pose_of(row["aim"])))
-        return self.move(side, row["grip"]["position"] + room - tip, step_m)
+        # The runtime's own grip, not where a bare hand's is.
+        at = np.array(self.controller(side).position)
+        return self.move(side, at + room - np.array(row["finger"]), step_m)
 
     def move(self, side: str, room: np.ndarray, step_m: float = GLIDE_M) -> dict:
         """The hand goes to a place (3,) of the room in a line, `step_m` a frame."""
