@@ -58,6 +58,14 @@ def aim_of(hand: Hand) -> Pose:
 
 
 @dataclass(frozen=True)
+class Area:
+    """A rectangle on the floor of the room that is free to walk in."""
+
+    play_from_area: Pose  # its middle; +Y up
+    size_m: tuple[float, float]  # along x and z
+
+
+@dataclass(frozen=True)
 class Pulse:
     """A buzz for a hand."""
 
@@ -78,3 +86,4 @@ class Frame:
     drawn: bool  # False: nothing is shown now, so nothing is to be drawn
     focused: bool  # False: somebody else has the hands; they are LOST
     recentred: bool = False  # the room has a new origin since the last frame
+    area: Area | None = None  # where the runtime knows it

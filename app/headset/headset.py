@@ -50,6 +50,11 @@ class Options(ReadingOptions):
     controllers: bool = True
     """No: take hands as the headset's cameras see them even where the runtime makes controllers of
     them.  Hands that hold none are taken so always."""
+    edges: bool = True
+    """Show the edges of the room that is free to walk in where head or hands come near them, and
+    where the runtime knows them."""
+    obstacles: bool = True
+    """Darken the picture where the head goes into what stands in the scene."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     target_ms: Annotated[float | None, EXPERT] = None
@@ -146,10 +151,16 @@ def wear(options: Options) -> int:
             Eyes(mirror.ctx, session.sizes) as eyes,
             editor.bodies,
         ):
-            rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
+            rules = Rules(
+                options.walking_hand, options.turning, vignette=options.vignette,
+                obstacles=options.obstacles,
+            )  # fmt: skip
             wearing = Wearing(
-                options.panel_hand, options.floor, options.hints, options.depth, options.panel_layer
-            )
+                options.panel_hand, options.floor, options.hints, options.depth,
+                options.panel_layer, options.edges,
+            )  # fmt: skip
+            if not (options.controllers or session.bare_hands.there):
+                say(f"{instance.runtime} sees no hands; controllers are taken.")
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(

@@ -17,7 +17,7 @@ from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.files.whole_file import open_lines, write_whole
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.record import Record
-from shapeshift.vr.frame import SIDES, Frame, Hand
+from shapeshift.vr.frame import SIDES, Area, Frame, Hand
 from shapeshift.vr.glove import fingertip
 from shapeshift.vr.openxr.life import Life
 from shapeshift.vr.openxr.swapchain import read
@@ -116,6 +116,8 @@ def frame_row(done: DoneFrame) -> dict:
             obj.name: {**pose_row(obj.world_from_object), "x": control_row(obj.x, DECIMALS)}
             for obj in world.drawn().objects
         },
+        "dark": rounded(done.state.user.comfort.blink),
+        "area": area_row(frame.area) if frame.area is not None else None,
         "panel": done.panel(),
         "layers": done.layers,
         "events": [event for record in done.records for event in record.events],
@@ -136,6 +138,10 @@ def hand_row(side: str, hand: Hand) -> dict:
         "finger": numbers(fingertip(side, hand)) if hand.grip is not None else None,
         "bare": hand.joints is not None,
     }
+
+
+def area_row(area: Area) -> dict:
+    return {**pose_row(area.play_from_area), "size_m": numbers(area.size_m)}
 
 
 def pose_row(pose: Pose) -> dict:

@@ -20,6 +20,7 @@ from shapeshift.renderer.gl.context import is_software
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
 from shapeshift.vr.frame import FAR_M, NEAR_M, Frame, Hand
+from shapeshift.vr.openxr.bounds import Bounds
 from shapeshift.vr.openxr.display import display_period
 from shapeshift.vr.openxr.events import (
     ControllersChanged,
@@ -71,6 +72,7 @@ class Session:
         self._handle = self._create()
         self.play = open_play_space(instance, self._handle)
         self._view_space = open_head_space(instance, self._handle)
+        self._bounds = Bounds(instance, self._handle)
         self.hands.attach(self._handle)
         self._controllers, self.bare_hands = controllers, HandTrackers(instance, self._handle)
         self.pace.display_s = display_period(instance, self._handle)
@@ -162,6 +164,7 @@ class Session:
                         self._enter_state(state)
                     case Recentred():
                         self._pending.append(event)
+                        self._bounds.ask()
                     case ControllersChanged():
                         self.profiles = self.hands.profiles()
                     case GoingAway():
@@ -194,9 +197,10 @@ class Session:
             views, known = self._locate_eyes(now)
             focused = self.life.focused
             hands = self._read_hands(now, focused)
+            area = self._bounds.area(self.play, now)
         drawn = bool(state.should_render) and known
         recentred = self._recentred(now)
-        return Frame(views, self._head, hands, seen_s, period_s, drawn, focused, recentred)
+        return Frame(views, self._head, hands, seen_s, period_s, drawn, focused, recentred, area)
 
     def _read_hands(self, now: int, focused: bool) -> dict[str, Hand]:
         """Controllers, and in the place of one that is not there the bare hand."""
