@@ -60,6 +60,9 @@ class FieldsOf:
     left: Mapping[str, str] | None = None
 
 
+Debug = Literal[
+    "", "culls", "birdseye", "overdraw", "depth", "object", "ellipses", "points", "rings"
+]
 POSITIONAL, EXPERT = Opt(positional=True), Opt(expert=True)
 SIZE, CONTROL, REGIONS, MODALITY = (Opt(metavar=m) for m in ("SIZE", "X", "REGION", "MODALITY"))
 

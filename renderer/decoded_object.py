@@ -23,5 +23,6 @@ class DecodedObject:
     version: int = 0  # goes up with every other x
     shade: Shade = NO_SHADE  # which colours are decoded
     grade: Appearance | None = None  # of its colours; None: they are as decoded
+    second: tuple[Shade, Appearance | None] | None = None  # the same of a second set of colours
     opacity: float = 1.0  # times that of its splats
     look: EyeColors | None = None  # made for the first pair of eyes

@@ -160,6 +160,10 @@ class Drawing(ABC):
         """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""
 
     @abstractmethod
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray:
+        """(H, W, 4) of view i, just drawn: splats as one of settings.EDGES, for a debug view."""
+
+    @abstractmethod
     def surface(self, view: View, settings: RenderSettings) -> Surface:
         """Depth, normals and coverage from a view; the last frame and its counts stay."""
 

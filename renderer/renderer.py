@@ -14,7 +14,7 @@ from shapeshift.renderer.colors.color_cache import (
     color_key,
     forget_colors,
 )
-from shapeshift.renderer.colors.eye_colors import EyeColors, drawn_together, shared_is_enough
+from shapeshift.renderer.colors.eye_colors import drawn_together
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
     PICTURE,
@@ -30,12 +30,20 @@ from shapeshift.renderer.colors.palette import (
     palette_colors,
 )
 from shapeshift.renderer.colors.tint import tinted
-from shapeshift.renderer.colors.wanted import wanted_anchors, wanted_of_follower
+from shapeshift.renderer.colors.two_looks import (
+    Look,
+    grade_of,
+    looks_of,
+    prepare_two,
+    same_shape,
+    two_false_colors,
+)
+from shapeshift.renderer.colors.wanted import own_colors, wanted_anchors, wanted_of_follower
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
-from shapeshift.renderer.resample import bilinear
+from shapeshift.renderer.resample import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
@@ -83,6 +91,7 @@ class Renderer:
         self.drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
         self._views: list[View] = []  # of the last frame, in the size that is shown
+        self._ways: list[FalseColors] = []  # how their colours came about
         self._debug: list[tuple[np.ndarray, dict[str, float]]] = []  # picture and numbers, a view
 
     @property
@@ -132,10 +141,7 @@ class Renderer:
                 decoded.shade = shade
                 forget_colors(decoded.colored)
         for decoded, obj in zip(self._decoded, scene.objects, strict=True):
-            # What a palette is to be laid over are values, not colours.
-            plain = obj.appearance.keeps_colors or self._false_colors.way == PICTURE
-            grade = None if plain else replace(obj.appearance, opacity=1.0)
-            if grade != decoded.grade:
+            if (grade := grade_of(obj, self._false_colors)) != decoded.grade:
                 decoded.grade = grade
                 forget_colors(decoded.colored)
 
@@ -174,8 +180,10 @@ class Renderer:
         settings = self._settings_of_frame()
         self.drawing.draws_heat = self._false_colors.way == BESIDE and not settings.debug
         self._views = views
+        # An eye that is not drawn keeps its picture, and how its colours came about.
+        self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
         full, views = views, [scaled(view, settings.render_scale) for view in views]
-        own, sorts = self._own_colors(full), 0
+        own, sorts = own_colors(self.settings, self._scene, self._decoded, full), 0
         with self._framebuffer_kept():
             for group in drawn_together(self._scene, len(full), own):
                 self._decode_colors(full[group], own)
@@ -192,13 +200,43 @@ class Renderer:
             with self._timer.time("resolve"):
                 for i, framebuffer in enumerate(targets):
                     self.present(framebuffer, i)
+        return self._stats_of(sorts, len(full) if own else 1)
+
+    def draw_two(self, views: tuple[View, View], other: Scene) -> FrameStats:
+        """Draws one view of the scene that `update` took over, and another one of a scene that
+        differs from it in its colours alone: projected and sorted once.
+
+        ValueError where more differs (colors/two_looks.py, `same_shape`).  No debug pictures.
+        """
+        if not same_shape(self._scene, other):
+            raise ValueError("draw_two wants two scenes that differ in their colours alone.")
+        scenes, self._ways = (self._scene, other), two_false_colors(self._scene, other)
+        looks = [looks_of(*pair) for pair in zip(scenes, self._ways, strict=True)]
+        self._false_key = None  # the next `update` looks again at what is decoded
+        self.drawing.draws_heat = any(colors.way == BESIDE for colors in self._ways)
+        self._views, self._debug = list(views), []
+        settings = replace(self._settings_of_frame(), debug="", stereo_sort="shared")
+        prepare_two(self._decoded, (looks[0], looks[1]))
+        with self._framebuffer_kept():
+            with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
+                for which, scene in enumerate(scenes):
+                    self.drawing.color_set(which, 2)
+                    at_once = self._ways[which].way == SPLATS
+                    self._decode_color_set(which, [views[which]], scene, looks[which], at_once)
+                self.drawing.wait_decoded()
+            small = [scaled(view, settings.render_scale) for view in views]
+            self.drawing.draw(small, settings, self._timer)
+        return self._stats_of(self.drawing.sorts, 2)
+
+    def _stats_of(self, sorts: int, color_sets: int) -> FrameStats:
+        """The counters of the frame that was just drawn; they begin anew."""
         culled = self.drawing.counts()
         drawn = culled.pop("drawn")
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
         stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
         stats.sorts, stats.order_age = sorts, self.drawing.order_age
-        stats.color_sets = len(full) if own else 1
+        stats.color_sets = color_sets
         if self._debug:
             stats.debug = self._debug[0][1]
         return stats
@@ -207,16 +245,6 @@ class Renderer:
         """The settings with the target in use: debug pictures hold numbers, not colours."""
         target = "rgba32f" if self.settings.debug else self._target or self.settings.target
         return replace(self.settings, target=target)
-
-    def _own_colors(self, views: list[View]) -> bool:
-        """Whether each of the views gets colours of its own: settings.stereo_colors."""
-        choice = "shared" if self.settings.debug or len(views) == 1 else self.settings.stereo_colors
-        if choice != "auto":
-            return choice == "each"
-        for decoded in self._decoded:
-            decoded.look = decoded.look or EyeColors.of(decoded.model)
-        looks = [decoded.look for decoded in self._decoded if decoded.look is not None]
-        return not shared_is_enough(self._scene, looks, views)
 
     def _decode_colors(self, views: list[View], own: bool = False) -> None:
         """Runs the colours of the visible objects for the middle of the eyes; own: for each eye."""
@@ -227,17 +255,21 @@ class Renderer:
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
             for which, group in enumerate(groups):
                 self.drawing.color_set(which, len(groups))
-                self._decode_color_set(which, group)
+                looks = [(decoded.shade, decoded.grade) for decoded in self._decoded]
+                at_once = self._false_colors.way == SPLATS
+                self._decode_color_set(which, group, self._scene, looks, at_once)
             self.drawing.wait_decoded()
 
-    def _decode_color_set(self, which: int, views: list[View]) -> None:
+    def _decode_color_set(
+        self, which: int, views: list[View], scene: Scene, looks: list[Look], at_once: bool
+    ) -> None:
         """Runs one set of colours for the middle of some eyes, where it moved.
 
         And the geometry of those that follow the eye: as often.
         """
         eye_world = np.mean([v.world_from_eye.position for v in views], axis=0)
         degrees = self.settings.recolor_degrees
-        for i, (obj, decoded) in enumerate(zip(self._scene.objects, self._decoded, strict=True)):
+        for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
             if not obj.seen:
                 continue
             colored = decoded.colored[which]
@@ -264,17 +296,18 @@ class Renderer:
                     decoded.opacity = 1.0
                     self._scale_opacity(i, obj, decoded)
                 if due:
-                    at_once = self._false_colors.way == SPLATS
-                    self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once, decoded.grade)
+                    shade, grade = looks[i]
+                    self.drawing.decode_color(i, shade, eye, wanted, at_once, grade)
                     self._color_runs += 1
 
     def image(self, i: int = 0) -> np.ndarray:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
         row 0 on top.  At a pure thermal stop it holds values, else colours.
         """
-        if not self.drawing.draws_heat:
+        colors = self._ways[i]
+        if not (self.drawing.draws_heat and colors.way == BESIDE):
             return self.drawing.image(i)
-        return overlay_heat(self.drawing.image(i), self.drawing.heat(i), self._false_colors.palette)
+        return overlay_heat(self.drawing.image(i), self.drawing.heat(i), colors.palette)
 
     def resolved(self, i: int = 0, out: np.ndarray | None = None) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background,
@@ -282,22 +315,22 @@ class Renderer:
         """
         if self._debug:
             return bilinear(self._debug[i][0], self._views[i].size)
-        palette, view = self._false_colors.palette, self._views[i]
+        colors, view = self._ways[i], self._views[i]
         rgba = bilinear(self.drawing.image(i), view.size)
-        if self.drawing.draws_heat:
-            rgba = overlay_heat(rgba, bilinear(self.drawing.heat(i), view.size), palette)
-        elif self._false_colors.way == PICTURE:
-            rgba = apply_palette(rgba, palette)
+        if self.drawing.draws_heat and colors.way == BESIDE:
+            rgba = overlay_heat(rgba, bilinear(self.drawing.heat(i), view.size), colors.palette)
+        elif colors.way == PICTURE:
+            rgba = apply_palette(rgba, colors.palette)
         return over_background(rgba, behind(self.settings.background, view), out)
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
         """Fills a GL framebuffer with view i as resolved() shows it."""
         if self._resolve is None:
             raise ValueError("this renderer has no GL context to present with; use resolved().")
-        name = "" if self._debug else self._false_colors.palette
+        name = "" if self._debug else self._ways[i].palette
         palette = palette_colors(name) if name else None
         image = opaque(self._debug[i][0]) if self._debug else self.drawing.presentable(i)
-        heat = self.drawing.presentable_heat(i) if self.drawing.draws_heat else None
+        heat = self.drawing.presentable_heat(i) if self.drawing.draws_heat and name else None
         background, view = self.settings.background, self._views[i]
         as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
@@ -328,6 +361,7 @@ class Renderer:
         are; image(i) is the picture in that order afterwards.
         """
         self._decode_colors(views)
+        self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
         settings = replace(self._settings_of_frame(), debug="")
         views = [scaled(view, settings.render_scale) for view in views]
         pictures = []
@@ -360,9 +394,3 @@ class Renderer:
 
     def __exit__(self, *failure) -> None:
         self.close()
-
-
-def scaled(view: View, part: float) -> View:
-    """The view in `part` times its pixels a side, at least one."""
-    width, height = (max(1, round(part * side)) for side in view.size)
-    return view if part == 1 else view.resized((width, height))

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from shapeshift.scene.pose import View
+
 
 def bilinear(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """(H, W, C) float32 -> (height, width, C): between the centres of pixels, edges held."""
@@ -21,3 +23,9 @@ def bilinear(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
         )
         image = first + part * (second - first)
     return image
+
+
+def scaled(view: View, part: float) -> View:
+    """The view in `part` times its pixels a side, at least one."""
+    width, height = (max(1, round(part * side)) for side in view.size)
+    return view if part == 1 else view.resized((width, height))

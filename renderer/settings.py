@@ -10,7 +10,8 @@ KEY_BITS = (16, 32)
 STEREO_SORTS = ("shared", "each")
 STEREO_COLORS = ("auto", "each", "shared")
 TARGETS = ("auto", "rgba8", "rgba16", "rgba16f", "rgba32f")
-DEBUG_VIEWS = ("", "culls", "birdseye", "overdraw", "depth", "object")
+EDGES = ("ellipses", "points", "rings")
+DEBUG_VIEWS = ("", "culls", "birdseye", "overdraw", "depth", "object", *EDGES)
 # Why a splat is not drawn, in the order of the gates: the first that it fails counts it.
 CULL_REASONS = ("opacity", "distance", "frustum", "size", "footprint", "faded")
 

@@ -20,6 +20,11 @@ FOUR_VIEWS = ("full", "overlay", "background", "isolated")
 FULL, OVERLAY, WITHOUT, ALONE = FOUR_VIEWS
 STRENGTH = 0.55  # of the colour of an object over its own
 GOLDEN = 0.381966  # of a turn: hues of labels in a row are far apart
+# Display sRGB; any two are 30 apart in CIE Lab with normal vision and without one kind of cones.
+DISTINCT = (
+    (0.00, 1.00, 0.00), (0.95, 0.04, 0.08), (0.00, 0.00, 0.96), (1.00, 0.71, 0.70),
+    (0.54, 0.20, 0.75), (1.00, 1.00, 0.59), (0.76, 0.26, 0.39), (0.50, 0.60, 0.80),
+)  # fmt: skip
 RowsOf = Callable[[Model, np.ndarray], Model]
 
 
@@ -90,6 +95,10 @@ def with_rows(model: Model, rows: np.ndarray) -> Model:
 
 
 def color_of(label: int) -> tuple[float, float, float]:
-    """Display sRGB of an object in the overlay: hues a golden angle apart, none of them dark."""
+    """Display sRGB of an object in the overlay, none dark: the first ones are told apart with any
+    colour vision, more of them have hues a golden angle apart.
+    """
+    if 0 < label <= len(DISTINCT):
+        return DISTINCT[label - 1]
     value = 1.0 if label % 2 else 0.8
     return colorsys.hsv_to_rgb((GOLDEN * label) % 1.0, 0.85, value)

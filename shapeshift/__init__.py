@@ -35,6 +35,7 @@ _NAMES_OF = {
     "app.errors": ("UsageError",),
     "decomposition.masks.specs": ("ObjectSpec", "PhotoPrompt"),
     "rasterizer.device": ("NoDevice",),
+    "renderer.colors.heat_over_shape": ("heat_over_shape",),
     "renderer.gl.context": ("NoContext",),
     "renderer.settings": ("FrameStats", "RenderSettings"),
     "runtime_models.model": ("AnchorModel", "BadFile", "ScaffoldModel", "SplatLayers", "Stop"),

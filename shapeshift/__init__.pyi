@@ -21,6 +21,7 @@ from shapeshift.app.paths import TOUCH as TOUCH
 from shapeshift.decomposition.masks.specs import ObjectSpec as ObjectSpec
 from shapeshift.decomposition.masks.specs import PhotoPrompt as PhotoPrompt
 from shapeshift.rasterizer.device import NoDevice as NoDevice
+from shapeshift.renderer.colors.heat_over_shape import heat_over_shape as heat_over_shape
 from shapeshift.renderer.gl.context import NoContext as NoContext
 from shapeshift.renderer.settings import FrameStats as FrameStats
 from shapeshift.renderer.settings import RenderSettings as RenderSettings

@@ -71,6 +71,12 @@ export class Program {
         const { gl } = this;
         if (!this.checked) this.check();
         gl.useProgram(this.handle);
+        this.set(values);
+    }
+
+    /** More uniforms of the program in use; textures count from unit 0. @param {Record<string, Uniform>} values */
+    set(values) {
+        const { gl } = this;
         let unit = 0;
         for (const [name, value] of Object.entries(values)) {
             const at = (this.locations[name] ??= gl.getUniformLocation(this.handle, name));
@@ -188,6 +194,15 @@ export class Gpu {
         const { gl } = this, handle = /** @type {WebGLBuffer} */ (gl.createBuffer());
         gl.bindBuffer(gl.UNIFORM_BUFFER, handle);
         gl.bufferData(gl.UNIFORM_BUFFER, data, gl.DYNAMIC_DRAW);
+        this.buffers.add(handle);
+        return handle;
+    }
+
+    /** @param {Uint16Array} data */
+    indexBuffer(data) {
+        const { gl } = this, handle = /** @type {WebGLBuffer} */ (gl.createBuffer());
+        gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, handle);
+        gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, data, gl.STATIC_DRAW);
         this.buffers.add(handle);
         return handle;
     }

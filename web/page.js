@@ -34,6 +34,7 @@ class Page {
         if (earlier) {  // the same scene, finer: nothing of what its reader did is lost
             earlier.objects.forEach((object, i) => Object.assign(renderer.objects[i], { x: object.x, pose: object.pose }));
             earlier.close();
+            this.panel?.close();
         } else {
             document.title = String(container.scene.title ?? document.title).slice(0, 200);
             const takes = (/** @type {PointerEvent} */ e) => this.pressed(e);

@@ -26,10 +26,12 @@ export class Panel {
         /** @type {Shift | null} */ this.shift = null;
         /** @type {Sweep | null} */ this.sweep = null;
         this.calm = matchMedia("(prefers-reduced-motion: reduce)");
+        this.done = new AbortController();  // of all that it listens to
+        const { signal } = this.done;
         this.slider = byId("x");
-        this.slider.addEventListener("input", () => this.drag(Number(this.slider.value)));
-        this.slider.addEventListener("pointerdown", (/** @type {PointerEvent} */ e) => { this.free = e.altKey; });
-        byId("play").addEventListener("click", () => this.play());
+        this.slider.addEventListener("input", () => this.drag(Number(this.slider.value)), { signal });
+        this.slider.addEventListener("pointerdown", (/** @type {PointerEvent} */ e) => { this.free = e.altKey; }, { signal });
+        byId("play").addEventListener("click", () => this.play(), { signal });
         this.addObjects();
         this.addPalettes();
         this.addStops();
@@ -100,7 +102,7 @@ export class Panel {
         const { objects } = this.renderer, choice = byId("object");
         choice.closest(".row").hidden = objects.length < 2;
         objects.forEach((object, i) => element("option", { value: i, textContent: object.name }, choice));
-        choice.addEventListener("change", () => this.choose(choice.value === "" ? null : objects[choice.value]));
+        choice.addEventListener("change", () => this.choose(choice.value === "" ? null : objects[choice.value]), { signal: this.done.signal });
     }
 
     /** @param {SceneObject | null} object */
@@ -132,7 +134,14 @@ export class Panel {
             if (found) for (const model of this.renderer.models) for (const stop of model.stops) if (stop.palette === found.stop.palette) stop.palette = choice.value;
             this.show();
             this.onChange();
-        });
+        }, { signal: this.done.signal });
+    }
+
+    /** Before the panel of another renderer takes its place. */
+    close() {
+        this.done.abort();
+        byId("palette").replaceChildren();
+        byId("object").replaceChildren(byId("object").options[0]);  // "all"
     }
 
     /** The panel as x is. */

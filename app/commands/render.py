@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Debug, Opt
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from shapeshift.app.document import Document
     from shapeshift.scene.pose import View
 
+MOST_DETAIL = 10.0
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 
@@ -48,6 +49,11 @@ class Options(ReadingOptions):
     sky: Annotated[tuple[str, str, str] | None, Opt(metavar="COLOR")] = None
     """Instead of one colour those at the zenith, the horizon and the ground, each as RRGGBB.
     Default: the scene file's sky, if it has one."""
+    shape_of: Annotated[str, CONTROL] = ""
+    """Heat over shape: the edges and the small changes of brightness of the picture at this x are
+    laid under the picture at --x, as inspection cameras do.  Default: none."""
+    detail: float = 1.0
+    """How much of them, 0 to 10."""
     exposure: float = 0.0
     """Stops of light by which the whole scene is brighter; measured heat keeps its colours."""
     gamma: float = 1.0
@@ -60,10 +66,10 @@ class Options(ReadingOptions):
     """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
     context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
     """Where the OpenGL context without a window comes from."""
-    debug: Annotated[Literal["", "culls", "birdseye", "overdraw", "depth", "object"], EXPERT] = ""
+    debug: Annotated[Debug, EXPERT] = ""
     """Draw with a legend, instead of the picture, which splats are left out and why, the same from
-    above, how many splats lie over each pixel, how far away they are, or which object they belong
-    to.  Default: the picture."""
+    above, how many splats lie over each pixel, how far away they are, which object they belong to,
+    or splats as ellipses, points or rings.  Default: the picture."""
     output: Literal["picture", "depth", "normal", "coverage"] = "picture"
     """What to write instead of colours: depth in metres along the view, surface normals, or how
     much of each pixel is covered; each as a .npy and a 16-bit .png, with a legend.json."""
@@ -149,7 +155,7 @@ def run(options: Options) -> int:
         scenes = [with_selectors(shown[c], selectors[i]) for c, i in rows]
         work = (renderer, scenes, [views[i] for _, i in rows], paths, options.stereo)
         if options.output == "picture":
-            draw_all(*work)
+            draw_all(*work, *shapes_of(options, document, scenes, rows, selectors))
         else:
             draw_outputs(*work, options.output, unit_of(options, document, views))
     say(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}")
@@ -182,10 +188,10 @@ def with_selectors(scene, selectors: tuple):
     return replace(scene, objects=(replace(obj, selectors=selectors),))
 
 
-def document_at(document, control: float | str | None):
-    """The Document at a value of --x; None: as it is.  Raises UsageError."""
+def document_at(document, control: float | str | None, said: str = "--x"):
+    """The Document at a value of --x; None: as it is.  Raises UsageError, about the option said."""
     if isinstance(control, str):
-        return document.placed(control)
+        return document.placed(control, said)
     return replace(document, scene=document.at(control))
 
 
@@ -217,6 +223,10 @@ def check_output(options: Options) -> None:
     """Numbers have neither a legend drawn over them nor a budget."""
     from shapeshift.app.errors import UsageError
 
+    if not 0 <= options.detail <= MOST_DETAIL:
+        raise UsageError(f"--detail is {options.detail}, expected 0 to {MOST_DETAIL:g}.")
+    if options.shape_of and (options.debug or options.output != "picture"):
+        raise UsageError("--shape-of goes without --debug and --output; leave one of them out.")
     for name in ("debug", "target_ms"):
         if options.output != "picture" and getattr(options, name) != getattr(Options, name):
             option = f"--{name.replace('_', '-')}"
@@ -314,20 +324,45 @@ def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
         raise UsageError(f"--select {error}") from None
 
 
-def draw_all(renderer, scenes: list, views: list, paths: list[Path], eye_distance: float) -> None:
-    """A picture of each scene from its view; two eyes side by side where they are apart."""
+def shapes_of(options: Options, document: "Document", scenes: list, rows, selectors) -> tuple:
+    """The scenes whose shape is laid under each picture, and how much of it; () for none."""
+    if not options.shape_of:
+        return ()
+    from shapeshift.app.decomposition.show_views import show_objects
+    from shapeshift.app.drawing import appearing, read_look
+
+    shape = show_objects(document_at(document, options.shape_of, "--shape-of").scene, options.show)
+    shape = appearing(shape, read_look(options)[0])
+    return [with_selectors(shape, selectors[i]) for _, i in rows], options.detail
+
+
+def draw_all(
+    renderer, scenes: list, views: list, paths: list[Path], eye_distance: float,
+    shapes: Sequence = (), detail: float = 1.0,
+) -> None:  # fmt: skip
+    """A picture of each scene from its view; two eyes side by side where they are apart.
+
+    shapes: other scenes, one a picture, whose fine structure is laid under it.
+    """
     import numpy as np
 
     from shapeshift.app.commands.picture_legend import with_legend
     from shapeshift.app.drawing import save_png
     from shapeshift.app.progress import tracked
+    from shapeshift.renderer.colors.heat_over_shape import heat_over_shape
     from shapeshift.renderer.debug.debug import debug_legend
     from shapeshift.scene.stereo import stereo_pair
 
-    work = list(zip(scenes, views, paths, strict=True))
-    for scene, view, path in tracked(work, "drawing"):
-        renderer.update(scene)
+    work = list(zip(scenes, views, paths, shapes or [None] * len(scenes), strict=True))
+    for scene, view, path, shape in tracked(work, "drawing"):
         eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
-        stats = renderer.draw(eyes)
-        picture = np.concatenate([renderer.resolved(i) for i in range(len(eyes))], axis=1)
+        parts = []
+        for each in (scene, shape) if shape is not None else (scene,):
+            renderer.update(each)
+            stats = renderer.draw(eyes)
+            parts.append([renderer.resolved(i).copy() for i in range(len(eyes))])
+        if shape is not None:
+            pairs = zip(*parts, strict=True)
+            parts[0] = [heat_over_shape(heat, photo, detail) for heat, photo in pairs]
+        picture = np.concatenate(parts[0], axis=1)
         save_png(with_legend(picture, debug_legend(renderer.settings.debug, stats)), path)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Debug, Opt
 from shapeshift.app.opening import ReadingOptions
 
 
@@ -50,7 +50,7 @@ class Options(ReadingOptions):
     known."""
     drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
     """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
-    debug: Annotated[Literal["", "culls", "birdseye", "overdraw", "depth", "object"], EXPERT] = ""
+    debug: Annotated[Debug, EXPERT] = ""
     """Debug view to start in; G goes through them.  Default: the picture."""
     screenshot: Annotated[Path | None, EXPERT] = None
     """Write a picture of the whole window to this file after --frames frames, and end.  Default:

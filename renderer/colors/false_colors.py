@@ -79,8 +79,11 @@ class FalseColors:
     shades: tuple[Shade, ...] = ()  # one an object
 
 
-def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
-    """What the objects' controls ask for; controls: as control_of gives them."""
+def false_colors(scene: Scene, controls: list[Controls], as_picture: bool = True) -> FalseColors:
+    """What the objects' controls ask for; controls: as control_of gives them.
+
+    as_picture: a scene that is heat and nothing else may be drawn as one picture of values.
+    """
     shades = [shade_of(o.model, x) for o, x in zip(scene.objects, controls, strict=True)]
     shown = [
         shade
@@ -89,7 +92,7 @@ def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
     ]
     names = {heat.palette for shade in shown for heat in shade.heats}
     tinted = any(obj.seen and obj.tint is not None for obj in scene.objects)
-    if len(names) == 1 and all(shade.pure for shade in shown) and not tinted:
+    if as_picture and len(names) == 1 and all(shade.pure for shade in shown) and not tinted:
         plain = [
             Shade(x if colors_follow_control(obj.model) else 0.0)
             for obj, x in zip(scene.objects, controls, strict=True)

@@ -1,4 +1,4 @@
-"""Which anchors get colours for a frame: those that a view sees, and that have none yet."""
+"""Which anchors get colours for a frame, those that a view sees; and whether each view its own."""
 
 import math
 
@@ -10,12 +10,13 @@ from shapeshift.renderer.colors.color_cache import (
     reach_of_scaffold,
     visible_anchors,
 )
+from shapeshift.renderer.colors.eye_colors import EyeColors, shared_is_enough
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import ScaffoldModel, SplatLayers
 from shapeshift.scene.pose import View
-from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.scene import Scene, SceneObject
 
 
 def wanted_anchors(
@@ -67,3 +68,16 @@ def wanted_of_follower(
     seen = visible_anchors(model.anchors, colored.reach, pose, views, settings)
     new = colored.anchors is not None and (seen & ~colored.anchors).any()
     return stale or bool(new), None if seen.all() else seen
+
+
+def own_colors(
+    settings: RenderSettings, scene: Scene, decoded: list[DecodedObject], views: list[View]
+) -> bool:
+    """Whether each of the views gets colours of its own: settings.stereo_colors."""
+    choice = "shared" if settings.debug or len(views) == 1 else settings.stereo_colors
+    if choice != "auto":
+        return choice == "each"
+    for each in decoded:
+        each.look = each.look or EyeColors.of(each.model)
+    looks = [each.look for each in decoded if each.look is not None]
+    return not shared_is_enough(scene, looks, views)

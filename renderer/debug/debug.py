@@ -1,10 +1,9 @@
-"""Debug pictures of a frame: culls, birdseye, overdraw, depth, object (settings.debug).
+"""Debug pictures of a frame: settings.DEBUG_VIEWS.
 
 The drawings give what they hold (splat_points), take other colours (write_colors) and count
 fragments (overdraw); everything else is numpy on the CPU, the same for quads and tiles.
 """
 
-import colorsys
 from typing import Protocol
 
 import numpy as np
@@ -13,21 +12,29 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.debug.classify import Points, classify, eye_places, runs
 from shapeshift.renderer.debug.debug_map import birdseye
 from shapeshift.renderer.debug.points import dim, dot_size, paint_points
-from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
+from shapeshift.renderer.settings import (
+    CULL_REASONS,
+    DEBUG_VIEWS,
+    EDGES,
+    FrameStats,
+    RenderSettings,
+)
 from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.parts import name_of, splat_labels
 from shapeshift.runtime_models.shapes import three
+from shapeshift.scene.four_views import color_of
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
+# Told apart with any colour vision, by their lightness where not by their hue.
 REASON_COLORS = {
-    "drawn": (0.30, 0.86, 0.36),
-    "opacity": (0.36, 0.17, 0.17),
-    "distance": (0.72, 0.36, 1.00),
-    "frustum": (0.50, 0.50, 0.50),
-    "size": (0.25, 0.50, 1.00),
-    "footprint": (0.14, 0.36, 0.36),
-    "faded": (0.40, 0.34, 0.12),
+    "drawn": (0.25, 0.87, 0.31),
+    "opacity": (0.25, 0.05, 0.11),
+    "distance": (1.00, 0.66, 0.99),
+    "frustum": (0.61, 0.61, 0.45),
+    "size": (0.26, 0.53, 0.96),
+    "footprint": (0.12, 0.32, 0.48),
+    "faded": (0.33, 0.33, 0.00),
 }
 REASON_TEXTS = {
     "drawn": "drawn",
@@ -60,6 +67,7 @@ class DebugDrawing(Protocol):
     def write_colors(self, color: np.ndarray) -> None: ...
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray: ...
     def image(self, i: int) -> np.ndarray: ...
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray: ...
 
 
 def prepare_debug(drawing: DebugDrawing, views: list[View], scene: Scene, name: str) -> bool:
@@ -109,6 +117,8 @@ def debug_image(
         number = drawing.overdraw(i, view, settings)
         largest = float(number.max(initial=0))
         return ramp(HEAT, np.sqrt(number / max(largest, 1))), {"largest": largest}
+    if settings.debug in EDGES:
+        return drawing.edges(i, view, settings, settings.debug)[..., :3].copy(), {}
     if settings.debug == "object":
         return np.ascontiguousarray(rgba[..., :3]), object_counts(scene)
     points, poses = drawing.splat_points(), object_poses(scene)
@@ -234,5 +244,5 @@ def label_ranks(model: Model) -> tuple[list[int], np.ndarray | int]:
 
 
 def object_color(i: int) -> tuple[float, float, float]:
-    """Hues a golden section apart: neighbours in the list are far apart in colour."""
-    return colorsys.hsv_to_rgb((0.08 + i * 0.61803398875) % 1.0, 0.65, 1.0)
+    """Display sRGB of the i-th part of all objects: that of the first label, the second, ..."""
+    return color_of(i + 1)

@@ -16,9 +16,10 @@ from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.debug.overdraw import count_overdraw
+from shapeshift.renderer.gl.debug.splat_edges import draw_edges
 from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.overdraw import count_overdraw
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter
@@ -250,6 +251,9 @@ class QuadsDrawing(Drawing):
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         return count_overdraw(self._gpu, self._projector, self.arena, view, settings)
+
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray:
+        return draw_edges(self._gpu, self._projector, self.arena, view, settings, kind)
 
     def surface(self, view: View, settings: RenderSettings) -> Surface:
         """Depth, normals and coverage from a view; the order and the counts in use stay."""

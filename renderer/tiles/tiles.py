@@ -23,6 +23,7 @@ from shapeshift.rasterizer.quantize_keys import quantize_keys
 from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
+from shapeshift.rasterizer.splat_edges import draw_edges
 from shapeshift.rasterizer.surface import DepthFrame, rasterize_depth, surface_arena
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.palette import palette_colors
@@ -31,9 +32,8 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
-from shapeshift.renderer.tiles.behind import behind
 from shapeshift.renderer.tiles.depth import depth_picture, surface_picture
-from shapeshift.renderer.tiles.view_camera import camera_of, limits_of
+from shapeshift.renderer.tiles.inputs import behind, camera_of, limits_of
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
@@ -368,6 +368,12 @@ class TilesDrawing(Drawing):
         if not self.splats:
             return np.zeros(view.size[::-1], np.int32)
         return count_overdraw(self.device, self._projected[i], view.size)
+
+    def edges(self, i: int, view: View, settings: RenderSettings, kind: str) -> np.ndarray:
+        if not self.splats:
+            return np.zeros((*view.size[::-1], 4), np.float32)
+        order = self._orders[i if len(self._orders) > 1 else 0]
+        return draw_edges(self.device, self._projected[i], order, view.size, kind)
 
     def surface(self, view: View, settings: RenderSettings) -> Surface:
         """Depth, normals and coverage from a view; the last frame stays as it is."""

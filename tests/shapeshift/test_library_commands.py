@@ -223,7 +223,7 @@ def test_what_a_training_does_not_know_is_refused(capture, tmp_path):
 
 
 def test_the_front_page_of_the_readme_runs(capture, tmp_path, monkeypatch):
-    """Its five lines as they stand there, with a second instead of a minute."""
+    """Its five lines as they stand there: a second, not a minute; a small film of few frames."""
     import re
     import shutil
     from pathlib import Path
@@ -235,7 +235,8 @@ def test_the_front_page_of_the_readme_runs(capture, tmp_path, monkeypatch):
     shutil.copy(ss.DEMO, tmp_path / "workshop.shift")
     shutil.copytree(capture, tmp_path / "capture")
     names = {}
-    exec(lines.replace("seconds=60", "seconds=1, max_anchors=60, points='random'"), names)
+    lines = lines.replace("seconds=60", "seconds=1, max_anchors=60, points='random'")
+    exec(lines.replace('Opened@6s")', 'Opened@6s", fps=1, size=(64, 48))'), names)
     assert names["picture"].shape == (360, 640, 3)
     assert [stop.name for stop in ss.load("scene.shift").stops] == ["RGB", "Thermal"]
     assert (tmp_path / "thermal.png").exists()

@@ -178,6 +178,8 @@ def test_a_folder_is_shown_by_a_server_coarse_first(browser, tmp_path):
         names = [a.rsplit("/", 1)[1] for a in browser.requests() if a.startswith("http")]
         assert names.index("coarse.bin") < names.index("scene.bin")
         assert browser.run("shapeshift.renderer.objects[0].count") == 600
+        names = browser.run("[...document.querySelectorAll('#object option')].map(o => o.text)")
+        assert names == ["all", *(obj.name for obj in document.scene.objects)]  # and not twice
         server.shutdown()
     browser.open(tmp_path / "site" / "index.html")
     assert "a folder needs a server" in browser.message()

@@ -1,5 +1,6 @@
 """What a page draws in a real browser, against the float64 reference."""
 
+import base64
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.document import Document
+from shapeshift.app.page.page_scene import PageSettings, page_scene
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.metrics import psnr
@@ -184,20 +186,54 @@ def test_half_floats_and_bytes_are_blended_where_a_device_has_no_more(browser, t
     assert decibels(page, document, scene, view, "rgba8") >= 36
 
 
+COUNTS = "(g => [g.textures.size, g.framebuffers.size, g.buffers.size])(shapeshift.renderer.gpu)"
+DRAW = """async (renderer) => {
+    const from = shapeshift.camera.pose, until = performance.now() + 10000;
+    do {
+        renderer.draw([{ worldFromEye: from, tangents: [-0.5, 0.5, -0.3, 0.3], near: 0.01, viewport: [0, 0, 320, 180] }]);
+        await new Promise((wake) => setTimeout(wake, 0));
+    } while (!renderer.settled && performance.now() < until);
+    return renderer.settled;
+}"""  # noqa: E501
+SHIFTS = f"""(async (count) => {{
+    const draw = {DRAW};
+    for (let i = 1; i <= count; i++) {{
+        shapeshift.renderer.setX(0.7 * i / count);
+        if (!await draw(shapeshift.renderer)) return false;
+    }}
+    return true;
+}})"""
+OPENINGS = f"""(async (count, coded) => {{
+    const draw = {DRAW}, bytes = Uint8Array.from(atob(coded), (c) => c.charCodeAt(0));
+    for (let i = 0; i < count; i++) {{
+        shapeshift.open(bytes.slice().buffer);
+        if (!await draw(shapeshift.renderer)) return false;
+    }}
+    return true;
+}})"""
+
+
+def memory_mb(page) -> tuple[float, float]:
+    """Of scripts after a collection, and of all processes of the browser."""
+    page.call("HeapProfiler.collectGarbage")
+    return page.call("Runtime.getHeapUsage")["usedSize"] / 2**20, page.resident_mb()
+
+
 @pytest.mark.slow
-def test_nothing_grows_while_x_moves(browser, tmp_path):
+def test_nothing_grows_over_shifts_and_openings(browser, tmp_path):
     document = Document.of(paced_model(60))
     page = opened(browser, document, tmp_path)
-    view = document.view(SIZE)
-    counts = (
-        "(g => [g.textures.size, g.framebuffers.size, g.buffers.size])(shapeshift.renderer.gpu)"
-    )
-    for x in (0.1, 0.4, 0.7):
-        drawn(page, at(document, x), [view])
-    before = page.run(counts)
-    for x in np.linspace(0, 0.7, 21):
-        drawn(page, at(document, float(x)), [view])
-    assert page.run(counts) == before and page.run("shapeshift.renderer.reads.length") == 0
+    scene = page_scene(document, PageSettings("again", pictures=False), lambda *_: None)
+    again = f"{OPENINGS}(100, '{base64.b64encode(scene).decode()}')"
+    assert page.run(f"{SHIFTS}(100)") and page.run(again, timeout=300)  # what is made once is made
+    before, (heap, resident) = page.run(COUNTS), memory_mb(page)
+    assert page.run(f"{SHIFTS}(1000)", timeout=300)
+    shifted = memory_mb(page)
+    assert page.run(again, timeout=300)
+    after = memory_mb(page)
+    assert page.run(COUNTS) == before and page.run("shapeshift.renderer.reads.length") == 0
+    assert shifted[0] < heap + 1 and after[0] < heap + 1
+    assert shifted[1] < resident + 16 and after[1] < resident + 16
 
 
 @pytest.mark.slow

@@ -2,7 +2,8 @@
 
     python tools/renderer/peers.py LEG_FOLDER --out docs/bench/peers.csv
 
-Ours draws with OpenCL tiles, and once more as a page in the browser.  gausscam (PyPI) wants a
+Ours draws with OpenCL tiles, and twice as a page in the browser: "page" as it comes, by a picture
+of 16 bits, "direct" into the canvas' 8 bits as the other viewers do.  gausscam (PyPI) wants a
 Vulkan driver for the CPU: name one newer than Mesa 23 with VK_ICD_FILENAMES where the system's is
 older.  gaussian-splats-3d, spark and playcanvas (npm) want npm, Chromium and Xvfb; the page wants
 the latter two.  A peer that cannot run is left out with its reason; the rest goes on.
@@ -147,6 +148,7 @@ PEERS = {
     "spark": lambda folder, model, views: in_browser("spark", folder),
     "playcanvas": lambda folder, model, views: in_browser("playcanvas", folder),
     "page": lambda folder, model, views: in_browser("page", folder),
+    "direct": lambda folder, model, views: in_browser("direct", folder),
 }
 
 

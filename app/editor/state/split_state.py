@@ -3,7 +3,9 @@
 from dataclasses import dataclass, replace
 
 from shapeshift.app.editor.state.regions import farthest_stop
+from shapeshift.renderer.colors.palette import thermal_weights
 from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.scene import Scene, SceneObject
 
 ON_STOP = 1e-3
@@ -16,15 +18,32 @@ class SplitState:
     on: bool = False
     name: str = ""  # of the object
     x: float = 1.0
+    over: bool = False  # heat over shape instead of a line between the two
+    detail: float = 1.0  # of the shape, that is laid under the heat
     possible: bool = False  # whether there is anybody to draw it
 
-    def toggle(self, obj: SceneObject) -> None:
-        """On for this object, at a thermal stop, else the one farthest from its x; or off."""
-        self.on = not self.on or self.name != obj.name
+    def toggle(self, obj: SceneObject, over: bool = False) -> None:
+        """On for this object, at a thermal stop, else the one farthest from its x; or off.
+
+        over: heat over shape instead of a line; from one of the two to the other nothing goes off.
+        """
+        self.on = not self.on or self.name != obj.name or self.over != over
+        self.over = over
         if self.name != obj.name or self.x == obj.slider_x:
             thermal = [stop.x for stop in obj.model.stops if stop.kind == "thermal"]
             others = [x for x in thermal if abs(x - obj.slider_x) > ON_STOP]
             self.name, self.x = obj.name, (others or [farthest_stop(obj)])[0]
+
+    def shows(self, scene: Scene) -> bool:
+        """Whether two stops of a scene are to be seen: it is on, and the object is there."""
+        return self.on and any(obj.name == self.name for obj in scene.objects)
+
+    def other_is_heat(self, scene: Scene) -> bool:
+        """Whether the second x shows more heat than the slider does: its colours are laid over."""
+        for obj in scene.objects:
+            if obj.name == self.name:
+                return heat_at(obj, self.x) >= heat_at(obj, obj.x)
+        return True
 
     def right(self, scene: Scene) -> Scene:
         """The scene right of the line; the same one where the object is gone."""
@@ -34,6 +53,12 @@ class SplitState:
             replace(obj, x=self.x) if obj.name == self.name else obj for obj in scene.objects
         ]
         return Scene(tuple(objects))
+
+
+def heat_at(obj: SceneObject, x: Control) -> float:
+    """How much of a thermal stop an object shows at x, 0 to 1."""
+    weights, _ = thermal_weights(obj.model.blend, x)
+    return float(weights[0]) if len(weights) else 0.0
 
 
 def name_of(x: float, stops: tuple[Stop, ...]) -> str:

@@ -1,11 +1,13 @@
 """The picture of the scene in the window: drawn when something changed, sorted anew at rest."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import moderngl
 
 from shapeshift.app.charts.comparison import Comparison, is_exact, measure_error, same_picture
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
+from shapeshift.renderer.colors.two_looks import same_shape
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile
@@ -16,6 +18,16 @@ STALE_S = 1.0  # between two measurements of the error of a kept order: each dra
 
 
 @dataclass(frozen=True)
+class Beside:
+    """What is shown right of a line instead."""
+
+    scene: Scene
+    cut: int  # the first column that shows it
+    renderer: Renderer  # that draws it where it is of another shape
+    refuse: Callable[[BadFile], None]  # called where there is no room for that
+
+
+@dataclass(frozen=True)
 class FrameRequest:
     """What is to be on the screen."""
 
@@ -23,6 +35,7 @@ class FrameRequest:
     view: View
     settings: RenderSettings
     moving: bool  # camera or control value: more frames will follow at once
+    beside: Beside | None = None  # None: the scene is shown in all of the window
 
 
 class Shown:
@@ -32,6 +45,7 @@ class Shown:
         self._renderer, self._readings = renderer, readings
         self._comparison = Comparison()
         self._drawn: tuple | None = None  # what the splats on screen were drawn from
+        self._kept: Scene | None = None  # whose id is part of that
         self._stale_when = 0.0
 
     def draw(self, request: FrameRequest, screen: moderngl.Framebuffer, force: bool) -> bool:
@@ -39,6 +53,8 @@ class Shown:
         settings = request.settings if request.moving else rested(request.settings)
         wanted = picture_key(request.scene, request.view, settings)
         self._renderer.settings = settings
+        if request.beside is not None:
+            return self._draw_two(request, request.beside, wanted, screen, force)
         fresh = force or not same_picture(self._drawn, wanted)
         if fresh:
             self._renderer.update(request.scene)
@@ -46,6 +62,44 @@ class Shown:
             self._drawn = wanted
         else:
             self._renderer.present(screen)
+        return fresh
+
+    def _draw_two(
+        self, request: FrameRequest, beside: Beside, key: tuple, screen: moderngl.Framebuffer,
+        force: bool,
+    ) -> bool:  # fmt: skip
+        """Each side of the line in its part of the screen and no more of it; both from one sort
+        where nothing but colours differs.
+        """
+        renderer, (width, height) = self._renderer, request.view.size
+        parts = (
+            request.view.part(0, 0, (beside.cut, height)),
+            request.view.part(beside.cut, 0, (width - beside.cut, height)),
+        )
+        wanted = (*key, id(beside.scene), beside.cut)
+        fresh = force or not same_picture(self._drawn, wanted)
+        together = same_shape(request.scene, beside.scene)
+        right = renderer if together else beside.renderer
+        right.settings = renderer.settings
+        if fresh:
+            renderer.update(request.scene)
+            if together:
+                self._readings.stats = renderer.draw_two(parts, beside.scene)
+            else:
+                self._readings.stats = renderer.draw([parts[0]])
+                try:
+                    right.update(beside.scene)
+                except BadFile as error:
+                    beside.refuse(error)
+                    return self.draw(replace(request, beside=None), screen, True)
+                right.draw([parts[1]])
+            self._drawn, self._kept = wanted, beside.scene
+        whole = screen.viewport
+        screen.viewport = (0, 0, beside.cut, height)
+        renderer.present(screen, 0)
+        screen.viewport = (beside.cut, 0, width - beside.cut, height)
+        right.present(screen, int(together))
+        screen.viewport = whole
         return fresh
 
     def forget(self) -> None:

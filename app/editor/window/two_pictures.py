@@ -48,12 +48,16 @@ class TwoPictures:
         """The first column of B, framebuffer pixels from the left."""
         return round(self.part * self._window.size[0])
 
-    def draw_right(self, request: FrameRequest) -> None:
-        """Lays B over the right part of the window."""
-        window = self._window
-        target = self._framebuffer(window.size)
+    def draw_other(self, request: FrameRequest) -> moderngl.Texture:
+        """B's picture, as large as the window."""
+        target = self._framebuffer(self._window.size)
         self._shown.draw(request, target, False)
         (texture,) = target.color_attachments
+        return texture
+
+    def draw_right(self, request: FrameRequest) -> None:
+        """Lays B over the right part of the window."""
+        window, texture = self._window, self.draw_other(request)
         screen, (width, height) = window.screen(), window.size
         screen.scissor = (self.cut, 0, width - self.cut, height)
         try:

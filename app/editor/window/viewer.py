@@ -1,7 +1,6 @@
 """The viewer: a window loop that draws only when something has changed."""
 
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -197,9 +196,8 @@ class Viewer:
             watched = self.polling or self.pads.connected
             redraw = self.window.wait(0.0 if busy else POLL_S if watched else SLEEP_S)
             now = time.perf_counter()
-            if self.window.minimised:
+            if self.window.hidden:  # no time passes either
                 last = now
-                time.sleep(0.05)
                 continue
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
@@ -287,10 +285,10 @@ class Viewer:
         """What the screen should show now."""
         state, view, moving = self.state, self.viewpoint.view(), self._moving
         settings = self.dial.while_moving(state.settings) if moving else state.settings
-        if self.viewpoint.parallel:  # whose eye is far away from all
-            settings = replace(settings, max_distance=np.inf)
+        settings = self.viewpoint.limits(settings)
         shown = state.shown(self.viewpoint.eye_view())
-        return FrameRequest(shown, view, settings, moving or self.dial.measuring)
+        beside = None if self.dial.measuring else self.hooks.beside(shown, view.size[0])
+        return FrameRequest(shown, view, settings, moving or self.dial.measuring, beside)
 
     @property
     def _moving(self) -> bool:

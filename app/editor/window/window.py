@@ -27,6 +27,7 @@ BUTTONS = {0: "left", 1: "right", 2: "middle"}
 DOUBLE_CLICK_S = 0.3
 CLICK_PIXELS = 4.0  # a press that moves further is a drag, not a click
 SETTLE_FRAMES = 3  # ImGui hands out queued input over this many frames
+HIDDEN_S = 0.5  # between two looks at what has become of a hidden window; events wake it at once
 HOVER_S = 0.35  # after the mouse came to rest tooltips are due, so there is a frame for them
 MODIFIERS = {
     imgui.Key.mod_shift: (glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT),
@@ -34,23 +35,15 @@ MODIFIERS = {
     imgui.Key.mod_alt: (glfw.KEY_LEFT_ALT, glfw.KEY_RIGHT_ALT),
 }
 TEXT_KEYS = {  # what typing a number into a slider needs
-    glfw.KEY_LEFT: imgui.Key.left_arrow,
-    glfw.KEY_RIGHT: imgui.Key.right_arrow,
-    glfw.KEY_HOME: imgui.Key.home,
-    glfw.KEY_END: imgui.Key.end,
-    glfw.KEY_DELETE: imgui.Key.delete,
-    glfw.KEY_BACKSPACE: imgui.Key.backspace,
-    glfw.KEY_ENTER: imgui.Key.enter,
-    glfw.KEY_KP_ENTER: imgui.Key.enter,
-    glfw.KEY_ESCAPE: imgui.Key.escape,
-    glfw.KEY_TAB: imgui.Key.tab,
-    glfw.KEY_A: imgui.Key.a,
-    glfw.KEY_C: imgui.Key.c,
-    glfw.KEY_V: imgui.Key.v,
-    glfw.KEY_X: imgui.Key.x,
-    glfw.KEY_Y: imgui.Key.y,
-    glfw.KEY_Z: imgui.Key.z,
-}
+    glfw.KEY_LEFT: imgui.Key.left_arrow, glfw.KEY_RIGHT: imgui.Key.right_arrow,
+    glfw.KEY_HOME: imgui.Key.home, glfw.KEY_END: imgui.Key.end,
+    glfw.KEY_DELETE: imgui.Key.delete, glfw.KEY_BACKSPACE: imgui.Key.backspace,
+    glfw.KEY_ENTER: imgui.Key.enter, glfw.KEY_KP_ENTER: imgui.Key.enter,
+    glfw.KEY_ESCAPE: imgui.Key.escape, glfw.KEY_TAB: imgui.Key.tab,
+    glfw.KEY_A: imgui.Key.a, glfw.KEY_C: imgui.Key.c,
+    glfw.KEY_V: imgui.Key.v, glfw.KEY_X: imgui.Key.x,
+    glfw.KEY_Y: imgui.Key.y, glfw.KEY_Z: imgui.Key.z,
+}  # fmt: skip
 SHORTCUTS = ("z", "y", "s", "d", "o", "n", "+", "=", "-", "0")  # with Ctrl, as printed on the key
 REPEATING = (glfw.KEY_LEFT, glfw.KEY_RIGHT)  # held down they go on
 MOVING = (glfw.KEY_W, glfw.KEY_A, glfw.KEY_S, glfw.KEY_D, glfw.KEY_Q, glfw.KEY_E)
@@ -198,15 +191,19 @@ class Window:
         return self._window.is_closing
 
     @property
-    def minimised(self) -> bool:
-        return 0 in self.size or bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED))
+    def hidden(self) -> bool:
+        """Whether nobody can see it: minimised, or not on the screen at all."""
+        gone = glfw.get_window_attrib(self.handle, glfw.ICONIFIED)
+        return bool(gone) or not glfw.get_window_attrib(self.handle, glfw.VISIBLE) or 0 in self.size
 
     def close(self) -> None:
         self._window.is_closing = True
 
     def keep_open(self) -> None:
-        """Takes back that somebody has asked to close it."""
+        """Takes back that somebody has asked to close it; minimised, it comes back to say why."""
         self._window.is_closing = False
+        if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
+            glfw.restore_window(self.handle)
 
     @property
     def cursor(self) -> tuple[float, float]:
@@ -232,7 +229,13 @@ class Window:
         return not busy and glfw.get_key(self.handle, key) == glfw.PRESS
 
     def wait(self, seconds: float) -> bool:
-        """Takes input, sleeping up to that long for it; True when the overlay must be redrawn."""
+        """Takes input, sleeping up to that long for it; True when the overlay must be redrawn.
+
+        A hidden window sleeps HIDDEN_S whatever is asked, and nothing of it must be redrawn.
+        """
+        if self.hidden:
+            glfw.wait_events_timeout(HIDDEN_S)
+            return False
         seconds = min(seconds, self._look_again - glfw.get_time())
         if self._unsettled > 0 or seconds <= 0:
             glfw.poll_events()

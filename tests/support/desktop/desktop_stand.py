@@ -66,9 +66,10 @@ class PlainRenderer:
     def stale_order_db(self, views) -> float:
         return 51.0
 
-    def present(self, framebuffer) -> None:
+    def present(self, framebuffer, i: int = 0) -> None:
         self.presents += 1
-        framebuffer.clear(*plain_color(self.settings.background))
+        color = plain_color(self.settings.background)
+        framebuffer.clear(*color, viewport=framebuffer.viewport)
 
 
 def read_stub(path: Path):

@@ -27,6 +27,7 @@ TABLES = {
     "sections.export_panel": {"DEGREES": ALL, "FORMAT_TIPS": VALUES},
     "sections.film_panel": {"AROUND": ALL, "PAST": ALL},
     "sections.histogram_panel": {"EXPLAINED": ALL},
+    "sections.look_panel": {"TWO_STOPS": ALL, "PALETTE_TIP": ALL},
     "sections.objects_panel": {"MODES": VALUES, "FOUR_VIEW_NAMES": VALUES, "DEEDS": ALL},
     "sections.parts_panel": {
         "AXES": ALL, "DEEDS": ALL, "SIZES": ALL, "CHOICES": ALL, "FLOATERS": ALL,

@@ -169,17 +169,26 @@ class Chromium:
             if event.get("method") == "Network.requestWillBeSent"
         ]
 
-    def cpu_seconds(self) -> float:
-        """User and system time of all its processes so far."""
-        ticks = 0
+    def _processes(self) -> list[list[str]]:
+        """What the system tells of each of its processes, from the state on: proc(5), stat."""
+        found = []
         for stat in Path("/proc").glob("[0-9]*/stat"):
             try:
                 fields = stat.read_text().rsplit(")", 1)[1].split()
-            except OSError:
+            except OSError:  # it has ended
                 continue
             if int(fields[3]) == self.process.pid:  # the session that it leads
-                ticks += int(fields[11]) + int(fields[12])
+                found.append(fields)
+        return found
+
+    def cpu_seconds(self) -> float:
+        """User and system time of all its processes so far."""
+        ticks = sum(int(fields[11]) + int(fields[12]) for fields in self._processes())
         return ticks / os.sysconf("SC_CLK_TCK")
+
+    def resident_mb(self) -> float:
+        """Memory of all its processes; what they share counts for each."""
+        return sum(int(f[21]) for f in self._processes()) * os.sysconf("SC_PAGE_SIZE") / 2**20
 
     def close(self) -> None:
         try:

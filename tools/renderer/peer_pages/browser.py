@@ -26,6 +26,7 @@ NAMES = {
     "spark": "@sparkjsdev/spark",
     "playcanvas": "playcanvas",
 }
+PAGES_OF_OURS = {"page": "ours, the page", "direct": "ours, the page, blended in 8 bits"}
 TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 PATIENCE_S = 600.0
 
@@ -110,7 +111,7 @@ def browser_frames(peer: str, folder: Path) -> Answer:
     programs = [shutil.which(name) for name in ("chromium", "Xvfb")]
     if not all(programs):
         raise CannotRun("Chromium and Xvfb are needed (Debian: apt-get install chromium xvfb)")
-    name, version = "ours, the page", ""
+    name, version = PAGES_OF_OURS.get(peer, ""), ""
     if peer in NAMES:
         name = NAMES[peer]
         package = (folder / "node_modules" / name / "package.json").read_text()

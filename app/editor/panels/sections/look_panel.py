@@ -8,11 +8,17 @@ from shapeshift.app.editor.panels.sections.appearance_panel import (
     draw_appearance,
     draw_background,
 )
-from shapeshift.app.editor.panels.widgets.panel_rows import choice, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import choice, slider, tip
 from shapeshift.app.editor.state.editor_state import AS_FILED, EditorState
 from shapeshift.renderer.colors.palette import PALETTES
 from shapeshift.renderer.settings import DEBUG_VIEWS
 
+TWO_STOPS = ("one stop", "two stops beside a line", "heat over shape")
+MOST_DETAIL = 3.0
+PALETTE_TIP = (
+    "The colours in which a thermal stop shows temperatures. In all but turbo lighter is hotter, "
+    "also for eyes that confuse colours; viridis and cividis are made for them."
+)
 DEBUG_NAMES = {
     "": "picture",
     "culls": "what is culled, and why",
@@ -20,7 +26,25 @@ DEBUG_NAMES = {
     "overdraw": "overdraw",
     "depth": "depth",
     "object": "objects",
+    "ellipses": "splats as ellipses",
+    "points": "splats as points",
+    "rings": "splats as rings",
 }
+
+
+def draw_two_stops(state: EditorState, ui_scale: float) -> None:
+    """One stop, two beside a line, or heat over the shape of the other."""
+    split, obj = state.split, state.scene.objects[state.sliders[0]]
+    now = TWO_STOPS[1 + split.over] if split.on else TWO_STOPS[0]
+    chosen = choice("two stops", now, TWO_STOPS, TWO_STOPS)
+    tip("Another stop at once: keys C and Shift+C. Its knob is blue.", ui_scale)
+    if chosen == TWO_STOPS[0] and split.on:
+        split.on = False
+    elif chosen != now:
+        split.toggle(obj, over=chosen == TWO_STOPS[2])
+    if split.on and split.over:
+        split.detail = slider("detail", split.detail, 0.0, MOST_DETAIL, "shape: %.2f")
+        tip("How much of the photo's edges shows through the colours of heat.", ui_scale)
 
 
 def draw_look(state: EditorState, ui_scale: float) -> None:
@@ -30,7 +54,7 @@ def draw_look(state: EditorState, ui_scale: float) -> None:
         names = [AS_FILED, *PALETTES]
         labels = ["heat: as filed", *(f"heat: {name}" for name in PALETTES)]
         chosen = choice("palette", state.palette, names, labels)
-        tip("The colours in which a thermal stop shows temperatures.", ui_scale)
+        tip(PALETTE_TIP, ui_scale)
         if chosen != state.palette:
             state.choose_palette(chosen)
     names = [f"show: {DEBUG_NAMES[name]}" for name in DEBUG_VIEWS]
@@ -38,6 +62,8 @@ def draw_look(state: EditorState, ui_scale: float) -> None:
     tip("The picture, or what it is made of. Key G goes through these, Shift+G back.", ui_scale)
     if debug != state.settings.debug:
         state.settings = replace(state.settings, debug=debug)
+    if state.split.possible and state.sliders:
+        draw_two_stops(state, ui_scale)
     if state.scene.objects:
         draw_appearance(state, ui_scale)
         draw_background(state, ui_scale)

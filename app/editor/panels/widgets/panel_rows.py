@@ -12,6 +12,7 @@ from shapeshift.app.editor.texts.table import said
 Vec = imgui.ImVec2
 T = TypeVar("T")
 TIP_WIDTH = 300.0  # logical pixels; longer explanations wrap
+ROWS_SHOWN = 16  # of an open list; more are reached by scrolling
 
 
 def item_label(name: str) -> str:
@@ -138,7 +139,7 @@ def choice(
     """
     values, labels = list(values), list(labels)
     shown = labels if names else [said(label) for label in labels]
-    changed, chosen = imgui.combo(f"##{name}", values.index(value), shown)
+    changed, chosen = imgui.combo(f"##{name}", values.index(value), shown, ROWS_SHOWN)
     return values[chosen] if changed else value
 
 

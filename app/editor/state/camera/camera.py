@@ -200,7 +200,7 @@ class EditorCamera:
         wanted = push.right * right + push.up * up + push.forward * forward
         length = float(np.linalg.norm(wanted))
         if length > 0:
-            wanted *= SPEED_RADII * self.speed * self.radius * push.pace / max(length, 1.0)
+            wanted *= SPEED_RADII * self.speed * self.radius * push.pace / max(float(length), 1.0)
         # v' = (wanted - v) / BRAKE_S solved exactly: two short steps equal a long one
         keep = np.exp(-seconds / BRAKE_S)
         gap = self._velocity - wanted

@@ -1,6 +1,7 @@
 """From where the editor looks: the camera that hands move, or one of a file; what moves it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from shapeshift.app.editor.state.camera.camera import (
 from shapeshift.app.editor.state.camera.kept_views import KeptViews
 from shapeshift.app.editor.state.camera.stepping import Steps, fitted
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.cameras.camera_list import CameraList, moved
@@ -84,6 +86,10 @@ class Viewpoint:
     def parallel(self) -> bool:
         """Whether rays are parallel: never those of a film or of a file's camera."""
         return self.flown is None and not self.steps.at_camera and self.camera.parallel
+
+    def limits(self, settings: RenderSettings) -> RenderSettings:
+        """The settings; for parallel rays, whose eye is far away from all, without a distance."""
+        return replace(settings, max_distance=np.inf) if self.parallel else settings
 
     def eye_view(self) -> View:
         """As `view`, but of rays that meet in the eye: what regions and lenses follow."""

@@ -1,0 +1,1 @@
+"""GL passes of debug pictures: overdraw, edges of splats."""

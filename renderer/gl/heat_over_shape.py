@@ -1,0 +1,65 @@
+"""heat_over_shape: two pictures of a window, laid over each other on the GPU."""
+
+import moderngl
+import numpy as np
+
+from shapeshift.renderer.colors.heat_over_shape import blur_weights
+from shapeshift.renderer.gl.gpu import Gpu
+
+MOST = 256  # weights that the shader has room for: of pictures up to 20,000 pixels high
+
+
+class HeatOverShape:
+    """The two passes, and the picture between them."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        name = ("resolve.vert", "colors/heat_over_shape.frag")
+        self._passes = [gpu.program(*name, SECOND=second, MOST=MOST) for second in (0, 1)]
+        self._triangles = [gpu.ctx.vertex_array(program, []) for program in self._passes]
+        self._between: moderngl.Framebuffer | None = None  # luminance, blurred along x
+        self._height = 0  # that the weights are for
+
+    def draw(
+        self, photo: moderngl.Texture, heat: moderngl.Texture, framebuffer: moderngl.Framebuffer,
+        detail: float = 1.0,
+    ) -> None:  # fmt: skip
+        """Fills the framebuffer, as large as the two: what colors/heat_over_shape.py says."""
+        between = self._room(photo.size)
+        (blurred,) = between.color_attachments
+        first, second = self._passes
+        if self._height != photo.size[1]:
+            self._height = photo.size[1]
+            weights = blur_weights(self._height)
+            for program in self._passes:
+                program["weights"].write(np.pad(weights, (0, MOST - len(weights))))
+                program["reach"].value = len(weights) - 1
+        for unit, texture in enumerate((photo, blurred, heat)):
+            texture.use(unit)
+        first["photo"].value = second["photo"].value = 0
+        second["blurred"].value, second["heat"].value = 1, 2
+        second["detail"].value = detail
+        for target, triangle in zip((between, framebuffer), self._triangles, strict=True):
+            with self._gpu.drawing_into(target):
+                self._gpu.ctx.enable_only(moderngl.NOTHING)
+                triangle.render(moderngl.TRIANGLES, vertices=3)
+
+    def _room(self, size: tuple[int, int]) -> moderngl.Framebuffer:
+        if self._between is None or self._between.size != size:
+            self._release_between()
+            ctx = self._gpu.ctx
+            self._between = ctx.framebuffer([ctx.texture(size, 1, dtype="f4")])
+        return self._between
+
+    def _release_between(self) -> None:
+        if self._between is not None:
+            for texture in self._between.color_attachments:
+                texture.release()
+            self._between.release()
+            self._between = None
+
+    def release(self) -> None:
+        """The programs belong to the Gpu."""
+        self._release_between()
+        for triangle in self._triangles:
+            triangle.release()

@@ -1,0 +1,137 @@
+"""The window's own loop: at rest it draws nothing, hidden it sleeps and no time passes."""
+
+import glfw
+import pytest
+
+from shapeshift.app.editor.window.viewer import SLEEP_S
+from shapeshift.app.editor.window.window import HIDDEN_S, KeyDown
+from tests.support.desktop.desktop_stand import run_frames
+
+WAITS = 40  # rounds of the loop that are looked at
+NORMAL, ICONIC = 1, 3  # WM_STATE, ICCCM 4.1.3.1
+
+
+class Rounds:
+    """Lets the loop go round so often, with waits cut short, and then closes the window.
+
+    `asked`: how long it wanted to sleep in each round; a round that sleeps is not waited out, so
+    that nothing here is a matter of time.
+    """
+
+    def __init__(self, viewer, monkeypatch) -> None:
+        self.viewer, self.asked, self.rounds = viewer, [], 0
+        wait, sleep = viewer.window.wait, glfw.wait_events_timeout
+        viewer.hooks.closing.clear()
+
+        def short(seconds: float) -> None:
+            self.asked.append(seconds)
+            sleep(1e-3)
+
+        def counted(seconds: float) -> bool:
+            self.rounds += 1
+            if self.rounds >= WAITS:
+                viewer.window.close()
+            return wait(seconds)
+
+        monkeypatch.setattr(glfw, "wait_events_timeout", short)
+        monkeypatch.setattr(viewer.window, "wait", counted)
+
+    def go(self) -> tuple[int, int, int]:
+        """Frames, splats drawn and splats shown again, of these rounds."""
+        viewer, self.asked, self.rounds = self.viewer, [], 0
+        before = self._counts()
+        viewer.loop()
+        viewer.window.keep_open()
+        now = self._counts()
+        return now[0] - before[0], now[1] - before[1], now[2] - before[2]
+
+    def _counts(self) -> tuple[int, int, int]:
+        renderer = self.viewer.renderer
+        return self.viewer.frames, renderer.draws, renderer.presents
+
+
+@pytest.fixture
+def rounds(viewer, monkeypatch):
+    made = Rounds(viewer, monkeypatch)
+    yield made
+    glfw.show_window(viewer.window.handle)
+
+
+def settle(viewer) -> None:
+    """Input that other tests have left is handed out, a mouse that has come to rest included."""
+    glfw.set_cursor_pos_callback(viewer.window.handle, lambda *_: None)
+    while viewer.window.wait(0.4):
+        viewer.frame(0.0)
+    glfw.set_cursor_pos_callback(viewer.window.handle, viewer.window.on_cursor)
+
+
+def test_without_events_no_frame_is_drawn_and_each_round_sleeps(viewer, monkeypatch):
+    settle(viewer)
+    rounds = Rounds(viewer, monkeypatch)
+    assert rounds.go() == (0, 0, 0)
+    # as long as ever at a time: by glfw's clock the last part of a tooltip's wait may be cut off
+    assert len(rounds.asked) == WAITS and set(rounds.asked) == {SLEEP_S}
+
+
+def test_an_event_draws_the_overlay_and_then_it_rests_again(viewer, monkeypatch):
+    settle(viewer)
+    rounds = Rounds(viewer, monkeypatch)
+    viewer.window.on_key(viewer.window.handle, glfw.KEY_F9, 0, glfw.PRESS, 0)  # a key of nothing
+    frames, draws, presents = rounds.go()
+    assert 0 < frames < WAITS / 2 and draws == 0 and presents == frames
+
+
+def hide(viewer, display) -> None:
+    glfw.hide_window(viewer.window.handle)
+
+
+def minimise(viewer, display) -> None:
+    """As a window manager says so; there is none in this display."""
+    set_state(viewer, display, ICONIC)
+
+
+def set_state(viewer, display: str, state: int) -> None:
+    from Xlib.display import Display
+
+    with_server = Display(display)
+    window = with_server.create_resource_object("window", glfw.get_x11_window(viewer.window.handle))
+    kind = with_server.intern_atom("WM_STATE")
+    window.change_property(kind, kind, 32, [state, 0])
+    with_server.sync()
+    with_server.close()
+
+
+@pytest.mark.parametrize("gone", [hide, minimise], ids=["not on the screen", "minimised"])
+def test_hidden_it_sleeps_even_while_it_plays(viewer, rounds, display, gone):
+    pytest.importorskip("Xlib")
+    state = viewer.state
+    gone(viewer, display)
+    try:
+        assert viewer.window.hidden
+        viewer.handle_event(KeyDown(glfw.KEY_SPACE, False))
+        x = state.scene.objects[0].x
+        viewer.window.restyle()  # something of it would have to be redrawn
+        assert viewer.busy() and rounds.go() == (0, 0, 0)
+        assert len(rounds.asked) == WAITS and set(rounds.asked) == {HIDDEN_S}
+        assert state.scene.objects[0].x == x, "time has passed"
+    finally:
+        set_state(viewer, display, NORMAL)
+        glfw.show_window(viewer.window.handle)
+    assert not viewer.window.hidden
+    frames, draws, _ = rounds.go()
+    assert frames >= WAITS - 1 and draws >= WAITS - 2, "it plays on"
+    assert state.scene.objects[0].x != x
+
+
+def test_a_minimised_window_that_may_not_close_comes_back_to_ask(viewer, display, monkeypatch):
+    pytest.importorskip("Xlib")
+    back = []
+    monkeypatch.setattr(glfw, "restore_window", back.append)
+    viewer.hooks.closing.append(lambda: False)
+    for state in (NORMAL, ICONIC):
+        set_state(viewer, display, state)
+        viewer.window.close()
+        assert not viewer.may_close() and not viewer.window.closing
+    set_state(viewer, display, NORMAL)
+    assert back == [viewer.window.handle]  # once: an open window stays as it is
+    run_frames(viewer, 1)

@@ -1,0 +1,2 @@
+// The page's other way of blending: see page.js.
+import "/page.js";
