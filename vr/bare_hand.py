@@ -92,7 +92,7 @@ def curl(places: np.ndarray) -> float:
         length = float(np.linalg.norm(np.diff(bones, axis=0), axis=1).sum())
         straight = float(np.linalg.norm(bones[-1] - bones[0])) / max(length, 1e-6)
         parts.append((STRAIGHT - straight) / (STRAIGHT - CURLED))
-    return float(np.clip(min(parts[0], np.mean(parts[1:])), 0, 1))
+    return min(max(min(parts[0], sum(parts[1:]) / len(parts[1:])), 0.0), 1.0)
 
 
 def pinched(gap_m: float) -> float:

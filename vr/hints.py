@@ -34,7 +34,7 @@ ONE_HAND = {
 
 
 # Of a hand without a controller.
-BARE = (
+BARE: tuple[str, ...] = (
     "Pinch: take, or act by ray",
     "Fist: take, or hold the world",
     "Thumb, middle: jump",

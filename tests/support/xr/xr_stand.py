@@ -205,7 +205,7 @@ def start_program(
     stand: Stand, *arguments: str, reports: bool = True, program: Path = ROOT / "launch.py",
     **environment: str,
 ) -> Program:  # fmt: skip
-    """`launch.py vr`, or a program that is as it, with its lines and output, and its report, in the stand's folder."""
+    """`launch.py vr`, or a program like it; its lines, output and report in the stand's folder."""
     out = ["--lines", stand.folder / "lines.jsonl"]
     out += ["--report", stand.folder / "report.json"] if reports else []
     command = [sys.executable, program, "vr", *arguments, *out]
