@@ -19,6 +19,10 @@ COMMANDS = {
         "commands.stability",
         "the cases where splat renderers fail, each held to a bound",
     ),
+    "thermal": (
+        "inspection.thermal",
+        "degrees at marks, alarms over the photo and tables of a thermal scene",
+    ),
     "lint": ("commands.lint", "what is wrong with a file, and what opening it repairs"),
     "info": ("commands.info", "what is in a scene"),
     "compare": (

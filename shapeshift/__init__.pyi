@@ -1,12 +1,12 @@
 from shapeshift.api.learn import TrainedScene as TrainedScene
 from shapeshift.api.learn import evaluate as evaluate
+from shapeshift.api.learn import poses as poses
 from shapeshift.api.learn import train as train
 from shapeshift.api.load import info as info
 from shapeshift.api.load import load as load
 from shapeshift.api.measure import bench as bench
 from shapeshift.api.measure import chart as chart
 from shapeshift.api.measure import compare as compare
-from shapeshift.api.photos import poses as poses
 from shapeshift.api.picture import Picture as Picture
 from shapeshift.api.play import Step as Step
 from shapeshift.api.play import cameras as cameras
@@ -35,6 +35,10 @@ from shapeshift.runtime_models.stop_weights import StopWeights as StopWeights
 from shapeshift.scene.appearance import Appearance as Appearance
 from shapeshift.scene.appearance import Sky as Sky
 from shapeshift.scene.cameras.camera_list import CameraList as CameraList
+from shapeshift.scene.inspection.marks import Isotherm as Isotherm
+from shapeshift.scene.inspection.marks import Mark as Mark
+from shapeshift.scene.inspection.marks import MarkReading as MarkReading
+from shapeshift.scene.inspection.value_picture import ValuePicture as ValuePicture
 from shapeshift.scene.metrics import psnr as psnr
 from shapeshift.scene.metrics import ssim as ssim
 from shapeshift.scene.pose import Pose as Pose

@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 from shapeshift.training.heads.networks import ANCHOR_ATTRIBUTES, HeadLayout
 
+Poses = Literal["stated", "refine"]
 Masks = Literal["object", "valid", "ignore"]
 Background = Literal["auto", "random", "black", "white", "gray"]
 
@@ -75,6 +76,10 @@ class TrainSettings:
     masks are not used."""
     background: Background = "auto"
     """Colour behind everything.  auto: the capture's own, else random where photos have masks."""
+    poses: Poses = "stated"
+    """refine: each training photo's camera is turned and shifted a little while the scene is
+    learned, for poses that are not exact; NAME.shift.cameras.json gets them.  stated: they are
+    right."""
     seed: int = 0
     """Seed of all random numbers."""
     splats_per_anchor: int = 5

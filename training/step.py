@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from shapeshift.scene.pose import View
+from shapeshift.training.calibration.pose_refinement import PoseGradient
 from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.drawing import Color, DrawnView, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Activation, Gaussians
@@ -26,6 +27,7 @@ class TrainingStep:
         self.activation = Activation(device, layout, voxel)
         self.rows = None  # (R,) int32 on the device: the anchors of the last drawing; None: all
         self.gathered: dict[str, object] = {}  # what the optimiser has of these, by group
+        self.pose_gradient: PoseGradient | None = None  # where poses are refined
         self.ms: dict[str, float] | None = None  # of each pass, summed; a dict switches it on ...
         self.clock = time.perf_counter  # ... by this clock, seconds
 
@@ -86,7 +88,11 @@ class TrainingStep:
         with self.timed("heads backward"):
             if min_opacity_share:
                 add_min_opacity_gradient(device, drawing.splats, grad, min_opacity_share)
-            return self.backward(grad)
+            grads = self.backward(grad)
+        if self.pose_gradient is not None:
+            with self.timed("pose"):
+                self.pose_gradient.collect(drawing, grad, grads["anchors"])
+        return grads
 
     def backward(self, grad: Gaussians) -> dict[str, object]:
         """The gradients by what the optimiser holds of those by the last splats decoded."""

@@ -10,6 +10,7 @@ from shapeshift.scene.cameras.framing import frame_points
 from shapeshift.scene.cameras.photo_view import photo_view
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
+from shapeshift.training.calibration.pose_refinement import PoseGradient, PoseRefinement
 from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.density.densify import (
     absent_as_nan,
@@ -110,12 +111,15 @@ class Trainer(Run):
         self.exposures = Exposures(device, by_modality)
         self.lr_warmup = LrWarmup()
         self.photo_contrast: dict[tuple, float] = {}
+        refined = by_modality if settings.poses == "refine" else {}
+        self.poses = PoseRefinement(refined)
         if resume is None:
             self.initialise(photos, report)
         else:
             self.restore(*resume)
         self.step = TrainingStep(device, self.layout, self.voxel, self.adam)
-        self.guard = DivergenceGuard(self.adam.state())
+        self.step.pose_gradient = PoseGradient(device) if refined else None
+        self.guard = DivergenceGuard(self.adam.state() | self.poses.state())
         self.next_snapshot = self.iteration + SNAPSHOT_EVERY
         if resume is not None:
             self.guard.first_loss = dict(resume[1]["first_loss"])
@@ -162,6 +166,7 @@ class Trainer(Run):
         self.stats.load(state)
         self.visibility.load(state)
         self.exposures.load(state)
+        self.poses.load(state)
 
     def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
         """(state, notes) from which `resume` goes on to the same bits."""
@@ -173,7 +178,7 @@ class Trainer(Run):
             "lr_warmup_start": self.lr_warmup.start,
         }  # fmt: skip
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
-        return self.adam.state() | known, notes
+        return self.adam.state() | known | self.poses.state(), notes
 
     @property
     def anchors_count(self) -> int:
@@ -221,12 +226,13 @@ class Trainer(Run):
         """Gradients of how a photo differs.  shapes: None for those of its stop."""
         self.stats.stop = stop = [s.name for s in self.stops].index(photo.modality)
         depth, rows = self.targets.depth_term(photo, self.settings.depth_share), None
+        view = self.poses.view(photo)
         if shapes is None:
             control = self.control(photo.modality)
-            rows = self.visibility.visible_rows(stop, camera_of(photo.view), self.adam["anchors"])
+            rows = self.visibility.visible_rows(stop, camera_of(view), self.adam["anchors"])
         else:
             control = shapes.control(self.encoding)
-        self.drawing = self.step.draw(photo.view, control, background, depth is not None, rows)
+        self.drawing = self.step.draw(view, control, background, depth is not None, rows)
         if shapes is None:
             self.visibility.update_reach(
                 stop, rows, self.step.gathered["anchors"], self.drawing.splats
@@ -235,16 +241,32 @@ class Trainer(Run):
         loss = self.targets.loss(photo)
         return self.step.gradients(self.drawing, loss, target, self.stats, depth)
 
+    def probe_pose(self, photo: LoadedPhoto, background: Color, fraction: float) -> None:
+        """Now and then, before a photo's step, its gradient by a pose a little beside its own."""
+        aside, collected = self.poses.probe(photo, fraction), self.step.pose_gradient
+        if aside is None or collected is None:
+            return
+        depth = self.targets.depth_term(photo, self.settings.depth_share)
+        view, control = self.poses.view(photo, aside), self.control(photo.modality)
+        drawing = self.step.draw(view, control, background, depth is not None)
+        target = self.targets.target(photo, background, self.exposures)
+        self.step.gradients(drawing, self.targets.loss(photo), target, None, depth)
+        self.poses.note_probe(photo, aside, collected.by_eye)
+
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard rolled back)."""
         photo = self.schedule.photo(self.iteration)
         background = self.schedule.background_of(self.iteration, photo)
         shapes = self.blending.sample(self.iteration, photo.modality)
-        grads = self.photo_gradients(photo, background, shapes)
         fraction = self.budget.fraction(self.iteration, self.elapsed)
+        if shapes is None:
+            self.probe_pose(photo, background, fraction)
+        grads = self.photo_gradients(photo, background, shapes)
         if self.lr_warmup.changes(self.iteration):
             self.adam.set_rates(self.all_rates())
         self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)
+        if self.step.pose_gradient is not None and shapes is None:
+            self.poses.step(photo, self.step.pose_gradient.by_eye, fraction)
         self.iteration += 1
         loss, rolled_back = None, False
         rounds = -(-self.iteration // len(self.stops))
@@ -277,7 +299,7 @@ class Trainer(Run):
         if self.guard.is_healthy(photo.modality, loss, self.visible(), contrast):
             last = photo.modality == self.stops[-1].name
             if self.iteration >= self.next_snapshot and last and self.guard.stable:
-                self.guard.save_snapshot(self.adam.state())
+                self.guard.save_snapshot(self.adam.state() | self.poses.state())
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
         self.lr_warmup = LrWarmup(self.iteration)
@@ -291,6 +313,7 @@ class Trainer(Run):
         """Another state, of perhaps other anchors; all as it was where memory does not suffice."""
         fresh = self.fresh_statistics(len(state["anchors.value"]))
         self.adam.load(state)
+        self.poses.load(state)
         self.stats, self.visibility = fresh
 
     def restore_last_good(self) -> bool:

@@ -75,6 +75,7 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
     try:
         write_package(model, out)
         write_checkpoint(checkpoint, *state)
+        save_cameras(trainer, out)
     except OSError as error:
         why = f"{out}: could not be written ({error.strerror or error})"
     else:
@@ -83,9 +84,27 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
         elsewhere = Path(tempfile.mkdtemp(prefix="shapeshift-"))
         write_package(model, elsewhere / out.name)
         write_checkpoint(elsewhere / checkpoint.name, *state)
+        save_cameras(trainer, elsewhere / out.name)
     except OSError:
         raise UsageError(f"{why}, nor anywhere else; {resume_hint(checkpoint)}.") from None
     raise UsageError(f"{why}; the scene and its checkpoint are in {elsewhere} instead.")
+
+
+def cameras_path(out: Path) -> Path:
+    """Where the refined cameras of a package `out` lie."""
+    return out.with_name(out.name + ".cameras.json")
+
+
+def save_cameras(trainer: "Trainer", out: Path) -> None:
+    """Beside the package, the training photos' cameras, where the run has refined them."""
+    from shapeshift.scene.cameras.camera_list import CameraList
+    from shapeshift.scene.cameras.write_cameras import write_cameras
+    from shapeshift.training.evaluation.evaluate import name_in
+
+    if photos := trainer.poses.photos:
+        names = tuple(name_in(trainer.capture, photo) for photo in photos)
+        views = tuple(map(trainer.poses.view, photos))
+        write_cameras(CameraList(views, names, "ours"), cameras_path(out), "ours")
 
 
 def resume_hint(checkpoint: Path) -> str:

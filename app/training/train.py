@@ -77,7 +77,8 @@ def run(options: Options) -> int:
     save(trainer, options.out, checkpoint)
     if not interrupted:
         pace_package(options.out)
-    say(summary(trainer, options.out, interrupted), *trainer.exposures.warnings())
+    more = [*refined(trainer, options.out), *trainer.exposures.warnings()]
+    say(summary(trainer, options.out, interrupted), *more)
     if not interrupted and (
         found := failed_modalities(trainer) or report(find_outlier_views(trainer))
     ):
@@ -130,6 +131,19 @@ def what_next(options: Options, steps: int, step_s: float, interrupted: bool) ->
             f"Go on: {' '.join(again)} --iterations {usual}"
         ]
     return [*lines, f"look: {program()} {out}"]
+
+
+def refined(trainer: "Trainer", out: Path) -> list[str]:
+    """How far cameras were moved, where their poses were refined."""
+    from shapeshift.app.training.saving import cameras_path
+
+    if not trainer.poses.photos:
+        return []
+    turn_deg, shift_m = trainer.poses.moves()
+    return [
+        f"poses: cameras stand {turn_deg:.2f} degrees and {shift_m:.4f} m beside the stated ones "
+        f"(median); {full(cameras_path(out))} has them"
+    ]
 
 
 def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:

@@ -12,6 +12,7 @@ from shapeshift.training.settings import TrainSettings, adjusted, resumed
 # Fields of TrainSettings that are typed; the others are set by fit, by --calibrate and from Python.
 USUAL = (
     "seconds", "iterations", "max_anchors", "max_mb", "points", "downscale", "masks", "background",
+    "poses",
 )  # fmt: skip
 EXPERTS = (
     "seed", "splats_per_anchor", "features", "hidden", "fixed", "depth_share", "blended_shapes",

@@ -74,6 +74,27 @@ CIVIDIS = (
     (0.9843, (0.992, 0.888, 0.205)),
     (1.0000, (0.996, 0.909, 0.218)),
 )
+# violet, blue, green, yellow, red, pale: more hues than ironbow, which thermographers use for small
+# differences
+RAINBOW = (
+    (0.00, (0.05, 0.00, 0.20)),
+    (0.16, (0.22, 0.08, 0.72)),
+    (0.34, (0.05, 0.50, 0.85)),
+    (0.50, (0.10, 0.74, 0.32)),
+    (0.66, (0.90, 0.84, 0.12)),
+    (0.82, (0.92, 0.25, 0.08)),
+    (1.00, (1.00, 0.88, 0.86)),
+)
+# blue below, gold above, so that cold and hot part at a look
+ARCTIC = (
+    (0.00, (0.02, 0.02, 0.20)),
+    (0.22, (0.06, 0.16, 0.52)),
+    (0.42, (0.28, 0.36, 0.62)),
+    (0.56, (0.52, 0.48, 0.50)),
+    (0.72, (0.76, 0.58, 0.30)),
+    (0.88, (0.96, 0.76, 0.28)),
+    (1.00, (1.00, 0.96, 0.76)),
+)
 
 
 @cache
@@ -238,4 +259,8 @@ PALETTES = {
     "perceptual": _perceptual,
     "viridis": lambda: _palette_table(VIRIDIS),
     "cividis": lambda: _palette_table(CIVIDIS),
+    "white-hot": _gray,  # gray, by the name that it has on thermal cameras
+    "black-hot": lambda: _gray()[::-1],
+    "rainbow": lambda: _palette_table(RAINBOW),
+    "arctic": lambda: _palette_table(ARCTIC),
 }

@@ -2,10 +2,10 @@
 
 import atexit
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from shapeshift.api.opened import OpenedScene
     from shapeshift.renderer.renderer import Renderer as FrameRenderer
 
+Inspected = TypeVar("Inspected")
 Drawing = Literal["auto", "quads", "tiles"]
 Context = Literal["auto", "egl", "surfaceless", "osmesa", "none"]
 
@@ -134,6 +135,14 @@ class Renderer:
         with self._current():
             self._frames.update(scene.drawn)
             return self._frames.surface(view)
+
+    def inspect(self, read: "Callable[[FrameRenderer], Inspected]") -> "Inspected":
+        """What a function reads of the program's own renderer, in its context.
+
+        renderer.inspect(lambda frames: frames.backends)
+        """
+        with self._current():
+            return read(self._frames)
 
     def _draw(self, scene: "OpenedScene", views: list[View]) -> None:
         self._frames.update(scene.drawn)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from shapeshift.api.arguments import Camera, Output, PathText, Progress, Size, X
 from shapeshift.api.edit import layers_of
-from shapeshift.api.opened import OpenedScene
+from shapeshift.api.inspect import InspectedScene
 from shapeshift.app.document import Document
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from shapeshift.renderer.settings import RenderSettings
 
 
-class Scene(OpenedScene):
+class Scene(InspectedScene):
     """One model, or the objects of a scene file, each at its own x.
 
     Nothing in it changes; `at`, `with_model`, `with_object` and `with_regions` give another scene,

@@ -85,6 +85,8 @@ LIGHT = [
     ("compare", "a.ply", "b.ply", *SIZE),
     ("render", "a.ply", "--out", "light/pictures", *SIZE),
     ("film", "a.ply", "--seconds", "0.1", "--out", "light/film.gif", *SIZE),
+    ("thermal", "a.ply", "--stop", "a", "--colors", "gray", "--range", "0", "1",
+     "--out", "light/heat.png", *SIZE),
     ("simulate", "touch.scene.json", "--seconds", "0.1", "--out", "light/run"),
 ]  # fmt: skip
 

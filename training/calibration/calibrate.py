@@ -12,11 +12,10 @@ import numpy as np
 from shapeshift.rasterizer.project import LEAST_ALPHA
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.scene.pose import View
 from shapeshift.training.baselines.plain import one_modality
 from shapeshift.training.calibration.extrinsics import ExtrinsicOffset, offset_of_matrix, rigid
 from shapeshift.training.calibration.residuals import Shape, ShapeResiduals
-from shapeshift.training.first_anchors.views import common_box
+from shapeshift.training.first_anchors.views import distance_of
 from shapeshift.training.photos import BLACK, read
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background
@@ -167,12 +166,6 @@ def shape_of(device, capture: Capture, settings: TrainSettings, report: ReportPr
             f"{capture.folder}: the photos of '{stop.name}' gave no shape to hold the cameras to."
         )
     return tuple(device.upload(array[there]) for array in arrays)
-
-
-def distance_of(views: list[View]) -> float:
-    """Median metres from the cameras to the place that they look at together."""
-    eyes = np.array([view.world_from_eye.position for view in views])
-    return float(np.median(np.linalg.norm(eyes - common_box(views)[0], axis=1)))
 
 
 def curvature(residuals: ShapeResiduals, offset: np.ndarray, slope: np.ndarray) -> np.ndarray:

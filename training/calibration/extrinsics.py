@@ -29,6 +29,32 @@ def moved_by(six: np.ndarray) -> np.ndarray:
     return out
 
 
+def about_pivot(six: np.ndarray, distance: float) -> np.ndarray:
+    """(4, 4) of a turn (3,) radians about the place `distance` metres ahead of an eye, and a shift
+    (3,) as a share of that distance: about the eye, turn and shift would do nearly the same to the
+    picture.
+    """
+    pivot = np.array([0, 0, -distance])
+    moved = moved_by(six * np.repeat([1.0, distance], 3))
+    moved[:3, 3] += pivot - moved[:3, :3] @ pivot
+    return moved
+
+
+def small_move(moved: np.ndarray, distance: float) -> np.ndarray:
+    """(6,) the numbers of `about_pivot` that give `moved` (4, 4), a small one, to first order."""
+    turn, pivot = moved[:3, :3], np.array([0, 0, -distance])
+    spin = turn - turn.T
+    shift = moved[:3, 3] + turn @ pivot - pivot
+    return np.concatenate([np.array([spin[2, 1], spin[0, 2], spin[1, 0]]) / 2, shift / distance])
+
+
+def slope_about_pivot(by_eye: np.ndarray, distance: float) -> np.ndarray:
+    """(6,) gradient by the numbers of `about_pivot` of that by turn and shift of the eye."""
+    out = by_eye * np.repeat([1.0, distance], 3)
+    out[:3] -= np.cross((0, 0, -distance), by_eye[3:])
+    return out
+
+
 def offset_view(view: View, eye_from_found: np.ndarray) -> View:
     """The view from where a camera sits that is off by `eye_from_found` (4, 4) in its own axes."""
     pose = Pose.from_matrix(view.world_from_eye.matrix() @ eye_from_found)

@@ -76,7 +76,9 @@ def judge(
 def drawn(trainer: Trainer, photo: LoadedPhoto) -> tuple[np.ndarray, np.ndarray]:
     """(H, W, 3) what the model shows of a photo, and the photo, over the same background."""
     background = trainer.schedule.background or (0.5, 0.5, 0.5)
-    drawing = trainer.step.draw(photo.view, trainer.control(photo.modality), background)
+    drawing = trainer.step.draw(
+        trainer.poses.view(photo), trainer.control(photo.modality), background
+    )
     image = trainer.device.download(drawing.frame.image).transpose(1, 2, 0)
     return image, photo.over(background)
 

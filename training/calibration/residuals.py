@@ -16,7 +16,12 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Projected, project, project_backward
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
 from shapeshift.scene.pose import View
-from shapeshift.training.calibration.extrinsics import moved_by, offset_view, pose_gradient
+from shapeshift.training.calibration.extrinsics import (
+    about_pivot,
+    offset_view,
+    pose_gradient,
+    slope_about_pivot,
+)
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.photos import LoadedPhoto
 
@@ -49,15 +54,12 @@ class ShapeResiduals:
             for weight, wanted in zip(self.weights, self.wanted, strict=True)
         )
         self.pace: np.ndarray | None = None
-        self.pivot = np.array([0, 0, -distance])
 
     def step(self, six: np.ndarray) -> np.ndarray:
         """(4, 4) of a turn (3,) radians about what is looked at and a shift (3,) as a share of
-        the distance: about the eye, turn and shift would do nearly the same to the picture.
+        the distance.
         """
-        moved = moved_by(six * np.repeat([1.0, self.distance], 3))
-        moved[:3, 3] += self.pivot - moved[:3, :3] @ self.pivot
-        return moved
+        return about_pivot(six, self.distance)
 
     def move_cameras(self, eye_from_found: np.ndarray) -> None:
         """Put all cameras `eye_from_found` (4, 4) away from their stated poses."""
@@ -122,9 +124,7 @@ class ShapeResiduals:
             self.device, means, scales, wxyz, opacity, color, camera_of(view), projected, record
         )
         means, wxyz, *by = map(self.device.view, (means, wxyz, by_means, by_wxyz))
-        by_pose = pose_gradient(view, means, wxyz, *by)
-        by_pose[:3] -= np.cross(self.pivot, by_pose[3:])
-        return by_pose * np.repeat([1.0, self.distance], 3)
+        return slope_about_pivot(pose_gradient(view, means, wxyz, *by), self.distance)
 
     def solve_brightness(self, steps: int) -> None:
         """Brings `gray` nearer to what shows the photos best from where the cameras stand."""

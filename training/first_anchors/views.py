@@ -31,3 +31,9 @@ def common_box(views: list[View]) -> tuple[np.ndarray, float]:
     distance = np.median(np.linalg.norm(eyes - centre, axis=1))
     tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
     return centre, float(1.5 * distance * min(tangent, 0.6))
+
+
+def distance_of(views: list[View]) -> float:
+    """Median metres from the cameras to the place that they look at together."""
+    eyes = np.array([view.world_from_eye.position for view in views])
+    return float(np.median(np.linalg.norm(eyes - common_box(views)[0], axis=1)))

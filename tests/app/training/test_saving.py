@@ -9,9 +9,10 @@ import pytest
 
 from shapeshift.app.cli import main
 from shapeshift.app.errors import UsageError
-from shapeshift.app.training.saving import check_writable, resume_hint
+from shapeshift.app.training.saving import cameras_path, check_writable, resume_hint
 from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.calibration.outlier_views import failed_modalities
 from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
@@ -128,6 +129,23 @@ def test_a_place_where_nothing_can_be_written_is_refused_at_once(tmp_path):
         check_writable(tmp_path / "file" / "deeper" / "a.shift")
     check_writable(tmp_path / "new" / "a.shift")
     assert not (tmp_path / "new").exists()
+
+
+def test_refined_cameras_lie_beside_the_scene(balls, tmp_path, capsys):
+    """Of the training photos, by their names in the capture; stated poses need no such file."""
+    out, word = tmp_path / "a.shift", ["train", str(balls.folder), "--iterations", str(STEPS)]
+    assert main([*word, "--out", str(out), "--poses", "refine"]) == 0
+    assert "beside the stated ones" in capsys.readouterr().err
+    found = read_camera_list(cameras_path(out))
+    train = [photo for photo in balls.photos if photo.split == "train"]
+    assert found.names == tuple(p.path.relative_to(balls.folder).as_posix() for p in train)
+    moved, places = read_checkpoint(checkpoint_path(out))[0]["poses.moved"], []
+    for photo, eye_from_found in zip(train, moved, strict=True):
+        places.append((photo.view.world_from_eye.matrix() @ eye_from_found)[:3, 3])
+    eyes = [view.world_from_eye.position for view in found.views]
+    np.testing.assert_allclose(eyes, places, atol=1e-9)
+    assert main([*word, "--out", str(tmp_path / "b.shift")]) == 0
+    assert not cameras_path(tmp_path / "b.shift").exists()
 
 
 def test_what_a_full_disk_can_go_on_from(tmp_path):

@@ -1,0 +1,164 @@
+"""A scene's thermal stop as numbers: which one it is, its range, and a ValuePicture of a view."""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.app.document import Document
+from shapeshift.app.errors import UsageError
+from shapeshift.renderer.colors.palette import LUMINANCE, PALETTES, STEPS, palette_colors
+from shapeshift.renderer.surface import SOLID
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.appearance import NEUTRAL
+from shapeshift.scene.cameras.framing import default_background
+from shapeshift.scene.inspection.value_picture import ValuePicture
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from shapeshift.renderer.renderer import Renderer
+
+UNKNOWN = (-1.0, -1.0, -1.0)  # a background that no scene can have
+
+
+@dataclass(frozen=True)
+class ThermalScene:
+    """What is drawn to be measured."""
+
+    scene: Scene  # at the thermal stop, neither tinted nor graded
+    stop: Stop  # with a value_range
+    behind: float | None  # luminance of what the scene was trained before; None: not known
+    colors: str = ""  # the palette that the scene's own colours are of; "": they are values
+
+
+@dataclass(frozen=True)
+class ThermalChoice:
+    """What a person says about the stop that is measured; empty: as the scene does."""
+
+    stop: str = ""
+    value_range: tuple[float, float] | None = None
+    unit: str = ""
+    colors: str = ""  # a palette: the colours are its, values are looked up in it
+
+
+def thermal_scene(document: Document, choice: ThermalChoice = ThermalChoice()) -> ThermalScene:
+    """The scene at the stop to be measured.  Raises UsageError, one sentence."""
+    stop = _choose_stop(document, choice)
+    value_range = choice.value_range or stop.value_range
+    if value_range is None:
+        raise UsageError(
+            f"the stop '{stop.name}' does not say which values black and white stand for; say it: "
+            "--range LOW HIGH (in Python value_range=(low, high))."
+        )
+    low, high = value_range
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise UsageError(
+            f"the range goes from {low:g} to {high:g}; two numbers are wanted, the lower one first."
+        )
+    if choice.colors and choice.colors not in PALETTES:
+        raise UsageError(f"there is no palette '{choice.colors}'; known are {', '.join(PALETTES)}.")
+    if not choice.colors and not (stop.kind == "thermal" and stop.palette):
+        raise UsageError(
+            f"the stop '{stop.name}' holds colours and no values; name the palette that they are "
+            "of: --colors NAME (gray, where they are values)."
+        )
+    placed = document.placed(stop.name, "the stop")
+    objects = tuple(
+        replace(obj, tint=None, appearance=NEUTRAL, selectors=()) for obj in placed.scene.objects
+    )
+    _refuse_other_ranges(objects, stop)
+    behind = None
+    if len(objects) == 1 and document.file is None:
+        color = default_background(objects[0].model, UNKNOWN)
+        behind = None if color == UNKNOWN else float(np.array(color) @ LUMINANCE)
+    measured = replace(stop, value_range=(float(low), float(high)), unit=choice.unit or stop.unit)
+    return ThermalScene(Scene(objects), measured, behind, choice.colors)
+
+
+def _choose_stop(document: Document, choice: ThermalChoice) -> Stop:
+    stops = [stop for model in document.models for stop in model.stops]
+    names = ", ".join(dict.fromkeys(stop.name for stop in stops))
+    if choice.stop:
+        for stop in stops:
+            if stop.name.casefold() == choice.stop.casefold():
+                return stop
+        raise UsageError(f"there is no stop '{choice.stop}'; the scene has {names or 'none'}.")
+    for stop in stops:
+        if stop.kind == "thermal":
+            return stop
+    raise UsageError(
+        f"the scene has no thermal stop (it has {names or 'none'}); where the colours of one are "
+        "of a palette, name both: --stop NAME --colors PALETTE --range LOW HIGH."
+    )
+
+
+def _refuse_other_ranges(objects: tuple, stop: Stop) -> None:
+    """Objects with a stop of the same name have to mean the same by it."""
+    for obj in objects:
+        for other in obj.model.stops:
+            known = (other.palette, other.value_range, other.unit)
+            if other.name == stop.name and known != (stop.palette, stop.value_range, stop.unit):
+                raise UsageError(
+                    f"objects of this scene have a stop '{stop.name}' with different palettes, "
+                    "ranges or units; measure one of them alone."
+                )
+
+
+def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> ValuePicture:
+    """Values and depths of a view, from the scene's values before the palette.
+
+    The network gives values 0..1 (as luminance), which splats blend as they blend colours.  What a
+    pixel lacks to full coverage showed, in training, what stood behind: that is put back where it
+    is known, else the value is divided by the coverage (docs/thermal.md has both errors).
+    """
+    renderer.update(thermal.scene)
+    renderer.draw([view])
+    behind = thermal.behind
+    if thermal.colors:
+        rgba = renderer.image(0).astype(np.float64)
+        alpha = rgba[..., 3]
+        colors = rgba[..., :3] / np.maximum(alpha, 1e-6)[..., None]
+        share, _ = value_of_colors(colors, thermal.colors)
+    elif renderer.drawing.draws_heat:  # beside objects that have no such stop
+        heat = renderer.drawing.heat(0).astype(np.float64)
+        alpha = heat[..., 1]
+        share = heat[..., 0] / np.maximum(alpha, 1e-6)
+    else:
+        rgba = renderer.image(0).astype(np.float64)
+        alpha, share = rgba[..., 3], rgba[..., :3] @ LUMINANCE
+        share = share / np.maximum(alpha, 1e-6) if behind is None else share + (1 - alpha) * behind
+    depth = renderer.surface(view).depth(SOLID).astype(np.float64)
+    assert thermal.stop.value_range is not None  # thermal_scene has seen to it
+    low, high = thermal.stop.value_range
+    values = low + (high - low) * np.clip(share, 0, 1)
+    known = (alpha >= SOLID) & np.isfinite(depth)
+    return ValuePicture(
+        view,
+        np.where(known, values, np.nan),
+        np.where(known, depth, np.nan),
+        thermal.stop.unit,
+        (low, high),
+    )
+
+
+def depth_picture(renderer: "Renderer", scene: Scene, view: View) -> ValuePicture:
+    """The depths of a view of any scene, at its own x; they are its values, too."""
+    renderer.update(scene)
+    depth = renderer.surface(view).depth(SOLID).astype(np.float64)
+    return ValuePicture(view, depth, depth, "m", (0.0, float("inf")))
+
+
+def value_of_colors(colors: np.ndarray, palette: str) -> tuple[np.ndarray, np.ndarray]:
+    """(...) values 0..1 whose colour of the palette is nearest to colours (..., 3) display sRGB,
+    and (...) how far from it, as a distance in sRGB: 0 is a colour of the palette.
+
+    The nearest point of the palette's curve, between its 256 colours.
+    """
+    from scipy.spatial import cKDTree
+
+    table = palette_colors(palette).astype(np.float64)
+    fine = np.linspace(0, 1, 16 * (STEPS - 1) + 1)
+    curve = np.stack([np.interp(fine * (STEPS - 1), np.arange(STEPS), c) for c in table.T], axis=1)
+    away, nearest = cKDTree(curve).query(np.nan_to_num(colors.reshape(-1, 3)))
+    return fine[nearest].reshape(colors.shape[:-1]), away.reshape(colors.shape[:-1])

@@ -1,0 +1,172 @@
+"""One view of an inspection: its values, its photo, what every mark reads, what isotherms hold."""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.app.document import Document
+from shapeshift.app.inspection.draw_values import ThermalScene, draw_values
+from shapeshift.scene.inspection.marks import Isotherm, Mark, MarkReading, read_mark
+from shapeshift.scene.inspection.marks_file import MarksFile
+from shapeshift.scene.inspection.value_picture import ValuePicture, value_text
+from shapeshift.scene.pose import View
+
+if TYPE_CHECKING:
+    from shapeshift.renderer.renderer import Renderer
+
+COLUMNS = ("mark", "kind", "min", "mean", "max", "samples", "depth", "place")
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would compute what begins so
+
+
+@dataclass(frozen=True)
+class IsothermReading:
+    """What of a view an isotherm holds."""
+
+    isotherm: Isotherm
+    share: float  # of the pixels that are known, 0..1
+    least: float
+    most: float
+
+
+@dataclass(frozen=True, eq=False)
+class InspectedView:
+    """A view with all that is measured in it."""
+
+    values: ValuePicture
+    photo: np.ndarray | None  # (H, W, 3) display sRGB
+    photo_name: str
+    readings: tuple[MarkReading, ...]
+    differences: tuple[tuple[str, str, float], ...]  # first, second, mean less mean
+    isotherms: tuple[IsothermReading, ...]
+
+
+def inspect_view(
+    renderer: "Renderer",
+    document: Document,
+    thermal: ThermalScene,
+    photo_stop: str,
+    view: View,
+) -> InspectedView:
+    """The values of a view, and its photo where photo_stop names a stop; nothing is marked yet."""
+    values = draw_values(renderer, thermal, view)
+    photo = None
+    if photo_stop:
+        renderer.update(document.placed(photo_stop, "the photo's stop").scene)
+        renderer.draw([view])
+        photo = renderer.resolved(0).copy()
+    return InspectedView(values, photo, photo_stop, (), (), ())
+
+
+def with_readings(inspected: InspectedView, file: MarksFile) -> InspectedView:
+    """The view with what it reads of all marks, differences and isotherms of a file."""
+    values = inspected.values
+    readings = {mark.name: read_mark(mark, values) for mark in file.marks}
+    differences = tuple((a, b, readings[a].mean - readings[b].mean) for a, b in file.differences)
+    isotherms = tuple(_isotherm(each, values) for each in file.isotherms)
+    return InspectedView(
+        values, inspected.photo, inspected.photo_name, tuple(readings.values()), differences,
+        isotherms,
+    )  # fmt: skip
+
+
+def _isotherm(each: Isotherm, values: ValuePicture) -> IsothermReading:
+    inside = each.holds(values.values) & values.known
+    known = int(values.known.sum())
+    if not inside.any():
+        return IsothermReading(each, 0.0, math.nan, math.nan)
+    held = values.values[inside]
+    share = float(inside.sum() / known)
+    return IsothermReading(each, share, float(held.min()), float(held.max()))
+
+
+def place_text(mark: Mark, origin: np.ndarray) -> str:
+    """The middle of a mark, metres in the world of the scene's file."""
+    return ",".join(f"{number + 0.0:.3f}" for number in np.round(mark.place + origin, 3))
+
+
+def reading_row(reading: MarkReading, values: ValuePicture, origin: np.ndarray) -> tuple[str, ...]:
+    """The cells of COLUMNS."""
+    texts = [
+        value_text(value, values.unit, values.value_range)
+        for value in (reading.least, reading.mean, reading.most)
+    ]
+    depth = f"{reading.depth_m:.3f} m" if np.isfinite(reading.depth_m) else "--"
+    mark = reading.mark
+    return (mark.name, mark.kind, *texts, str(reading.samples), depth, place_text(mark, origin))
+
+
+def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
+    """All readings as a table: a row a mark and view, empty cells where nothing is known."""
+    held = io.StringIO()
+    rows = csv.writer(held, lineterminator="\n")
+    head = (
+        "view",
+        "mark",
+        "kind",
+        "unit",
+        "min",
+        "mean",
+        "max",
+        "samples",
+        "depth_m",
+        "x_m",
+        "y_m",
+        "z_m",
+    )
+    rows.writerow((*head, "note"))
+    for number, each in enumerate(inspected):
+        for reading in each.readings:
+            mark = reading.mark
+            figures = (reading.least, reading.mean, reading.most)
+            rows.writerow(
+                (
+                    number,
+                    cell(mark.name),
+                    mark.kind,
+                    cell(each.values.unit),
+                    *map(number_cell, figures),
+                    reading.samples,
+                    number_cell(reading.depth_m),
+                    *map(number_cell, mark.place + origin),
+                    cell(mark.note),
+                )
+            )
+        for a, b, value in each.differences:
+            name = cell(f"{a} - {b}")
+            gone = ("",) * 6
+            rows.writerow(
+                (
+                    number,
+                    name,
+                    "difference",
+                    cell(each.values.unit),
+                    "",
+                    number_cell(value),
+                    *gone[:-1],
+                    "",
+                    "",
+                )
+            )
+    return held.getvalue()
+
+
+def profile_csv(reading: MarkReading, unit: str) -> str:
+    """The profile of a line: metres along it, and the value."""
+    lines = [f"metres,{cell(unit) or 'value'}"]
+    lines += [f"{way:.5f},{number_cell(value)}" for way, value in reading.profile]
+    return "\n".join(lines) + "\n"
+
+
+def number_cell(value: float) -> str:
+    """A figure of a table; empty where it is not known."""
+    return f"{value + 0.0:.4f}" if np.isfinite(value) else ""
+
+
+def cell(text: str) -> str:
+    """A text of a table that no spreadsheet takes for a formula."""
+    return f"'{text}" if text.startswith(FORMULA) else text

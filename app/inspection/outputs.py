@@ -1,0 +1,129 @@
+"""What the command thermal prints and writes: tables, a picture, CSV."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.app.inspection.draw_values import ThermalScene
+from shapeshift.app.inspection.inspect_view import (
+    COLUMNS,
+    InspectedView,
+    csv_text,
+    profile_csv,
+    reading_row,
+)
+from shapeshift.app.inspection.pictures import (
+    ColorScale,
+    alarm_picture,
+    heat_picture,
+    with_marks,
+    with_scale_bar,
+)
+from shapeshift.app.paths import file_name, full
+from shapeshift.app.terminal import open_console, say
+from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.scene.inspection.marks_file import MarksFile
+from shapeshift.scene.inspection.value_picture import value_text
+
+BETWEEN_PX = 8  # of pictures side by side
+
+
+def print_readings(
+    shown: Sequence[InspectedView], file: MarksFile, thermal: ThermalScene, origin: np.ndarray
+) -> None:
+    """Tables on standard output."""
+    from rich.table import Table
+    from rich.text import Text
+
+    console = open_console(stderr=False)
+    unit = thermal.stop.unit
+    for number, each in enumerate(shown):
+        table = Table(*COLUMNS)
+        for reading in each.readings:
+            row = reading_row(reading, each.values, origin)
+            table.add_row(*map(Text, row))
+        if len(shown) > 1:
+            console.print(Text(f"view {number}"))
+        if each.readings:
+            console.print(table)
+        for line in summary_lines(each):
+            console.print(Text(line), soft_wrap=True)
+    if file.held_out is not None:
+        console.print(Text(f"error: {file.held_out.words(unit)}"), soft_wrap=True)
+    else:
+        say("The error of these values is not known; --capture CAPTURE measures it.")
+
+
+def summary_lines(inspected: InspectedView) -> list[str]:
+    """Differences, isotherms and the hottest place of a view."""
+    values = inspected.values
+    lines = [
+        f"{a} less {b}: {value_text(value, values.unit)}" for a, b, value in inspected.differences
+    ]
+    for each in inspected.isotherms:
+        ends = f", {each.least:.1f} to {each.most:.1f} {values.unit}".rstrip() if each.share else ""
+        words = each.isotherm.words(values.unit)
+        lines.append(f"{words}: {100 * each.share:.2f} % of what is seen{ends}")
+    if values.known.any():
+        (column, row), value = values.hottest()
+        text = value_text(value, values.unit, values.value_range)
+        lines.append(f"hottest: {text} at pixel {column:g},{row:g}")
+    else:
+        lines.append("nothing is covered by a half in this view")
+    return lines
+
+
+def three_pictures(inspected: InspectedView, scale: ColorScale) -> list[tuple[str, np.ndarray]]:
+    """(title, (H, W, 3)) of the photo, the heat with marks and scale bar, and the alarms."""
+    values = inspected.values
+    heat = heat_picture(values, scale)
+    marked = with_marks(heat, values, inspected.readings)
+    unit = values.unit
+    title = f"Thermal, level {scale.level:g}, span {scale.span:g} {unit}".rstrip()
+    pictures = [(title, with_scale_bar(marked, scale, unit))]
+    if inspected.photo is not None:
+        pictures.insert(0, (f"Photo ({inspected.photo_name})", np.clip(inspected.photo, 0, 1)))
+    if inspected.isotherms:
+        below = heat if inspected.photo is None else inspected.photo
+        alarms = alarm_picture(below, values, [each.isotherm for each in inspected.isotherms])
+        words = ", ".join(each.isotherm.words(unit) for each in inspected.isotherms)
+        pictures.append((f"Alarms: {words}", with_marks(alarms, values, inspected.readings)))
+    return pictures
+
+
+def write_picture(path: Path, shown: Sequence[InspectedView], scale: ColorScale) -> None:
+    """The pictures of every view, a row each, as one PNG."""
+    from shapeshift.app.drawing import make_folder, save_png
+
+    make_folder(path.parent)
+    rows = []
+    for each in shown:
+        pictures = [picture for _, picture in three_pictures(each, scale)]
+        gap = np.zeros((pictures[0].shape[0], BETWEEN_PX, 3), np.float32)
+        parts = [part for picture in pictures for part in (gap, picture)][1:]
+        rows.append(np.concatenate(parts, axis=1))
+    save_png(stacked(rows), path)
+    say(f"written to {full(path)}")
+
+
+def write_tables(path: Path, shown: Sequence[InspectedView], origin: np.ndarray) -> None:
+    """All readings as CSV, and the profile of every line, as the first view sees it, beside it."""
+    from shapeshift.app.drawing import make_folder
+
+    make_folder(path.parent)
+    write_whole(path, csv_text(shown, origin).encode())
+    for reading in shown[0].readings:
+        if reading.mark.kind == "line":
+            name = f"{path.stem}.{file_name(reading.mark.name)}.csv"
+            text = profile_csv(reading, shown[0].values.unit)
+            write_whole(path.with_name(name), text.encode())
+    say(f"written to {full(path)}")
+
+
+def stacked(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Pictures of several widths below each other."""
+    width = max(row.shape[1] for row in rows)
+    return np.concatenate(
+        [np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in rows]
+    )

@@ -1,0 +1,176 @@
+"""NAME.marks.json beside a scene: marks, differences and isotherms, strictly read."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, cast
+
+import numpy as np
+
+from shapeshift.runtime_models.files.json_fields import Fields, is_number, read_json
+from shapeshift.runtime_models.files.plain_text import LONGEST_NAME, json_text, name_line
+from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.inspection.marks import (
+    FARTHEST,
+    KINDS,
+    MOST_MARKS,
+    MOST_POINTS,
+    Isotherm,
+    Mark,
+)
+
+MARK = "shapeshift_marks"
+VERSION = 1
+ENDING = ".marks.json"
+MOST_BYTES = 8 << 20
+DECIMALS = 5  # of metres: a hundredth of a millimetre
+ADVICE = "see docs/formats.md"
+MOST_VALUE = 1e6  # of an isotherm
+BOUNDS: dict[str, tuple[str, ...]] = {
+    "above": ("low",),
+    "below": ("high",),
+    "between": ("low", "high"),
+}
+
+
+@dataclass(frozen=True)
+class HeldOutError:
+    """How far values are from photos that no training has seen."""
+
+    mean: float
+    percentile_95: float
+    photos: int
+
+    def words(self, unit: str) -> str:
+        """One sentence."""
+        return (
+            f"on {self.photos} held-out photos {self.mean:.2f} {unit} in the mean, 95 of 100 "
+            f"pixels within {self.percentile_95:.2f} {unit}"
+        )
+
+
+@dataclass(frozen=True)
+class MarksFile:
+    """What is measured in a scene; metres of the world of its file."""
+
+    marks: tuple[Mark, ...] = ()
+    differences: tuple[tuple[str, str], ...] = ()  # names: the first less the second
+    isotherms: tuple[Isotherm, ...] = ()
+    metres_per_unit: float = 1.0  # what a length of the scene is multiplied by
+    held_out: HeldOutError | None = None  # as it was measured last
+
+    def named(self, name: str) -> Mark:
+        """The mark of that name.  KeyError: there is none."""
+        return {mark.name: mark for mark in self.marks}[name]
+
+
+def marks_path(scene: Path) -> Path:
+    """Where the marks of a scene lie: beside it."""
+    name = (
+        scene.name.removesuffix(".scene.json") if scene.name.endswith(".scene.json") else scene.stem
+    )
+    return scene.with_name(f"{name or scene.name}{ENDING}")
+
+
+def read_marks_file(path: Path) -> MarksFile:
+    """Raises BadFile, one sentence."""
+    fields = Fields(read_json(path, most_bytes=MOST_BYTES, unique=True), path.name, ADVICE)
+    fields.count(MARK, VERSION, VERSION)
+    scale = fields.number("metres_per_unit", 1.0, "a number from 1e-6 to 1e6", 1e-6, 1e6)
+    marks = tuple(_mark(row) for row in fields.rows("marks", MOST_MARKS, "mark"))
+    names = [mark.name for mark in marks]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise BadFile(f"{path.name}: two marks are called '{twice}'; rename one, {ADVICE}.")
+    pairs = tuple(_pair(row, names) for row in fields.rows("differences", MOST_MARKS, "difference"))
+    isotherms = tuple(_isotherm(row) for row in fields.rows("isotherms", MOST_MARKS, "isotherm"))
+    error = fields.optional_object("held_out")
+    held_out = None if error is None else _held_out(error)
+    fields.refuse_unknown_keys()
+    return MarksFile(marks, pairs, isotherms, scale, held_out)
+
+
+def _mark(row: Fields) -> Mark:
+    name = row.line("name")
+    if name != name_line(name):
+        raise row.error("name", f"one line of 1 to {LONGEST_NAME} letters")
+    kind = row.text("kind")
+    if kind not in KINDS:
+        raise row.error("kind", f"one of {', '.join(KINDS)}")
+    points = row.value("points")
+    good = isinstance(points, list) and len(points) <= MOST_POINTS
+    good = good and all(
+        isinstance(p, list) and len(p) == 3 and all(map(is_number, p)) for p in points
+    )
+    if not good:
+        raise row.error("points", f"a list of [x, y, z] in metres, at most {MOST_POINTS:,},")
+    radius = row.number("radius", 0.0, "metres above 0", 0.0, FARTHEST) if kind == "circle" else 0.0
+    note = row.line("note", "")
+    row.refuse_unknown_keys()
+    try:
+        return Mark(name, kind, np.array(points, np.float64), radius, note)
+    except ValueError as error:
+        raise BadFile(f"{row.where}: {error}") from None
+
+
+def _pair(row: Fields, names: list[str]) -> tuple[str, str]:
+    pair = (row.text("of"), row.text("less"))
+    for key, name in zip(("of", "less"), pair, strict=True):
+        if name not in names:
+            raise row.error(key, "the name of a mark of this file")
+    row.refuse_unknown_keys()
+    return pair
+
+
+def _isotherm(row: Fields) -> Isotherm:
+    kind = row.text("kind")
+    if kind not in BOUNDS:
+        raise row.error("kind", f"one of {', '.join(BOUNDS)}")
+    ends = {
+        key: row.number(key, wanted="a value", low=-MOST_VALUE, high=MOST_VALUE)
+        for key in BOUNDS[kind]
+    }
+    row.refuse_unknown_keys()
+    try:
+        return Isotherm(cast(Literal["above", "below", "between"], kind), **ends)
+    except ValueError as error:
+        raise BadFile(f"{row.where}: {error}") from None
+
+
+def _held_out(row: Fields) -> HeldOutError:
+    mean, high = (row.number(key, wanted="0 or more", low=0) for key in ("mean", "percentile_95"))
+    photos = row.count("photos", 1, 1_000_000)
+    row.refuse_unknown_keys()
+    return HeldOutError(mean, high, photos)
+
+
+def moved_marks(file: MarksFile, by: np.ndarray) -> MarksFile:
+    """The same with every mark moved by (3,) metres: into another world's zero."""
+    marks = tuple(replace(mark, points=mark.points + by) for mark in file.marks)
+    return replace(file, marks=marks)
+
+
+def marks_rows(file: MarksFile) -> dict:
+    """The file as JSON has it."""
+    marks = []
+    for mark in file.marks:
+        row: dict = {"name": mark.name, "kind": mark.kind}
+        row["points"] = (np.round(mark.points, DECIMALS) + 0.0).tolist()
+        row |= {"radius": round(float(mark.radius_m), 7)} if mark.kind == "circle" else {}
+        marks.append(row | ({"note": mark.note} if mark.note else {}))
+    rows: dict = {MARK: VERSION, "marks": marks}
+    rows["differences"] = [{"of": a, "less": b} for a, b in file.differences]
+    rows["isotherms"] = [
+        {"kind": each.kind} | {key: float(getattr(each, key)) for key in BOUNDS[each.kind]}
+        for each in file.isotherms
+    ]
+    if file.metres_per_unit != 1:
+        rows["metres_per_unit"] = float(file.metres_per_unit)
+    if file.held_out is not None:
+        rows["held_out"] = vars(file.held_out)
+    return rows
+
+
+def write_marks_file(file: MarksFile, path: Path) -> None:
+    """Whole or not at all."""
+    write_whole(path, (json_text(marks_rows(file)) + "\n").encode())

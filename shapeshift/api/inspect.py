@@ -1,0 +1,164 @@
+"""What a scene measures: degrees, depths, marks, lengths; from its values, never from colours."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from shapeshift.api.arguments import Camera, PathText, Size
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.render import shared_renderer
+from shapeshift.api.views import choose_views
+from shapeshift.app.errors import UsageError
+from shapeshift.app.inspection.draw_values import (
+    ThermalChoice,
+    ThermalScene,
+    depth_picture,
+    draw_values,
+    thermal_scene,
+)
+from shapeshift.app.inspection.facing import value_facing
+from shapeshift.app.paths import plain
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.inspection.lengths import Measurement, Point, Scale
+from shapeshift.scene.inspection.lengths import measure as measured
+from shapeshift.scene.inspection.marks import Mark, MarkReading, read_mark
+from shapeshift.scene.inspection.marks_file import marks_path, moved_marks, read_marks_file
+from shapeshift.scene.inspection.value_picture import ValuePicture
+from shapeshift.scene.pose import View
+
+BLACK = (0.0, 0.0, 0.0)
+Place = Sequence[float]  # (column, row) in pixels of a view, or (x, y, z) metres in the world
+
+
+class InspectedScene(OpenedScene):
+    """What a `Scene` measures of itself."""
+
+    def values(
+        self,
+        camera: Camera = "front",
+        size: Size | None = None,
+        *,
+        stop: str = "",
+        value_range: tuple[float, float] | None = None,
+        unit: str = "",
+        colors: str = "",
+    ) -> ValuePicture:
+        """A view of the thermal stop as numbers: `values` (H, W) in `unit` and `depth_m` (H, W),
+        NaN where less than half of a pixel is covered, and `points` (H, W, 3) metres in the world.
+
+        stop: which one; "": the first thermal one.  value_range, unit: what its black and white
+        stand for, where the scene does not say.  colors: the palette of a stop that holds its
+        colours and no values.  Raises UsageError.
+
+            seen = scene.values("front", (640, 480))
+            (column, row), celsius = seen.hottest()
+        """
+        thermal = thermal_scene(self.subject, ThermalChoice(stop, value_range, unit, colors))
+        return _drawn(thermal, choose_views(self, camera, 1, size)[0])
+
+    def temperature(
+        self,
+        place: Place,
+        camera: Camera | None = None,
+        size: Size | None = None,
+        **choice: "str | tuple[float, float]",
+    ) -> float:
+        """The value of the thermal stop, in its unit, at (x, y, z) metres in the world or at
+        (column, row) of a view; NaN where nothing is seen.
+
+        camera None: a place in the world is read in the view, of 32 around it, that its surface
+        faces most; a pixel in the front view.  choice: as of `values`.  Raises UsageError.
+
+            celsius = scene.temperature((0.31, 0.22, 0.05))
+        """
+        spot = _numbers(place)
+        chosen = ThermalChoice(**choice)  # type: ignore[arg-type]  # names and types of `values`
+        thermal = thermal_scene(self.subject, chosen)
+        if len(spot) == 3 and camera is None:
+            radius = self.bounds[1]
+            return value_facing(lambda view: _drawn(thermal, view), spot, radius)
+        picture = _drawn(thermal, choose_views(self, camera or "front", 1, size)[0])
+        if len(spot) == 3:
+            return float(picture.values_at(spot[None])[0])
+        return float(picture.at(picture.values, spot[None])[0])
+
+    def depth(self, pixel: Place, camera: Camera = "front", size: Size | None = None) -> float:
+        """Metres along the view at (column, row), at the scene's x; NaN where nothing is.
+
+        metres = scene.depth((320, 180))
+        """
+        picture = self._depths(camera, size)
+        return float(picture.at(picture.depth_m, _numbers(pixel)[None])[0])
+
+    def read_marks(
+        self,
+        marks: "Iterable[Mark] | PathText | None" = None,
+        camera: Camera = "front",
+        size: Size | None = None,
+        **choice: "str | tuple[float, float]",
+    ) -> tuple[MarkReading, ...]:
+        """What a view reads at marks: name, least, mean, most, samples, profile; NaN: not seen.
+
+        marks: some, a file of them, or None: the file that lies beside the scene, NAME.marks.json.
+        choice: as of `values`.  Raises UsageError, BadFile.
+
+            for reading in scene.read_marks(): print(reading.mark.name, reading.mean)
+        """
+        if marks is None and self.path is None:
+            raise UsageError("this scene lies in no file, so no marks lie beside it; give them.")
+        if marks is None or not isinstance(marks, Iterable) or isinstance(marks, str):
+            path = marks_path(self.path) if marks is None and self.path else plain(str(marks))
+            marks = moved_marks(read_marks_file(path), -self.origin).marks
+        picture = self.values(camera, size, **choice)  # type: ignore[arg-type]  # as above
+        return tuple(read_mark(mark, picture) for mark in marks)
+
+    def measure(
+        self,
+        kind: str,
+        *places: Place,
+        camera: Camera = "front",
+        size: Size | None = None,
+        known: tuple[Place, Place, float] | None = None,
+    ) -> Measurement:
+        """A distance, polyline, angle or area between places, with its uncertainty.
+
+        places: (column, row) of a view, on the surface at the scene's x, or (x, y, z) metres in the
+        world, which count as exact.  known: two places and the metres between them, from which the
+        scale comes.  Raises UsageError.
+
+            wide = scene.measure("distance", (120, 200), (420, 210))
+            print(wide.value, wide.uncertainty, wide.unit)
+        """
+        picture = self._depths(camera, size)
+        try:
+            scale = Scale()
+            if known is not None:
+                scale = Scale.of_known([_point(picture, p) for p in known[:2]], float(known[2]))
+            return measured(kind, [_point(picture, place) for place in places], scale)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+
+    def _depths(self, camera: Camera, size: Size | None) -> ValuePicture:
+        view = choose_views(self, camera, 1, size)[0]
+        with shared_renderer("auto", "auto", RenderSettings(), BLACK) as renderer:
+            return renderer.inspect(lambda frames: depth_picture(frames, self.drawn, view))
+
+
+def _drawn(thermal: ThermalScene, view: View) -> ValuePicture:
+    with shared_renderer("auto", "auto", RenderSettings(), BLACK) as renderer:
+        return renderer.inspect(lambda frames: draw_values(frames, thermal, view))
+
+
+def _numbers(place: Place) -> np.ndarray:
+    """(2,) or (3,) float64.  Raises UsageError."""
+    numbers = np.array(place, np.float64)
+    if numbers.shape not in ((2,), (3,)) or not np.isfinite(numbers).all():
+        raise UsageError(f"a place is {place}; (column, row) or (x, y, z) is wanted.")
+    return numbers
+
+
+def _point(picture: ValuePicture, place: Place) -> Point:
+    numbers = _numbers(place)
+    if len(numbers) == 3:
+        return Point(numbers, np.zeros((3, 3)))
+    return picture.picked((numbers[0], numbers[1]))

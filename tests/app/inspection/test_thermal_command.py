@@ -1,0 +1,232 @@
+"""launch.py thermal: values of a wall that is known, files that it writes, refusals."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from shapeshift.app import cli
+from shapeshift.app.document import Document
+from shapeshift.app.drawing import open_renderer
+from shapeshift.app.errors import UsageError
+from shapeshift.app.inspection.draw_values import (
+    ThermalChoice,
+    draw_values,
+    thermal_scene,
+    value_of_colors,
+)
+from shapeshift.app.inspection.pictures import (
+    ColorScale,
+    alarm_picture,
+    auto_ends,
+    heat_picture,
+    scale_ticks,
+)
+from shapeshift.renderer.colors.palette import PALETTES, palette_values
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.write_cameras import write_cameras
+from shapeshift.scene.inspection.marks import Isotherm, Mark, read_mark, spot_at
+from tests.support.models import make_random_model
+from tests.support.scene.warm_wall import STOPS, celsius_at, wall_view, write_wall
+
+PIXEL_C = 0.8  # °C across a pixel, 15 mm: splats in order lean to the nearer ones by less
+NO_GL = ("--context", "none")
+
+
+@pytest.fixture(scope="module")
+def wall(tmp_path_factory):
+    return write_wall(tmp_path_factory.mktemp("wall") / "wall")
+
+
+@pytest.fixture(scope="module")
+def cameras(tmp_path_factory):
+    views = (wall_view(), wall_view((0.5, 0.2, 1.4)))
+    path = tmp_path_factory.mktemp("cameras") / "cameras.json"
+    write_cameras(CameraList(views, ("",) * 2, "test"), path, "ours")
+    return path
+
+
+@pytest.fixture(scope="module")
+def drawn(wall):
+    """The wall's values in the first view."""
+    document = Document.of(read_model(wall))
+    with open_renderer("none", "tiles") as (renderer, _):
+        return draw_values(renderer, thermal_scene(document), wall_view())
+
+
+def thermal(*arguments) -> int:
+    return cli.main(["thermal", *map(str, arguments), *NO_GL])
+
+
+def refused(capsys, *arguments) -> str:
+    """The sentence with which the command refuses."""
+    assert thermal(*arguments) == 2
+    said = capsys.readouterr().err.strip()
+    assert len(said.splitlines()) == 1, said
+    return said
+
+
+def test_values_and_depths_are_those_of_the_wall(drawn):
+    """Splats of a straight line keep it to one of their spacings, half a degree; 1.5 m away a wall
+    that is 1 mm thick is hit within 3 mm."""
+    inner = (slice(10, -10), slice(10, -10))
+    assert drawn.known[inner].all() and not drawn.known[0, 0]
+    wanted = celsius_at(drawn.points[..., 0])
+    assert np.abs(drawn.values - wanted)[inner].max() < 0.5
+    assert np.abs(drawn.depth_m - 1.5)[inner].max() < 0.003
+    assert (drawn.unit, drawn.value_range) == ("°C", (0.0, 100.0))
+
+
+def test_half_a_coverage_decides_what_is_known(wall):
+    model = read_model(wall)
+    for opacity, known in ((0.02, False), (0.99, True)):
+        thin = replace(model, opacity=np.full_like(model.opacity, opacity))
+        with open_renderer("none", "tiles") as (renderer, _):
+            values = draw_values(renderer, thermal_scene(Document.of(thin)), wall_view())
+        assert values.known[36, 48] == known
+        spot = Mark("Sp1", "spot", np.zeros((1, 3)))
+        assert read_mark(spot, values).samples == int(known)
+
+
+def test_a_mark_reads_the_same_from_another_view(wall, drawn):
+    document = Document.of(read_model(wall))
+    spot = spot_at("Sp1", drawn, (60.0, 30.0))
+    with open_renderer("none", "tiles") as (renderer, _):
+        for eye in ((0.5, 0.2, 1.4), (-0.6, 0.3, 1.3), (0.1, -0.5, 1.5)):
+            view = wall_view(eye, (192, 144))  # pixels half as wide as where it was laid
+            seen = draw_values(renderer, thermal_scene(document), view)
+            reading = read_mark(spot, seen)
+            assert reading.mean == pytest.approx(celsius_at(spot.points[0, 0]), abs=PIXEL_C)
+
+
+def test_colours_of_a_known_palette_are_looked_up():
+    """Luminance of ironbow only grows, so every colour has one place: to half a fine step."""
+    share = np.linspace(0, 1, 1001)
+    for palette in ("ironbow", "gray", "rainbow", "arctic", "perceptual"):
+        found, away = value_of_colors(palette_values(share, palette), palette)
+        assert np.abs(found - share).max() < 1e-3 and away.max() < 0.02
+    _, away = value_of_colors(np.array([[0.0, 1.0, 0.0]]), "ironbow")
+    assert away[0] > 0.3  # green is none of its colours
+
+
+def test_command_prints_writes_and_keeps(wall, cameras, tmp_path, capsys):
+    out, table, marks = tmp_path / "a.png", tmp_path / "a.csv", tmp_path / "kept.marks.json"
+    words = (
+        wall, "--camera", cameras, "--spot", "mid=48,36", "0.2,0,0", "--box", "20,20,40,50",
+        "--line", "10,36,86,36", "--circle", "0,0,0,0.1", "--difference", "Sp1,mid",
+        "--above", 60, "--between", 20, 30, "--out", out, "--csv", table, "--marks", marks,
+        "--save",
+    )  # fmt: skip
+    assert thermal(*words) == 0
+    said = capsys.readouterr().out
+    assert "Sp1 less mid: 10." in said or "Sp1 less mid: 9.9" in said
+    rows = {row["mark"]: row for row in csv.DictReader(table.open())}
+    assert float(rows["mid"]["mean"]) == pytest.approx(50, abs=0.5)
+    assert float(rows["Sp1"]["mean"]) == pytest.approx(60, abs=0.5)
+    assert float(rows["Ci1"]["max"]) == pytest.approx(55, abs=1)
+    assert float(rows["Sp1"]["depth_m"]) == pytest.approx(1.5, abs=0.01)
+    profile = list(csv.reader((tmp_path / "a.Li1.csv").open()))
+    assert profile[0] == ["metres", "°C"] and len(profile) > 50
+    assert Image.open(out).height == 72 and np.asarray(Image.open(out)).std() > 20
+    assert [m["name"] for m in json.loads(marks.read_text())["marks"]] == [
+        "mid", "Sp1", "Li1", "Ci1", "Ar1",
+    ]  # fmt: skip
+    # the same marks from another view, without laying them again
+    again = (wall, "--camera", cameras, "--view", 1, "--marks", marks, "--csv", tmp_path / "b.csv")
+    assert thermal(*again, "--forget", "Ar1") == 0
+    rows = {row["mark"]: row for row in csv.DictReader((tmp_path / "b.csv").open())}
+    assert float(rows["Sp1"]["mean"]) == pytest.approx(60, abs=PIXEL_C) and "Ar1" not in rows
+    assert len(json.loads(marks.read_text())["marks"]) == 5  # without --save nothing is written
+
+
+def test_names_are_no_formulas_in_tables(wall, cameras, tmp_path):
+    table = tmp_path / "a.csv"
+    assert thermal(wall, "--camera", cameras, "--spot", "=1+1=48,36", "--csv", table) == 0
+    assert [row["mark"] for row in csv.DictReader(table.open())] == ["'=1+1"]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--spot", "1,2,3,4"), "column,row in pixels"),
+        (("--spot", "a=b"), "expected numbers"),
+        (("--spot", "nan,1"), "expected numbers"),
+        (("--spot", "500,20"), "outside of the picture"),
+        (("--spot", "0,0"), "covers less than half"),
+        (("--spot", "9,9,9"), "outside of the scene"),
+        (("--circle", "48,36,0"), "radius"),
+        (("--line", "0,0,3,0"), "covers by a half"),
+        (("--difference", "A,B"), "no mark is called 'A'"),
+        (("--between", "5", "5"), "lower value first"),
+        (("--palette", "blue"), "no palette 'blue'"),
+        (("--stop", "Cold"), "no stop 'Cold'"),
+        (("--stop", "RGB"), "--range LOW HIGH"),
+        (("--stop", "RGB", "--range", "0", "1"), "--colors NAME"),
+        (("--range", "5", "1"), "lower one first"),
+        (("--colors", "none"), "no palette 'none'"),
+        (("--span", "0"), "--span is 0"),
+        (("--auto", "--level", "5"), "--auto"),
+        (("--view", "2"), "cameras 0 to 1"),
+        (("--out", "a.jpg"), ".png"),
+        (("--csv", "a.txt"), ".csv"),
+        (("--marks", "none.marks.json"), "does not exist"),
+        (("--forget", "Sp1"), "no mark is called 'Sp1'"),
+        (("--photo", "Film"), "the scene has RGB, Thermal"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(wall, cameras, capsys, words, sentence):
+    assert sentence in refused(capsys, wall, "--camera", cameras, *words)
+
+
+def test_scenes_without_heat_or_range_are_one_sentence():
+    plain = make_random_model(20)
+    without = replace(plain, stops=(Stop("A", 0.0), Stop("B", 1.0)))
+    with pytest.raises(UsageError, match=r"no thermal stop \(it has A, B\)"):
+        thermal_scene(Document.of(without))
+    unknown = replace(plain, stops=(Stop("A", 0.0), Stop("T", 1.0, "thermal", "ironbow")))
+    with pytest.raises(UsageError, match="--range LOW HIGH"):
+        thermal_scene(Document.of(unknown))
+    said = thermal_scene(Document.of(unknown), ThermalChoice(value_range=(0, 9), unit="K"))
+    assert (said.stop.value_range, said.stop.unit) == ((0.0, 9.0), "K")
+
+
+def test_nothing_is_overwritten_unasked(wall, cameras, tmp_path, capsys):
+    out = tmp_path / "a.png"
+    out.write_text("mine")
+    assert "exists" in refused(capsys, wall, "--camera", cameras, "--out", out)
+    assert out.read_text() == "mine"
+
+
+def test_pictures_of_values(drawn):
+    scale = ColorScale(20.0, 80.0, "white-hot")
+    heat = heat_picture(drawn, scale)
+    row = heat[36, 12:-12, 0]
+    wanted = np.clip((drawn.values[36, 12:-12] - 20) / 60, 0, 1)
+    np.testing.assert_allclose(row, wanted, atol=0.01)
+    below = np.full((*drawn.values.shape, 3), 0.5, np.float32)
+    alarms = alarm_picture(below, drawn, [Isotherm("above", low=60.0)])
+    red = (alarms[..., 0] > alarms[..., 1] + 0.2) & drawn.known
+    np.testing.assert_array_equal(red, drawn.values > 60)
+    low, high = auto_ends(drawn.values)
+    known = drawn.values[drawn.known]
+    assert known.min() <= low < high <= known.max()
+    with pytest.raises(ValueError, match="nothing is covered"):
+        auto_ends(np.full((2, 2), np.nan))
+    assert (ColorScale(20, 80, "gray").level, ColorScale(20, 80, "gray").span) == (50, 60)
+
+
+@pytest.mark.parametrize(("low", "high"), [(15, 95), (0, 1), (-1e-3, 2e-3), (20.0, 20.1), (0, 9e5)])
+def test_ticks_are_round_and_inside(low, high):
+    ticks = scale_ticks(low, high, 6)
+    assert 2 <= len(ticks) <= 8 and low <= min(ticks) and max(ticks) <= high + 1e-9
+    assert np.ptp(np.diff(ticks)) == pytest.approx(0, abs=1e-9 * (high - low))
+
+
+def test_thermal_cameras_palettes_are_there():
+    assert {"white-hot", "black-hot", "rainbow", "arctic"} <= PALETTES.keys()
+    assert STOPS[1].palette in PALETTES

@@ -1,0 +1,68 @@
+"""Degrees, depths, marks and lengths through the library, on a wall that is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+import shapeshift as ss
+from shapeshift.scene.inspection.marks_file import MarksFile, write_marks_file
+from tests.support.scene.warm_wall import celsius_at, wall_view, write_wall
+
+PIXEL_C = 0.8  # °C across a pixel of the view
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    return ss.load(write_wall(tmp_path_factory.mktemp("wall") / "wall"))
+
+
+def test_degrees_and_metres_at_pixels_and_places(scene):
+    view = wall_view()
+    seen = scene.values(view)
+    assert isinstance(seen, ss.ValuePicture) and seen.unit == "°C"
+    assert scene.temperature((48, 36), view) == pytest.approx(celsius_at(0), abs=PIXEL_C)
+    assert scene.temperature((0.2, 0.1, 0.0), view) == pytest.approx(60, abs=PIXEL_C)
+    assert scene.temperature((0.2, 0.1, 0.0)) == pytest.approx(60, abs=0.3)  # small pixels
+    assert scene.depth((48, 36), view) == pytest.approx(1.5, abs=0.003)
+    for nothing in ((0.5, 0.5), (500, 20), (0.2, 0.1, -0.5)):
+        assert math.isnan(scene.temperature(nothing, view))
+    assert math.isnan(scene.temperature((0.0, 0.0, 3.0)))  # in the air
+    assert math.isnan(scene.depth((0.5, 0.5), view))
+
+
+def test_marks_beside_a_scene_are_read(scene, tmp_path):
+    marks = (ss.Mark("Sp1", "spot", np.array([(0.2, 0.0, 0.0)])),)
+    (reading,) = scene.read_marks(marks, wall_view())
+    assert isinstance(reading, ss.MarkReading)
+    assert reading.mean == pytest.approx(60, abs=PIXEL_C)
+    with pytest.raises(ss.BadFile, match=r"wall\.marks\.json"):
+        scene.read_marks(camera=wall_view())
+    write_marks_file(MarksFile(marks), scene.path.with_name("wall.marks.json"))
+    for given in (None, str(scene.path.with_name("wall.marks.json"))):
+        (again,) = scene.read_marks(given, wall_view())
+        assert again.mean == reading.mean
+
+
+def test_lengths_come_with_their_uncertainty(scene):
+    view = wall_view()
+    wide = scene.measure("distance", (20, 36), (76, 36), camera=view)
+    truth = 56 * 1.5 / view.pinhole()[1]
+    assert abs(wide.value - truth) <= 2 * wide.uncertainty and wide.unit == "m"
+    known = ((20, 36), (76, 36), 10.0)
+    scaled = scene.measure("distance", (20, 36), (48, 36), camera=view, known=known)
+    assert scaled.value == pytest.approx(5, abs=2 * scaled.uncertainty)
+    assert scene.measure("angle", (1, 0, 0), (0, 0, 0), (0, 1, 0), camera=view).value == 90
+    for places in (((0, 0), (48, 36)), ((48, 36),), ((1, 2, 3, 4), (48, 36))):
+        with pytest.raises(ss.UsageError, match=r"^[^\n]+\.$"):
+            scene.measure("distance", *places, camera=view)
+
+
+def test_scenes_without_heat_say_so(scene):
+    with pytest.raises(ss.UsageError, match="no stop 'Steam'"):
+        scene.values(wall_view(), stop="Steam")
+    plain = ss.Scene.from_splats(scene.splats("RGB"))
+    with pytest.raises(ss.UsageError, match="no thermal stop"):
+        plain.temperature((0, 0, 0))
+    with pytest.raises(ss.UsageError, match="lies in no file"):
+        plain.read_marks()
