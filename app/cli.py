@@ -21,7 +21,11 @@ COMMANDS = {
     ),
     "thermal": (
         "inspection.thermal",
-        "degrees at marks, alarms over the photo and tables of a thermal scene",
+        "degrees at marks, alarms over the photo, tables and reports of a thermal scene",
+    ),
+    "measure": (
+        "inspection.measure",
+        "distances, angles and areas on a scene, with their uncertainty",
     ),
     "lint": ("commands.lint", "what is wrong with a file, and what opening it repairs"),
     "info": ("commands.info", "what is in a scene"),

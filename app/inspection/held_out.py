@@ -38,8 +38,8 @@ def held_out_error(
     photos = capture.of(thermal.stop.name, "test")
     if not photos:
         raise BadFile(
-            f"{capture.folder} holds no photo of '{thermal.stop.name}' out for testing; mark some "
-            "with split 'test'."
+            f"{capture.folder}: no photo of '{thermal.stop.name}' is held out for testing; mark "
+            "some with split 'test'."
         )
     factor = trained_downscale(provenance) or choose_downscale(capture.photos)
     assert thermal.stop.value_range is not None  # thermal_scene has seen to it

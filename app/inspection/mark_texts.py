@@ -58,19 +58,6 @@ def split_name(text: str) -> tuple[str, str]:
     return name, numbers
 
 
-def read_point(text: str, picture: ValuePicture, origin: np.ndarray, said: str) -> np.ndarray:
-    """(3,) metres of `column,row` or `x,y,z`.  Raises UsageError."""
-    numbers = parse_numbers(text, said)
-    if len(numbers) == 3:
-        return np.array(numbers) - origin
-    if len(numbers) != 2:
-        raise UsageError(f"{said} is '{text}', expected column,row or x,y,z.")
-    try:
-        return spot_at(said, picture, (numbers[0], numbers[1])).points[0]
-    except ValueError as error:
-        raise UsageError(str(error)) from None
-
-
 def make_mark(
     kind: Kind,
     text: str,

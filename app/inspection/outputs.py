@@ -39,7 +39,8 @@ def print_readings(
     console = open_console(stderr=False)
     unit = thermal.stop.unit
     for number, each in enumerate(shown):
-        table = Table(*COLUMNS)
+        table = Table(*COLUMNS[:-1])
+        table.add_column(COLUMNS[-1], overflow="fold")  # to be typed again
         for reading in each.readings:
             row = reading_row(reading, each.values, origin)
             table.add_row(*map(Text, row))

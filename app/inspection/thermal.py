@@ -1,4 +1,4 @@
-"""launch.py thermal: degrees of a scene at marks, alarms over its photo, tables."""
+"""launch.py thermal: degrees of a scene at marks, alarms over its photo, tables and reports."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,7 +27,7 @@ MOST_VIEWS = 50
 @dataclass(frozen=True)
 class Options(ReadingOptions):
     """Measure a thermal scene: spots, boxes, circles and lines in the world, isotherms, a picture,
-    a table.  Values are those before the palette; -- says that nothing is known.
+    a table, a report.  Values are those before the palette; -- says that nothing is known.
 
     A mark is [NAME=]numbers, by pixels of the view or by metres in the world.  Marks are kept in
     NAME.marks.json beside the scene where --save says so, and are read from there."""
@@ -73,6 +73,9 @@ class Options(ReadingOptions):
     csv: Path | None = None
     """A .csv of all readings; the profile of a line goes beside it, NAME.LINE.csv.
     Default: none."""
+    report: tuple[Path, ...] = ()
+    """A .html, one file that loads nothing from anywhere, or a .pdf, or both; the cameras go
+    beside it as NAME.camera.json.  Default: none."""
     save: bool = False
     """Keep all marks, differences, isotherms and the held-out error in the file of marks."""
     marks: Path | None = None
@@ -82,6 +85,16 @@ class Options(ReadingOptions):
     capture: Path | None = None
     """The photos that the scene was trained on: the held-out ones give the stated error.
     Default: the error that the file of marks has, else none is stated."""
+    title: str = "Thermal inspection"
+    """What the report is called."""
+    client: str = ""
+    """For whom the report is.  Default: nobody is named."""
+    inspector: str = ""
+    """Who measured.  Default: nobody is named."""
+    note: str = ""
+    """A paragraph at the top of the report.  Default: none."""
+    date: str = ""
+    """The day that the report names.  Default: today, as 2026-11-23."""
     stop: str = ""
     """The stop that is measured.  Default: the first thermal one."""
     range: tuple[float, float] | None = None
@@ -144,6 +157,8 @@ def run(options: Options) -> int:
         write_picture(options.out, shown, scale)
     if options.csv is not None:
         write_tables(options.csv, shown, document.origin)
+    if options.report:
+        write_reports(options, thermal, shown, file, scale, document.origin)
     if options.save:
         keep_marks(path, file, document.origin)
     return 0
@@ -155,6 +170,7 @@ def check_outputs(options: Options) -> None:
 
     wanted: list[tuple[str, Path | None, tuple[str, ...]]]
     wanted = [("--out", options.out, (".png",)), ("--csv", options.csv, (".csv",))]
+    wanted += [("--report", path, (".html", ".pdf")) for path in options.report]
     for name, path, endings in wanted:
         if path is None:
             continue
@@ -302,6 +318,27 @@ def choose_scale(
     if not -1e6 <= level <= 1e6:
         raise UsageError(f"--level is {level:g}, expected a value.")
     return ColorScale(level - span / 2, level + span / 2, palette)
+
+
+def write_reports(
+    options: Options,
+    thermal: "ThermalScene",
+    shown: "list[InspectedView]",
+    file: "MarksFile",
+    scale: "ColorScale",
+    origin: "np.ndarray",
+) -> None:
+    """--report, each with the cameras of its views."""
+    from shapeshift.app.drawing import make_folder
+    from shapeshift.app.inspection.report import ReportHead, report_of
+    from shapeshift.app.inspection.report_pdf import write_report
+
+    head = ReportHead(options.title, options.date, options.client, options.inspector, options.note)
+    report = report_of(head, options.scene, thermal.stop, shown, file, scale, origin)
+    for path in options.report:
+        make_folder(path.parent)
+        write_report(report, path)
+        say(f"written to {full(path)}")
 
 
 def keep_marks(path: Path, file: "MarksFile", origin: "np.ndarray") -> None:

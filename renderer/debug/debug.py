@@ -28,13 +28,13 @@ from shapeshift.scene.scene import Scene
 
 # Told apart with any colour vision, by their lightness where not by their hue.
 REASON_COLORS = {
-    "drawn": (0.25, 0.87, 0.31),
-    "opacity": (0.25, 0.05, 0.11),
-    "distance": (1.00, 0.66, 0.99),
-    "frustum": (0.61, 0.61, 0.45),
-    "size": (0.26, 0.53, 0.96),
-    "footprint": (0.12, 0.32, 0.48),
-    "faded": (0.33, 0.33, 0.00),
+    "drawn": (0.17, 1.00, 0.33),
+    "opacity": (0.49, 0.21, 0.15),
+    "distance": (1.00, 0.77, 0.86),
+    "frustum": (0.61, 0.75, 0.47),
+    "size": (0.11, 0.55, 0.99),
+    "footprint": (0.27, 0.35, 0.48),
+    "faded": (0.55, 0.47, 0.08),
 }
 REASON_TEXTS = {
     "drawn": "drawn",

@@ -14,7 +14,6 @@ from shapeshift.training.calibration.extrinsics import (
     about_pivot,
     offset_of_matrix,
     offset_view,
-    rigid,
     slope_about_pivot,
     small_move,
 )
@@ -140,7 +139,7 @@ class PoseRefinement:
         way *= min(1.0, MOST / max(np.abs(way).max(), 1e-30))
         way -= SPRING * small_move(self.moved[row], self.distance)
         way *= PACE * DECAY**fraction
-        self.moved[row] = rigid(self.moved[row] @ about_pivot(way, self.distance))
+        self.moved[row] @= about_pivot(way, self.distance)
 
     def moves(self) -> tuple[float, float]:
         """Median degrees and metres by which cameras stand beside their stated poses."""

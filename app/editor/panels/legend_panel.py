@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.theme import Box
+from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 Row = tuple[str, tuple[float, float, float]]  # text, display sRGB
@@ -17,6 +18,7 @@ def draw_legend(rows: Sequence[Row], free: Box, ui_scale: float) -> None:
     No more rows than leave the middle of the scene to be seen.
     """
     left, top, right, bottom = free
+    rows = [(_in_language(text), rgb) for text, rgb in rows]
     step = imgui.get_text_line_height() + 4 * ui_scale
     high, wide = 0.45 * (bottom - top) - 36 * ui_scale, 0.45 * (right - left)
     narrow = max((imgui.calc_text_size(text).x for text, _ in rows), default=0.0) < wide
@@ -40,3 +42,9 @@ def draw_legend(rows: Sequence[Row], free: Box, ui_scale: float) -> None:
             Vec(x, y + 0.1 * line), Vec(x + 0.8 * line, y + 0.9 * line), theme.color(rgb), 2.0
         )
         draw.add_text(Vec(x + line + pad, y), theme.color(theme.TEXT), text)
+
+
+def _in_language(text: str) -> str:
+    """Of a row "words: number" the words."""
+    words, colon, number = text.partition(": ")
+    return said(words) + colon + number

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.editor.state.files.edited_file import EditedFile, ModelKey, key_of
 from shapeshift.app.editor.state.files.opened import Progress
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.opening import sentence
 from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
@@ -156,7 +157,7 @@ class Bodies:
         """Makes one collider in a thread that the program's end does not wait for."""
         future = self._future = Future()
         file, model, unwanted = edited.file, edited.model(item), self._unwanted
-        self._making = (f"{item.name}: making a collider", 0.0)
+        self._making = (said("{name}: making a collider", name=item.name), 0.0)
 
         def report(what: str, part: float) -> None:
             if unwanted.is_set():

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from shapeshift.app.editor.state.arrange import as_it_stands, copy_offset, edit, redo, undo
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document import edits
@@ -74,19 +75,19 @@ class ObjectEdits:
                 self.count_changed()
 
     def undo(self) -> None:
-        self._step(undo, "Undone")
+        self._step(undo, said("Undone: {what}"), said("Nothing to be undone"))
 
     def redo(self) -> None:
-        self._step(redo, "Done again")
+        self._step(redo, said("Done again: {what}"), said("Nothing to be done again"))
 
-    def _step(self, step: Callable, word: str) -> None:
+    def _step(self, step: Callable, words: str, nothing: str) -> None:
         count = len(self.state.scene.objects)
         try:
             what = step(self.state)
         except BadFile as error:
             self.state.say(str(error))
             return
-        self.state.say(f"{word}: {what}" if what else f"Nothing to be {word.lower()}")
+        self.state.say(words.format(what=said(what)) if what else nothing)
         if len(self.state.scene.objects) != count:
             self.count_changed()
 
@@ -95,4 +96,4 @@ class ObjectEdits:
         if self._viewpoint is None:
             return
         if self.edit(edits.look_from, self._viewpoint.stated(), what="first look"):
-            self.state.say("The scene opens with this view, once it is saved.")
+            self.state.say(said("The scene opens with this view, once it is saved."))

@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.app.editor.state.arrange import steer
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.paths import is_bundled
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.world.follow import reset_objects
@@ -93,7 +94,7 @@ class TouchState:
         if self._known is None:
             self._unfold, world.paused = True, not self.opens_playing
             if self.opens_playing:
-                self._say(HOW, HOW_S)
+                self._say(said(HOW), HOW_S)
         self._known = world
 
     @property
@@ -105,10 +106,10 @@ class TouchState:
     def status(self) -> str:
         """Words for the status line."""
         if self.held:
-            return f"carrying {self.held}"
+            return said("carrying {name}", name=self.held)
         if self.world is None:
             return ""
-        return STILL if self.world.paused else MOVING
+        return said(STILL if self.world.paused else MOVING)
 
     def release(self) -> None:
         """What the mouse holds flies on."""
@@ -123,7 +124,7 @@ class TouchState:
         if world is None:
             return
         world.paused = not world.paused
-        self._say("Objects hold still. T lets them move." if world.paused else HOW)
+        self._say(said("Objects hold still. T lets them move.") if world.paused else said(HOW))
 
     def _say(self, text: str, seconds: float | None = None) -> None:
         if self._keys:
@@ -156,7 +157,7 @@ class TouchState:
         if world is None:
             self.hand = None
             if self._state.bodies.busy and self.opens_playing:
-                self._state.say("Getting objects ready to be touched \u2026")
+                self._state.say(said("Getting objects ready to be touched \u2026"))
             return False
         if world is not self._known:
             self.meet(world)

@@ -8,6 +8,7 @@ from shapeshift.app.editor.panels.widgets.path_box import PathBox
 from shapeshift.app.editor.state.arrange import edit, undo
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, Progress, read_files
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.files import poll_opener
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.runtime_models.model import BadFile
@@ -62,12 +63,13 @@ class Adding:
         """One object more of each source; a scene that the device cannot hold stays without."""
         state = self._state
         if found.path is not None:
-            state.problem = (
-                f"{found.path.name} is a scene file: open it instead, or add its models one by one."
+            state.problem = said(
+                "{name} is a scene file: open it instead, or add its models one by one.",
+                name=found.path.name,
             )
             return
         if not found.sources:
-            state.problem = "A file of cameras is no object; drop it on the window itself."
+            state.problem = said("A file of cameras is no object; drop it on the window itself.")
             return
         file = state.edited.file
         for source in found.sources:

@@ -19,6 +19,7 @@ from shapeshift.app.editor.state.files.open_scene import first_look, opened_scen
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, ReadModel, read_files
 from shapeshift.app.editor.state.user.recent import RecentFiles
 from shapeshift.app.editor.state.user.recent_pictures import RecentPictures
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.window import Drop, Event, KeyDown
 from shapeshift.app.paths import DEMO, TOUCH, config_folder
 from shapeshift.runtime_models.model import BadFile
@@ -204,8 +205,10 @@ class Files:
             self.recent.add(path)
             self.picture_due = path.absolute()
         except OSError as error:
-            sentence = f"The list of recent files cannot be kept: {error.strerror}."
-            self._state.messages.fail(sentence)
+            why = error.strerror
+            self._state.messages.fail(
+                said("The list of recent files cannot be kept: {why}.", why=why)
+            )
             self.recent = None
 
 
@@ -220,7 +223,7 @@ def poll_opener(state: EditorState, opener: Opener, show: Callable[[OpenedFiles]
         state.problem = str(error)
         state.say("")
     except MemoryError:
-        state.problem = f"{name} needs more memory than there is."
+        state.problem = said("{name} needs more memory than there is.", name=name)
         state.say("")
     else:
         if found is not None:

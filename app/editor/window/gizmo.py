@@ -11,6 +11,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.arrange import place
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import HANDLES, EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.window import (
     DoubleClick,
     Drag,
@@ -74,7 +75,7 @@ class Gizmo:
             if len(state.scene.objects) == 1:
                 state.chosen = state.scene.objects[0].name
             else:
-                state.say("Click an object, or its name, to choose what to move.")
+                state.say(said("Click an object, or its name, to choose what to move."))
 
     @property
     def under_mouse(self) -> bool:

@@ -10,6 +10,7 @@ from shapeshift.app.editor.state.arrange import all_go_to_stop, step_stop, step_
 from shapeshift.app.editor.state.camera.camera import FAST, SLOW, Push
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.window import (
     DoubleClick,
@@ -120,7 +121,7 @@ class InputActions:
             case glfw.KEY_G:
                 state.next_debug_view(-1 if event.shift else 1)
             case glfw.KEY_L:
-                state.say(f"Lens {'on' if state.toggle_lens() else 'off'}")
+                state.say(said("Lens on" if state.toggle_lens() else "Lens off"))
             case glfw.KEY_ESCAPE:
                 state.regions.placing = False
                 state.regions.choose(-1)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.refine import Refiner, show_level
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.scene.scene import Scene
@@ -36,7 +37,7 @@ def attach_refiner(
         except BadFile as error:  # more than the driver holds: the level before stays
             show_level(state, index, before)
             refiner.stop_at(before)
-            state.problem = f"no finer level can be shown: {error}"
+            state.problem = said("no finer level can be shown: {error}", error=error)
         scene_changed()
 
     def follow() -> None:

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 from shapeshift.app.editor.panels.save_boxes import draw_saving
 from shapeshift.app.editor.state.files.saving import Saving, unsaved
 from shapeshift.app.editor.state.object_edits import ObjectEdits
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.adding import Adding
 from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.window import (
@@ -74,7 +75,7 @@ class Objects:
         self._window.close()
 
     def status(self) -> str:
-        return "not saved" if self.unsaved else ""
+        return said("not saved") if self.unsaved else ""
 
     def handle_event(self, event: Event) -> bool:
         """True for shortcuts, for a click that chooses, and for what is dropped to be added."""

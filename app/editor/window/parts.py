@@ -6,12 +6,14 @@ import numpy as np
 from shapeshift.app.editor.panels.outlines import draw_brush, draw_segments, segments
 from shapeshift.app.editor.panels.panel import Section
 from shapeshift.app.editor.panels.parts_marks import draw_drag
+from shapeshift.app.editor.panels.sections.objects_panel import FOUR_VIEW_NAMES
 from shapeshift.app.editor.panels.sections.parts_panel import DRAG_WORDS, draw_parts
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import ADD, REMOVE, REPLACE, PartsTool
 from shapeshift.app.editor.state.parts.selecting import COLOR, LASSO, SPHERE
 from shapeshift.app.editor.state.regions import Region
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hands import TURN
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.objects import Objects
@@ -153,10 +155,10 @@ class MouseParts:
                 tool.toggle()
             case glfw.KEY_U if tool.on and not event.ctrl:
                 tool.selecting.next_drag(-1 if event.shift else 1)
-                state.say(DRAG_WORDS[tool.selecting.drag])
+                state.say(said(DRAG_WORDS[tool.selecting.drag]))
             case glfw.KEY_I if not event.ctrl:
                 show = state.shown_scene.next_view(-1 if event.shift else 1)
-                state.say(f"View: {show}")
+                state.say(said("view: {what}", what=said(FOUR_VIEW_NAMES[show])))
             case glfw.KEY_ENTER | glfw.KEY_KP_ENTER if tool.on and tool.crop is not None:
                 tool.apply_crop()
             case glfw.KEY_ENTER | glfw.KEY_KP_ENTER if tool.on:

@@ -12,7 +12,7 @@ from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.user.settings import ProgramSettings, other_text_size
 from shapeshift.app.editor.texts.fonts import is_offered, why_not
-from shapeshift.app.editor.texts.table import all_languages, use_language
+from shapeshift.app.editor.texts.table import all_languages, said, use_language
 from shapeshift.app.editor.window.monitor import place_of
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 
@@ -61,7 +61,8 @@ class Shell:
         """Larger (1), smaller (-1), as the monitor asks for (0); kept for the next start."""
         size = other_text_size(self._window.text_size, step) if step else None
         self._window.text_size = self._settings.text_size = size
-        self._messages.say(f"Text size {self._window.text_size:.0%}", self._now())
+        now = said("Text size {size:.0%}", size=self._window.text_size)
+        self._messages.say(now, self._now())
         self.keep()
 
     def draw_settings(self, ui_scale: float) -> None:
@@ -90,7 +91,8 @@ class Shell:
         try:
             self._settings.keep()
         except OSError as error:
-            self._messages.fail(f"The settings cannot be kept: {error.strerror or error}.")
+            why = error.strerror or error
+            self._messages.fail(said("The settings cannot be kept: {why}.", why=why))
             self._settings.folder = None  # said once
 
     def draw(self, free: Box, more_keys: dict[str, list[Row]], ui_scale: float) -> list[Box]:

@@ -11,6 +11,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.layout import Box
 from shapeshift.app.editor.state.split_state import SplitState, name_of
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.shown import Beside, FrameRequest
 from shapeshift.app.editor.window.two_pictures import TwoPictures
@@ -112,7 +113,7 @@ def splitting(
 
     def refuse(error: BadFile) -> None:
         split_state.on = False
-        state.messages.fail(f"There is no room for a second picture: {error}")
+        state.messages.fail(said("There is no room for a second picture: {error}", error=error))
 
     def draw(request: FrameRequest) -> None:
         split_state.on = split_state.shows(request.scene)

@@ -32,6 +32,7 @@ from shapeshift.app.editor.state.quality_controller import FLOOR_DB, TARGET_MS, 
 from shapeshift.app.editor.state.user.kept_palette import KeptPalette
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.adding import Adding
 from shapeshift.app.editor.window.devices.gamepads import attach_pads
 from shapeshift.app.editor.window.files import Files, OpenActions
@@ -395,4 +396,4 @@ class Viewer:
         if self.state.save_picture:
             self.state.save_picture = False
             path = write_numbered_png(self.window.picture(), self._pictures)
-            self.state.say(f"Saved {path}")
+            self.state.say(said("Saved {path}", path=path))

@@ -13,6 +13,7 @@ from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.layout import Box
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.shown import FrameRequest, picture_key
 from shapeshift.app.editor.window.two_pictures import TwoPictures
@@ -48,7 +49,7 @@ def comparing(
     with Renderer(window.ctx, drawing) as other:
         wipe = Wipe(window, (renderer, other), state, side, free())
         wipe.attach(hooks)
-        state.say("Drag the line, or press , and . for it; C takes it away")
+        state.say(said("Drag the line, or press , and . for it; C takes it away"))
         try:
             yield wipe
         finally:
@@ -117,7 +118,7 @@ class Wipe(TwoPictures):
         if not self.on or self._waiting or self._comparison.db is None:
             return ""
         db = self._comparison.db
-        return "A = B" if db == MOST_DB else f"A to B {db:.1f} dB"
+        return "A = B" if db == MOST_DB else said("A to B {db:.1f} dB", db=db)
 
     def handle_event(self, event: Event) -> bool:
         """True for what concerns the line: dragging it, the keys , . and C."""

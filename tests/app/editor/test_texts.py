@@ -17,7 +17,7 @@ from shapeshift.app.editor.texts.fonts import (
     why_not,
 )
 from shapeshift.app.editor.texts.table import all_languages, said, use_language
-from tests.support.desktop.overlay_texts import overlay_texts
+from tests.support.desktop.overlay_texts import overlay_texts, unsaid_texts
 
 OTHERS = [code for code in all_languages() if code != table.ENGLISH]
 PERCENT = re.compile(r"%[-+.\d]*[a-z%]")
@@ -48,6 +48,10 @@ def test_no_text_is_missing_and_none_is_left_over(code):
     assert len(wanted) > 400
     assert not sorted(wanted - texts.keys()), "these are not in the table"
     assert not sorted(texts.keys() - wanted), "nobody says these any more"
+
+
+def test_no_item_of_the_panel_goes_past_the_tables():
+    assert unsaid_texts() == []
 
 
 @pytest.mark.parametrize("code", OTHERS)

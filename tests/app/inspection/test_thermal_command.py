@@ -18,6 +18,7 @@ from shapeshift.app.inspection.draw_values import (
     thermal_scene,
     value_of_colors,
 )
+from shapeshift.app.inspection.held_out import held_out_error
 from shapeshift.app.inspection.pictures import (
     ColorScale,
     alarm_picture,
@@ -26,13 +27,14 @@ from shapeshift.app.inspection.pictures import (
     scale_ticks,
 )
 from shapeshift.renderer.colors.palette import PALETTES, palette_values
-from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
+from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.inspection.marks import Isotherm, Mark, read_mark, spot_at
 from tests.support.models import make_random_model
-from tests.support.scene.warm_wall import STOPS, celsius_at, wall_view, write_wall
+from tests.support.scene.warm_wall import STOPS, celsius_at, traced, wall_view, write_wall
 
 PIXEL_C = 0.8  # °C across a pixel, 15 mm: splats in order lean to the nearer ones by less
 NO_GL = ("--context", "none")
@@ -230,3 +232,26 @@ def test_ticks_are_round_and_inside(low, high):
 def test_thermal_cameras_palettes_are_there():
     assert {"white-hot", "black-hot", "rainbow", "arctic"} <= PALETTES.keys()
     assert STOPS[1].palette in PALETTES
+
+
+def test_the_held_out_error_is_what_the_photos_are_off_by(wall, tmp_path):
+    """Photos of the formula plus 5 °C, cut out by their alpha: 5 °C, but for edges and bytes."""
+    photos = []
+    for number, eye in enumerate([(0, 0, 1.5), (0.5, 0.2, 1.4)]):
+        truth = traced(eye, (192, 144))
+        grey = np.nan_to_num((truth.values + 5) / 100 * 255 + 0.5).astype(np.uint8)
+        alpha = np.where(truth.known, 255, 0).astype(np.uint8)
+        path = tmp_path / f"{number}.png"
+        Image.fromarray(np.dstack([grey, grey, grey, alpha])).save(path)
+        photos.append(Photo(truth.view, path, "Thermal", None, "test"))
+    none = np.zeros((0, 3), np.float32)
+    capture = Capture(tmp_path, STOPS, tuple(photos), none, none, (0.0, 0.0, 0.0), {})
+    document = Document.of(read_model(wall))
+    with open_renderer("none", "tiles") as (renderer, _):
+        thermal_stop = thermal_scene(document)
+        error = held_out_error(renderer, thermal_stop, document, capture)
+        assert (error.photos, error.mean) == (2, pytest.approx(5, abs=0.3))
+        assert error.percentile_95 == pytest.approx(5, abs=1.0)
+        train = tuple(replace(photo, split="train") for photo in photos)
+        with pytest.raises(BadFile, match="is held out for testing"):
+            held_out_error(renderer, thermal_stop, document, replace(capture, photos=train))

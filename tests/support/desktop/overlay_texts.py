@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from shapeshift.renderer.debug.debug import REASON_TEXTS
+
 ROOT = Path(__file__).resolve().parents[3]
 EDITOR = ROOT / "app" / "editor"
 PANELS = "shapeshift.app.editor.panels"
@@ -13,7 +15,8 @@ PANELS = "shapeshift.app.editor.panels"
 SAYING: dict[str, tuple[int, ...] | None] = {
     "said": (0,), "tip": (0,), "item_label": (0,), "subsection": (0,), "Section": (0,),
     "rows": None, "answer_row": None, "question_box": (0,), "choice": (3,), "slider": (4, 5),
-    "labelled_slider": (4,), "open_slider": (4, 5), "pace_button": (3,), "PathBox": None,
+    "labelled_slider": (4,), "_picked": (0, 2), "open_slider": (4, 5), "pace_button": (3,),
+    "PathBox": None,
 }  # fmt: skip
 # Tables of texts that functions are handed: what of a dictionary is a text, by module.
 KEYS, VALUES, ALL = "keys", "values", "all"
@@ -23,11 +26,14 @@ TABLES = {
     "open_row": {"NEW": ALL},
     "panel": {"LARGER": ALL, "SMALLER": ALL, "ORDER": ALL},
     "save_boxes": {"OVER": ALL, "SAVE": ALL, "LOSE": ALL},
-    "sections.camera_panel": {"STEPS": ALL, "KEEP": ALL, "SIDES": VALUES},
+    "sections.appearance_panel": {"SLIDERS": VALUES, "PARTS": ALL},
+    "sections.camera_panel": {
+        "STEPS": ALL, "KEEP": ALL, "SIDES": ALL, "WAYS": ALL, "FORM_NAMES": VALUES,
+    },
     "sections.export_panel": {"DEGREES": ALL, "FORMAT_TIPS": VALUES},
     "sections.film_panel": {"AROUND": ALL, "PAST": ALL},
     "sections.histogram_panel": {"EXPLAINED": ALL},
-    "sections.look_panel": {"TWO_STOPS": ALL, "PALETTE_TIP": ALL},
+    "sections.look_panel": {"TWO_STOPS": ALL, "PALETTE_TIP": ALL, "DEBUG_NAMES": VALUES},
     "sections.objects_panel": {"MODES": VALUES, "FOUR_VIEW_NAMES": VALUES, "DEEDS": ALL},
     "sections.parts_panel": {
         "AXES": ALL, "DEEDS": ALL, "SIZES": ALL, "CHOICES": ALL, "FLOATERS": ALL,
@@ -39,7 +45,7 @@ TABLES = {
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
 KEY_TABLES = ("objects", "parts", "split", "touch")  # of app/editor/window: KEYS of the sheet
-PARTS_TOOL = "shapeshift.app.editor.state.parts.parts_tool"
+STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
 LETTERS = re.compile(r"[A-Za-z]{2}")
 KEY = r"(Ctrl|Shift|Alt|Esc|Enter|Space|Tab|[A-Z]|F\d+|\d|[+\u2013])"
 NAMES = re.compile(rf"[.\w]*\.\w+|{KEY}([ ,+]+{KEY})*|%\.\d+f .?m")  # the same in all tables
@@ -115,8 +121,30 @@ def overlay_texts() -> set[str]:
         module = importlib.import_module(f"{PANELS}.{name}")
         for table, what in tables.items():
             found |= set(texts_of(getattr(module, table), what))
-    found |= set(texts_of(importlib.import_module(PARTS_TOOL).HOW))
+    for name, texts in STATES.items():
+        module = importlib.import_module(f"shapeshift.app.editor.state.{name}")
+        for text in texts:
+            found |= set(texts_of(getattr(module, text)))
+    found |= set(texts_of(REASON_TEXTS, VALUES))  # in the legend of a debug view
     for name in KEY_TABLES:
         module = importlib.import_module(f"shapeshift.app.editor.window.{name}")
         found |= set(texts_of(module.KEYS))
     return {text.split("##")[0] for text in found if is_text(text.split("##")[0])}
+
+
+UNSAID = ("button", "checkbox", "color_edit3", "menu_item", "radio_button", "text",
+          "text_disabled", "text_unformatted", "text_wrapped")  # fmt: skip
+
+
+def unsaid_texts() -> list[str]:
+    """Texts that go to ImGui as they stand in the code, and so in English alone."""
+    found = []
+    for path in (EDITOR / "panels").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+                continue
+            owner = node.func.value
+            if isinstance(owner, ast.Name) and owner.id == "imgui" and node.func.attr in UNSAID:
+                texts = {text for part in node.args[:1] for text in literals(part)}
+                found += [text for text in texts if is_text(text.split("##")[0])]
+    return sorted(found)

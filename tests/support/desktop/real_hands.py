@@ -24,6 +24,8 @@ class RealHands:
     def __init__(self, viewer, display: str) -> None:
         self.viewer = viewer
         self._display = Display(display)
+        # On a busy machine a key stays down long enough for the server to repeat it.
+        self._display.change_keyboard_control(auto_repeat_mode=X.AutoRepeatModeOff)
 
     def __enter__(self) -> "RealHands":
         return self

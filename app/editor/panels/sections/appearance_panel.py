@@ -7,9 +7,15 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, subsection, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import (
+    item_label,
+    labelled_slider,
+    subsection,
+    tip,
+)
 from shapeshift.app.editor.state.arrange import edit
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.appearance import NEUTRAL, Appearance, Color, Sky, plain_color
 from shapeshift.scene.document import edits
@@ -39,7 +45,7 @@ def draw_appearance(state: EditorState, ui_scale: float) -> None:
         return
     name, now = ("", of_scene) if item is None else (item.name, item.appearance)
     imgui.push_id(f"appearance {name}")
-    imgui.text_disabled(f"of {name}" if name else "of the whole scene")
+    imgui.text_disabled(said("of {name}", name=name) if name else said("of the whole scene"))
     for field, (least, most, text, logarithmic, what) in SLIDERS.items():
         flags = imgui.SliderFlags_.always_clamp
         flags |= imgui.SliderFlags_.logarithmic if logarithmic else 0
@@ -52,7 +58,7 @@ def draw_appearance(state: EditorState, ui_scale: float) -> None:
         _appear(state, name, replace(now, tint=tint), "tint")
     if now != NEUTRAL:
         imgui.same_line()
-        if imgui.button("As it was"):
+        if imgui.button(item_label("As it was")):
             _appear(state, name, NEUTRAL, "")
         tip("No exposure, gamma 1, no tint, opacity 1.", ui_scale)
     imgui.pop_id()
@@ -61,7 +67,7 @@ def draw_appearance(state: EditorState, ui_scale: float) -> None:
 def draw_background(state: EditorState, ui_scale: float) -> None:
     """One colour, or those of a sky."""
     now = state.settings.background
-    changed, on = imgui.checkbox("sky", isinstance(now, Sky))
+    changed, on = imgui.checkbox(item_label("sky"), isinstance(now, Sky))
     tip("Behind the scene a sky over a ground instead of one colour.", ui_scale)
     if changed:
         _put_sky(state, CLEAR_SKY if on else _plain(plain_color(now)), "")
@@ -82,8 +88,8 @@ def draw_background(state: EditorState, ui_scale: float) -> None:
 
 def _picked(name: str, color: Color, what: str, ui_scale: float) -> Color:
     """A field of a colour; a click opens where another one is chosen."""
-    changed, chosen = imgui.color_edit3(name, list(color), PICKED)
-    tip(f"{what} Click it to choose another.", ui_scale)
+    changed, chosen = imgui.color_edit3(item_label(name), list(color), PICKED)
+    tip(said("{what} Click it to choose another.", what=said(what)), ui_scale)
     return three(min(max(part, 0.0), 1.0) for part in chosen) if changed else color
 
 

@@ -5,19 +5,21 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.sections.named_views_panel import draw_lens, draw_named_views
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import button_row, choice, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import button_row, choice, item_label, tip
 from shapeshift.app.editor.state.camera.stepping import picture_box
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.scene.cameras.write_cameras import FORMS
 
 Vec = imgui.ImVec2
 SIDES = {
-    "front": "From +Z. Numpad 1.",
-    "right": "From +X. Numpad 3; Ctrl: the left side.",
-    "top": "From above. Numpad 7; Ctrl: from below.",
-    "back": "From -Z. Ctrl and numpad 1.",
+    "Front": "From +Z. Numpad 1.",
+    "Right": "From +X. Numpad 3; Ctrl: the left side.",
+    "Top": "From above. Numpad 7; Ctrl: from below.",
+    "Back": "From -Z. Ctrl and numpad 1.",
 }
+WAYS = ("Fly", "Orbit")  # to the other one
 STEPS = {
     "Previous": "Key P; moving leaves the camera.",
     "Next": "Key N; moving leaves the camera.",
@@ -51,10 +53,9 @@ def draw_edges(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> Non
 def draw_cameras(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> None:
     """Views from all sides, the camera's ways, cameras of a file, keeping views."""
     steps, kept = viewpoint.steps, viewpoint.kept
-    sides = {name.title(): what for name, what in SIDES.items()}
-    if clicked := button_row(sides, ui_scale, len(sides)):
+    if clicked := button_row(SIDES, ui_scale, len(SIDES)):
         viewpoint.look_from(clicked.lower())
-    flying = "Orbit" if viewpoint.camera.flying else "Fly"
+    flying = WAYS[viewpoint.camera.flying]
     moves = {
         "Frame all": "Everything into the picture. Key F.",
         "First view": "As it was opened. Shift+F.",
@@ -75,11 +76,12 @@ def draw_cameras(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> N
         if clicked:
             viewpoint.step_to_camera(1 if clicked == "Next" else -1)
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
-    if imgui.button("Keep view", Vec((room - gap) / 2, 0)):
+    if imgui.button(item_label("Keep view"), Vec((room - gap) / 2, 0)):
         viewpoint.keep_view()
     tip(KEEP, ui_scale)
     imgui.same_line()
     imgui.push_item_width(-1)
-    kept.form = choice("form", kept.form, FORMS, [f"as {FORM_NAMES[form]}" for form in FORMS])
+    names = [said("as {form}", form=said(FORM_NAMES[form])) for form in FORMS]
+    kept.form = choice("form", kept.form, FORMS, names, names=True)
     tip("What the file of kept views is written for.", ui_scale)
     imgui.pop_item_width()

@@ -50,7 +50,9 @@ def _way(gallery: Gallery, ui_scale: float) -> None:
     gap = imgui.get_style().item_spacing.x
     imgui.push_item_width(-1)
     start, end = gallery.picked
-    moved, part = labelled_slider("way", gallery.part, 0.0, 1.0, f"{start} to {end}")
+    moved, part = labelled_slider(
+        "way", gallery.part, 0.0, 1.0, said("{start} to {end}", start=start, end=end)
+    )
     if moved:
         gallery.slide(part)
     tip("Straight from one to the other, at an even pace: no third stop is passed.", ui_scale)

@@ -10,6 +10,7 @@ from shapeshift.app.editor.panels.sections.appearance_panel import (
 )
 from shapeshift.app.editor.panels.widgets.panel_rows import choice, slider, tip
 from shapeshift.app.editor.state.editor_state import AS_FILED, EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.renderer.colors.palette import PALETTES
 from shapeshift.renderer.settings import DEBUG_VIEWS
 
@@ -53,13 +54,13 @@ def draw_look(state: EditorState, ui_scale: float) -> None:
     imgui.push_item_width(-1)
     if state.has_palettes:
         names = [AS_FILED, *PALETTES]
-        labels = ["heat: as filed", *(f"heat: {name}" for name in PALETTES)]
-        chosen = choice("palette", state.palette, names, labels)
+        labels = [said("heat: as filed"), *(said("heat: {name}", name=name) for name in PALETTES)]
+        chosen = choice("palette", state.palette, names, labels, names=True)
         tip(PALETTE_TIP, ui_scale)
         if chosen != state.palette:
             state.choose_palette(chosen)
-    names = [f"show: {DEBUG_NAMES[name]}" for name in DEBUG_VIEWS]
-    debug = choice("debug", state.settings.debug, DEBUG_VIEWS, names)
+    names = [said("show: {what}", what=said(DEBUG_NAMES[name])) for name in DEBUG_VIEWS]
+    debug = choice("debug", state.settings.debug, DEBUG_VIEWS, names, names=True)
     tip("The picture, or what it is made of. Key G goes through these, Shift+G back.", ui_scale)
     if debug != state.settings.debug:
         state.settings = replace(state.settings, debug=debug)

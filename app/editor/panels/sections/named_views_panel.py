@@ -5,10 +5,16 @@ from collections.abc import Callable
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.widgets.panel_rows import labelled_slider, subsection, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import (
+    item_label,
+    labelled_slider,
+    subsection,
+    tip,
+)
 from shapeshift.app.editor.state.arrange import edit
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import NamedView, SceneFile
 
@@ -32,8 +38,11 @@ def draw_lens(viewpoint: Viewpoint, ui_scale: float) -> None:
         viewpoint.leave_camera()
         camera.fov_y = math.radians(degrees)
     least, most = NEAREST_RADII * camera.radius, FARTHEST_RADII * camera.radius
-    text = "nothing nearer than %.3g m" if camera.near_m > least else "near plane: as usual"
-    moved, near = labelled_slider("near", max(camera.near_m, least), least, most, text, LOGARITHMIC)
+    moved, near = labelled_slider(
+        "near", max(camera.near_m, least), least, most,
+        "nothing nearer than %.3g m" if camera.near_m > least else "near plane: as usual",
+        LOGARITHMIC,
+    )  # fmt: skip
     tip("What is nearer to the eye is left out, to look inside. At the left end none is.", ui_scale)
     if moved:
         camera.near_m = near if near > least else 0.0
@@ -41,11 +50,12 @@ def draw_lens(viewpoint: Viewpoint, ui_scale: float) -> None:
     tip("Of flight with W A S D Q E, and of a gamepad's stick. Shift is faster.", ui_scale)
     if moved:
         camera.speed = speed
-    changed, parallel = imgui.checkbox("orthographic", camera.parallel)
+    changed, parallel = imgui.checkbox(item_label("orthographic"), camera.parallel)
     tip("Parallel rays: what is farther is not smaller. Numpad 5; not in flight.", ui_scale)
     if changed and parallel != camera.parallel:
         viewpoint.toggle_orthographic()
-    _, camera.about_pointer = imgui.checkbox("turn about what is pressed", camera.about_pointer)
+    label = item_label("turn about what is pressed")
+    _, camera.about_pointer = imgui.checkbox(label, camera.about_pointer)
     tip("A drag turns about the place under the mouse, which stays there.", ui_scale)
     imgui.pop_item_width()
 
@@ -59,13 +69,13 @@ def draw_named_views(state: EditorState, viewpoint: Viewpoint, ui_scale: float) 
         _row(state, viewpoint, named, ui_scale)
         imgui.pop_id()
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
-    if imgui.button("Add view", Vec((room - gap) / 2, 0)):
+    if imgui.button(item_label("Add view"), Vec((room - gap) / 2, 0)):
         _edit(state, lambda file: edits.keep_view(file, viewpoint.stated()), "add a view")
     tip("The view of now under a name, in the scene file once it is saved.", ui_scale)
     imgui.same_line()
-    if imgui.button("Start here", Vec(-1, 0)):
+    if imgui.button(item_label("Start here"), Vec(-1, 0)):
         _edit(state, lambda file: edits.look_from(file, viewpoint.stated()), "first look")
-        state.say("The scene opens with this view, once it is saved.")
+        state.say(said("The scene opens with this view, once it is saved."))
     tip("The scene opens with the view of now, once it is saved.", ui_scale)
 
 
@@ -74,7 +84,7 @@ def _row(state: EditorState, viewpoint: Viewpoint, named: NamedView, ui_scale: f
     side = imgui.get_frame_height()
     if imgui.arrow_button("go", imgui.Dir.right):
         viewpoint.go_to(named.view)
-    tip(f"Goes to {named.name}.", ui_scale)
+    tip(said("Goes to {name}.", name=named.name), ui_scale)
     imgui.same_line()
     imgui.set_next_item_width(imgui.get_content_region_avail().x - side - 8 * ui_scale)
     entered = imgui.InputTextFlags_.enter_returns_true
@@ -86,7 +96,7 @@ def _row(state: EditorState, viewpoint: Viewpoint, named: NamedView, ui_scale: f
     imgui.same_line()
     if imgui.button("\u00d7", Vec(-1, 0)):
         _edit(state, lambda file: edits.remove_view(file, named.name), f"take out {named.name}")
-    tip(f"Takes out {named.name}; Ctrl+Z brings it back.", ui_scale)
+    tip(said("Takes out {name}; Ctrl+Z brings it back.", name=named.name), ui_scale)
 
 
 def _edit(state: EditorState, change: Callable[[SceneFile], SceneFile], what: str) -> None:

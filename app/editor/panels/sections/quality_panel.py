@@ -204,7 +204,8 @@ def _pixels(settings: RenderSettings, drawing: str, ui_scale: float) -> RenderSe
     tip("Of width and height: 50 % draws a quarter of the pixels; details blur.", ui_scale)
     tiles = not drawing.startswith("quads")
     imgui.begin_disabled(tiles)
-    target = choice("target", settings.target, TARGETS, [f"blend into {name}" for name in TARGETS])
+    labels = [said("blend into {name}", name=name) for name in TARGETS]
+    target = choice("target", settings.target, TARGETS, labels)
     imgui.end_disabled()
     tip(
         "Tiles blend in float32 registers: there is no target to choose." if tiles
@@ -214,7 +215,7 @@ def _pixels(settings: RenderSettings, drawing: str, ui_scale: float) -> RenderSe
     )  # fmt: skip
     imgui.begin_disabled(not tiles)
     values = sorted({*STOPS, settings.min_transmittance})
-    names = [f"pixel full at 1/{1 / value:.0f}" for value in values]
+    names = [said("pixel full at 1/{part:.0f}", part=1 / value) for value in values]
     through = choice("through", settings.min_transmittance, values, names)
     imgui.end_disabled()
     tip(

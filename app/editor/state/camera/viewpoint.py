@@ -16,6 +16,7 @@ from shapeshift.app.editor.state.camera.camera import (
 from shapeshift.app.editor.state.camera.kept_views import KeptViews
 from shapeshift.app.editor.state.camera.stepping import Steps, fitted
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
@@ -215,7 +216,7 @@ class Viewpoint:
         steps = self.steps
         now, self.flown = self.view(), None
         if not steps.step(by, now):
-            self._state.say("There are no cameras to step through; drop a file of them here.")
+            self._state.say(said("There are no cameras to step through; drop a file of them here."))
         elif steps.untold:
             self._state.say("\n".join(steps.untold))
             steps.untold = ()
@@ -228,8 +229,7 @@ class Viewpoint:
         except BadFile as error:
             self._state.messages.fail(str(error))
         except OSError as error:
-            self._state.messages.fail(
-                f"The view cannot be kept: {error.strerror}: {error.filename}"
-            )
+            facts = {"why": error.strerror, "path": error.filename}
+            self._state.messages.fail(said("The view cannot be kept: {why}: {path}", **facts))
         else:
-            self._state.say(f"Kept in {path.absolute()}")
+            self._state.say(said("Kept in {path}", path=path.absolute()))

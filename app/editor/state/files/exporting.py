@@ -10,6 +10,7 @@ from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.parts.write_pieces import write_labelled
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.evaluate import follows_eye
@@ -44,18 +45,18 @@ class Exporting:
 
     def status(self) -> str:
         """Words for the status line; "" when nothing is under way."""
-        return f"exporting {self._path.name}" if self.running else ""
+        return said("exporting {name}", name=self._path.name) if self.running else ""
 
     def choices(self) -> tuple[list[int], list[str]]:
         """What can be exported: values and what they are called."""
         state = self._state
-        values, labels = [EVERYTHING], ["everything"]
+        values, labels = [EVERYTHING], [said("everything")]
         if len(state.scene.objects) > 1:
             values += range(len(state.scene.objects))
             labels += [f"{i + 1}  {obj.name}" for i, obj in enumerate(state.scene.objects)]
         if any(region.enabled for region in state.regions.items):
             values.append(REGIONS)
-            labels.append("inside the regions")
+            labels.append(said("inside the regions"))
         return values, labels
 
     @property
@@ -105,10 +106,11 @@ class Exporting:
             splats = work.result()
         except (BadFile, UsageError, OSError, MemoryError) as error:
             self._path.unlink(missing_ok=True)  # the claim, which is empty
-            self._state.problem = f"Nothing was exported: {error}"
+            self._state.problem = said("Nothing was exported: {error}", error=error)
         else:
             size = self._path.stat().st_size / 1e6
-            self._state.say(f"{self._path}: {number(splats)} splats, {size:.1f} MB")
+            facts = {"path": self._path, "count": number(splats), "size": size}
+            self._state.say(said("{path}: {count} splats, {size:.1f} MB", **facts))
         return True  # one frame more, so that it is seen
 
 

@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.opening import PATIENCE_S, progress_after
 from shapeshift.app.scene_files import print_findings
 from shapeshift.runtime_models.model import BadFile, Model
@@ -168,7 +169,8 @@ class Opener:
         """What is being opened, and how far it is."""
         names = ", ".join(path.name or str(path) for path in self._paths)
         what, part = self._progress
-        return f"Opening {names} \u2026" + (f" {part:.0%}" if what and part > 0 else "")
+        words = said("Opening {names} \u2026", names=names)
+        return words + (f" {part:.0%}" if what and part > 0 else "")
 
     def start(
         self, paths: tuple[Path, ...], read: Callable[[tuple[Path, ...], Progress], OpenedFiles]

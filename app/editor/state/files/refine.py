@@ -7,6 +7,7 @@ from pathlib import Path
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
 from shapeshift.runtime_models.read_scene import describe
@@ -108,7 +109,7 @@ class Refiner:
                     before = after
         except (BadFile, OSError, MemoryError) as error:
             if not unwanted.is_set():
-                self.problem = f"no finer level can be shown: {error}"
+                self.problem = said("no finer level can be shown: {error}", error=error)
 
 
 def put_when_free(out: queue.Queue, item: tuple, unwanted: threading.Event) -> bool:

@@ -7,6 +7,7 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import beside, stamp_of, with_regions
 from shapeshift.app.editor.state.parts.write_pieces import with_written_pieces
 from shapeshift.app.editor.state.user.own_files import OwnFiles
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.paths import is_bundled, plain
 from shapeshift.scene.document.scene_file import ENDING, FAR_M, SceneFile
 from shapeshift.scene.document.write_scene_file import write_scene_file
@@ -70,8 +71,12 @@ class Saving:
         if not path.name.lower().endswith(ENDING):
             path = path.with_name(path.name.removesuffix(".json") + ENDING)
         if is_bundled(path):
-            sentence = f"{path.name} came with the program; choose another folder for yours."
-            self._state.messages.fail(sentence)
+            self._state.messages.fail(
+                said(
+                    "{name} came with the program; choose another folder for yours.",
+                    name=path.name,
+                )
+            )
             return False
         untouched = self._own.has(path, stamp_of(path)) and self._is_open(path)
         if path.exists() and not untouched and not replace:
@@ -104,7 +109,7 @@ class Saving:
             write_scene_file(file, path)
         except (OSError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
-            state.problem = f"{path.name} cannot be saved: {reason}."
+            state.problem = said("{name} cannot be saved: {why}.", name=path.name, why=reason)
             return False
         self.name = ""
         path = path.absolute()
@@ -112,12 +117,13 @@ class Saving:
         try:
             self._own.wrote(path, edited.stamp)
         except OSError as error:
+            why = error.strerror or error
             self._state.messages.fail(
-                f"That this file is yours cannot be remembered: {error.strerror or error}."
+                said("That this file is yours cannot be remembered: {why}.", why=why)
             )
         edited.saved, edited.saved_regions = edited.file, state.regions.kept
         self._remember(path)
-        self._state.say(f"Saved {path}")
+        self._state.say(said("Saved {path}", path=path))
         self._go_on()
         return True
 

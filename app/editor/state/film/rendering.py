@@ -6,6 +6,7 @@ from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.editor.state.film.program_child import ProgramChild
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
 from shapeshift.scene.film.film_file import ENDING, write_film_file
@@ -33,7 +34,7 @@ class Rendering:
 
     def status(self) -> str:
         """Words for the status line; "" when nothing is under way."""
-        return f"film {self.progress[1]:.0%}" if self.running else ""
+        return said("film {part:.0%}", part=self.progress[1]) if self.running else ""
 
     def start(self) -> None:
         """Begins to draw; what is moved meanwhile does not show in the film."""
@@ -42,7 +43,7 @@ class Rendering:
             words = self._words()
             self._child = ProgramChild(words)
         except (OSError, UsageError) as error:
-            state.problem = f"There is no film: {error}"
+            state.problem = said("There is no film: {error}", error=error)
 
     def _words(self) -> list[str]:
         """The command.  Raises UsageError, OSError."""
@@ -69,9 +70,9 @@ class Rendering:
             path = free_name(self._folder, Path(state.title).name, ENDING)
             write_film_file(state.timeline.keys.path(origin_on_disk(state)), path)
         except (OSError, UsageError) as error:
-            state.problem = f"The film cannot be kept: {error}"
+            state.problem = said("The film cannot be kept: {error}", error=error)
         else:
-            state.say(f"Kept in {path}")
+            state.say(said("Kept in {path}", path=path))
 
     def cancel(self) -> None:
         """Ends it; the frames that are drawn stay."""
@@ -85,9 +86,10 @@ class Rendering:
             return child is not None
         self._child = None
         if child.cancelled:
-            self._state.say(f"The film was left; its frames are in {frames_of(self._path)}")
+            folder = frames_of(self._path)
+            self._state.say(said("The film was left; its frames are in {folder}", folder=folder))
         elif problem := child.problem():
-            self._state.problem = f"There is no film: {problem}"
+            self._state.problem = said("There is no film: {error}", error=problem)
         else:
             self._state.say(child.said, seconds=8)
         return True

@@ -14,6 +14,7 @@ from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.editor.state.film.program_child import ProgramChild
 from shapeshift.app.editor.state.film.rendering import free_name
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training.style_options import Options
 from shapeshift.runtime_models.model import BadFile
@@ -53,7 +54,7 @@ class StyleWork:
 
     def status(self) -> str:
         """Words for the status line; "" when nothing is under way."""
-        return f"style {self.progress[1]:.0%}" if self.running else ""
+        return said("style {part:.0%}", part=self.progress[1]) if self.running else ""
 
     def name(self, index: int = 0) -> str:
         """What a stop of the chosen shape will be called."""
@@ -85,7 +86,7 @@ class StyleWork:
             command = ["style", str(source.path), "--out", str(self._path), *words]
             self._child = ProgramChild(command)
         except (OSError, UsageError) as error:
-            state.problem = f"There is no new style: {error}"
+            state.problem = said("There is no new style: {error}", error=error)
 
     def cancel(self) -> None:
         """Ends it; nothing is left of it."""
@@ -99,9 +100,9 @@ class StyleWork:
             return child is not None
         self._child = None
         if child.cancelled:
-            self._state.say("The style was left; nothing was written.")
+            self._state.say(said("The style was left; nothing was written."))
         elif problem := child.problem():
-            self._state.problem = f"There is no new style: {problem}"
+            self._state.problem = said("There is no new style: {error}", error=problem)
         else:
             self._show()
         return True
@@ -116,9 +117,12 @@ class StyleWork:
         try:
             put_in_place(state, self._object, self._path, self._stop)
         except (BadFile, OSError) as error:
-            state.problem = f"The new style is in {self._path}, and cannot be shown: {error}"
+            state.problem = said(
+                "The new style is in {path}, and cannot be shown: {error}",
+                path=self._path, error=error,
+            )  # fmt: skip
         else:
-            state.say(f"It is in {self._path}", seconds=8)
+            state.say(said("It is in {path}", path=self._path), seconds=8)
 
 
 def put_in_place(state: EditorState, name: str, path: Path, stop: str) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.scene.pick import Hit, Picker, anchor_places
 from shapeshift.scene.pose import View
@@ -138,7 +139,7 @@ class Finder:
             try:
                 found = self.find(query)
             except (BadFile, ValueError, MemoryError) as error:
-                self.problem = str(error) or "There is no memory for what a click means."
+                self.problem = str(error) or said("There is no memory for what a click means.")
             with self._wake:
                 self._busy, self.status = False, ""
                 self._answered, self._found = query, found
@@ -199,9 +200,9 @@ class Finder:
         object_from_world = np.linalg.inv(obj.world_from_object.matrix())
         world = np.array([*self.eyes] or [view.world_from_eye.position])
         eyes = world @ object_from_world[:3, :3].T + object_from_world[:3, 3]
-        self.status = f"{obj.name}: colours of all stops"
+        self.status = said("{name}: colours of all stops", name=obj.name)
         nodes = nodes_of(obj.model, eyes.mean(axis=0))
-        self.status = f"{obj.name}: which anchors go together"
+        self.status = said("{name}: which anchors go together", name=obj.name)
         graph = make_graph(nodes, eyes)
         made = _Graph(obj.model, graph, owners(graph, places))
         self._graphs = [made, *self._graphs][:KEPT_GRAPHS]

@@ -13,6 +13,7 @@ from shapeshift.app.editor.state.parts.anchor_numbers import (
     histogram_of,
 )
 from shapeshift.app.editor.state.parts.piece import check_pieces
+from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.runtime_models.stop_weights import Control, same_controls
 from shapeshift.scene.scene import SceneObject
@@ -54,7 +55,7 @@ class Measuring:
             return
         local = np.linalg.inv(obj.world_from_object.matrix()) @ np.append(eye, 1.0)
         self._asked = (obj.model, obj.x)
-        self.status = f"{obj.name}: sizes and colours"
+        self.status = said("{name}: sizes and colours", name=obj.name)
         self._work = self._thread.submit(numbers_of_piece, obj.model, obj.x, local[:3])
 
     def then(self, obj: SceneObject, eye: np.ndarray, use: Use) -> None:
@@ -98,7 +99,7 @@ class Measuring:
             self._take_search()
         except (BadFile, ValueError, MemoryError) as error:
             self._waiting, self._search = [], None
-            self.problem = str(error) or "There is no memory for the numbers of all anchors."
+            self.problem = str(error) or said("There is no memory for the numbers of all anchors.")
         if not self.busy:
             self.status = ""
         return self.busy

@@ -242,7 +242,12 @@ class PartsTool:
         name = self._do(make_object)
         if name:
             self.state.chosen = name
-            self.state.say(f"{name} is an object now. Ctrl+Z puts it back; its name is in Objects.")
+            self.state.say(
+                said(
+                    "{name} is an object now. Ctrl+Z puts it back; its name is in Objects.",
+                    name=name,
+                )
+            )
 
     def hide(self) -> None:
         """What is chosen is no longer seen; it is an object that is hidden."""
@@ -252,13 +257,15 @@ class PartsTool:
         """What is chosen is gone, from what is saved, too."""
         count = self.count
         if self._do(delete_rows) is not None:
-            self.state.say(f"{number(count)} anchors deleted. Ctrl+Z brings them back.")
+            self.state.say(
+                said("{count} anchors deleted. Ctrl+Z brings them back.", count=number(count))
+            )
 
     def _do(self, act: Callable[..., str | None]) -> str | None:
         """An edit of what is chosen; "" where it was done without a name, None where it was not."""
         index = self.index
         if index is None or not self.count:
-            self.state.say("Nothing is chosen. Click a thing, or draw a box around it.")
+            self.state.say(said("Nothing is chosen. Click a thing, or draw a box around it."))
             return None
         try:
             name = act(self.state, index, self.chosen)
@@ -308,7 +315,7 @@ class PartsTool:
         rows = self.outside()
         self.crop = None
         if not rows.any():
-            self.state.say("Nothing lies outside the box.")
+            self.state.say(said("Nothing lies outside the box."))
             return
         self.chosen = rows
         self._do(lambda state, index, rows: delete_rows(state, index, rows, "crop"))

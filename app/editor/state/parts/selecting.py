@@ -11,6 +11,7 @@ from shapeshift.app.editor.state.parts.choosing import in_lasso, in_sphere
 from shapeshift.app.editor.state.parts.finder import SPREAD_PX, ray_through
 from shapeshift.app.editor.state.parts.floaters import floaters
 from shapeshift.app.editor.state.parts.measuring import Measuring
+from shapeshift.app.editor.texts.table import said
 from shapeshift.scene.pick import Hit, anchor_places
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import SceneObject
@@ -50,7 +51,7 @@ class Selecting:
         """All within a ball about the surface under `middle`, whose outline passes `edge`."""
         hit = self._hit(view, middle)
         if hit is None:
-            self._state.say("A sphere begins on a surface: press where there is one.")
+            self._state.say(said("A sphere begins on a surface: press where there is one."))
             return
         obj = self._state.scene.objects[hit.index]
         metres_per_px = (view.tangents[1] - view.tangents[0]) / view.size[0] * depth_m(view, hit)
@@ -97,14 +98,16 @@ class Selecting:
         def found(rows: np.ndarray) -> None:
             count = int(np.count_nonzero(rows))
             if not count:
-                self._state.say("Nothing looks like a floater.")
+                self._state.say(said("Nothing looks like a floater."))
                 return
             self._choose_if_there(obj, rows, how)
             share = f"{100 * count / len(rows):.2g} %"
-            self._state.say(f"{number(count)} anchors ({share}) look like floaters.", 6.0)
+            facts = {"count": number(count), "share": share}
+            self._state.say(said("{count} anchors ({share}) look like floaters.", **facts), 6.0)
 
         def search(numbers: AnchorNumbers) -> None:
-            self.measuring.search(f"{obj.name}: floaters", floaters, numbers, found)
+            what = said("{name}: floaters", name=obj.name)
+            self.measuring.search(what, floaters, numbers, found)
 
         self.measuring.then(obj, eye, search)
 

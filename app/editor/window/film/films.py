@@ -12,6 +12,7 @@ from shapeshift.app.editor.state.film.gallery import Gallery
 from shapeshift.app.editor.state.film.preview import Preview
 from shapeshift.app.editor.state.film.rendering import Rendering, origin_on_disk
 from shapeshift.app.editor.state.film.style_work import StyleWork
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.window import Drop, Event, Window
 from shapeshift.app.errors import UsageError
@@ -63,7 +64,7 @@ class Films:
         except (BadFile, UsageError, OSError) as error:
             state.problem = str(error)
         else:
-            state.say(f"The keys of {path.name} are in the section Film.")
+            state.say(said("The keys of {name} are in the section Film.", name=path.name))
 
 
 def attach_films(

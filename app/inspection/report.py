@@ -1,0 +1,280 @@
+"""A report of an inspection: what is in it, and as one HTML file that loads nothing."""
+
+import base64
+import html
+import io
+import math
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.app.inspection.inspect_view import COLUMNS, InspectedView, reading_row
+from shapeshift.app.inspection.outputs import summary_lines, three_pictures
+from shapeshift.app.inspection.pictures import ColorScale, scale_ticks
+from shapeshift.app.program import program
+from shapeshift.runtime_models.files.plain_text import json_text, one_line
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.cameras.camera_list import CameraList, moved
+from shapeshift.scene.cameras.write_own_cameras import own_rows
+from shapeshift.scene.inspection.marks_file import MarksFile
+
+CAMERAS_ENDING = ".camera.json"
+VALUES_WORDS = (
+    "Values are apparent temperatures as the photos gave them, read before the palette; -- where "
+    "less than half of a pixel is covered; < and > at the ends of the range."
+)
+NO_ERROR = "The error of these values was not measured; --capture CAPTURE measures it."
+JUMP = 8.0  # times the usual step along a line: it goes from one surface to another
+PROFILE_SIZE, PROFILE_EDGES = (640, 170), (56, 10, 10, 28)  # px; left, right, top, bottom
+STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em;
+  color: #1a1a1a; background: #fff; }
+h1 { font-size: 1.6em; margin: 0 0 .2em; } h2 { font-size: 1.15em; margin: 1.6em 0 .5em; }
+.row { display: flex; flex-wrap: wrap; gap: 10px; } figure { margin: 0; }
+img { width: 100%; height: auto; display: block; } figcaption { font-size: .85em; color: #444; }
+table { border-collapse: collapse; font-size: .9em; } td, th { padding: .25em .7em;
+  border-bottom: 1px solid #ddd; text-align: left; } th { border-bottom: 2px solid #888; }
+td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+code { background: #f2f2f2; padding: .1em .3em; overflow-wrap: anywhere; }
+svg { max-width: 100%; height: auto; } @media print { h2 { break-after: avoid; }
+  figure, table, svg { break-inside: avoid; } }
+"""
+
+
+@dataclass(frozen=True)
+class ReportHead:
+    """What a person says about an inspection; "" is left out."""
+
+    title: str
+    date: str = ""  # "": today
+    client: str = ""
+    inspector: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A line's values along it."""
+
+    name: str
+    unit: str
+    rows: np.ndarray  # (n, 2) metres, value; NaN where nothing is seen
+
+
+@dataclass(frozen=True, eq=False)
+class ReportView:
+    """One view of a report."""
+
+    title: str
+    pictures: list[tuple[str, np.ndarray]]  # (title, (H, W, 3) display sRGB)
+    rows: list[tuple[str, ...]]  # cells of COLUMNS
+    notes: list[str]
+    lines: list[str]
+    profiles: list[Profile]
+
+
+@dataclass(frozen=True, eq=False)
+class InspectionReport:
+    """All that both forms of a report say."""
+
+    head: ReportHead
+    views: list[ReportView]
+    settings: list[tuple[str, str]]
+    error: str
+    scene: str  # as the command was given it
+    stop: str
+    cameras: str  # JSON, our own form, in the world of the scene's file
+
+    @property
+    def lines(self) -> list[str]:
+        """Under the title."""
+        who = [("Client", self.head.client), ("Inspector", self.head.inspector)]
+        day = self.head.date or date.today().isoformat()
+        said = [f"Date: {day}", *(f"{name}: {text}" for name, text in who if text)]
+        return [one_line(text) for text in (*said, f"Scene: {Path(self.scene).name}")]
+
+    def command(self, cameras_name: str) -> str:
+        """What opens the scene where the first view is."""
+        scene, stop, cameras = map(shlex.quote, (self.scene, self.stop, cameras_name))
+        return f"{program()} view {scene} --x {stop} --camera {cameras}"
+
+
+def report_of(
+    head: ReportHead,
+    scene: Path,
+    stop: Stop,
+    shown: Sequence[InspectedView],
+    file: MarksFile,
+    scale: ColorScale,
+    origin: np.ndarray,
+) -> InspectionReport:
+    """The report of some views with their readings."""
+    unit = stop.unit
+    views = []
+    for number, each in enumerate(shown):
+        rows = [reading_row(reading, each.values, origin) for reading in each.readings]
+        marks = [reading.mark for reading in each.readings]
+        profiles = [
+            Profile(reading.mark.name, unit, with_gaps(reading.profile))
+            for reading in each.readings
+            if reading.mark.kind == "line" and reading.samples
+        ]
+        title = f"View {number + 1}" if len(shown) > 1 else "View"
+        notes = [f"{mark.name}: {mark.note}" for mark in marks if mark.note]
+        pictures = three_pictures(each, scale)
+        views.append(ReportView(title, pictures, rows, notes, summary_lines(each), profiles))
+    error = NO_ERROR
+    if file.held_out is not None:
+        error = f"Error of the values {file.held_out.words(unit)}."
+    seen = moved([each.values.view for each in shown], origin.tolist())
+    names = tuple(view.title for view in views)
+    cameras = json_text(own_rows(CameraList(tuple(seen), names, "report"))) + "\n"
+    settings = settings_rows(stop, scale, shown, origin)
+    return InspectionReport(head, views, settings, error, str(scene), stop.name, cameras)
+
+
+def settings_rows(
+    stop: Stop, scale: ColorScale, shown: Sequence[InspectedView], origin: np.ndarray
+) -> list[tuple[str, str]]:
+    """(what, value) of everything that the figures depend on."""
+    assert stop.value_range is not None  # thermal_scene has seen to it
+    low, high = stop.value_range
+    unit = stop.unit
+    rows = [
+        ("stop", stop.name),
+        ("range of the photos", f"{low:g} to {high:g} {unit}".rstrip()),
+        ("palette", scale.palette),
+        ("level, span", f"{scale.level:g}, {scale.span:g} {unit}".rstrip()),
+    ]
+    for number, each in enumerate(shown):
+        view = each.values.view
+        eye = ", ".join(
+            f"{c + 0.0:.3f}" for c in np.round(view.world_from_eye.position + origin, 3)
+        )
+        down, up = view.tangents[2:]
+        angle = math.degrees(math.atan(up) - math.atan(down))
+        width, height = view.size
+        name = f"camera {number + 1}" if len(shown) > 1 else "camera"
+        rows.append((name, f"at {eye} m, {angle:.1f}° high, {width}x{height} pixels"))
+    return rows
+
+
+def html_of(report: InspectionReport, cameras_name: str) -> str:
+    """The whole file: no scripts, and a policy that lets nothing be loaded."""
+    title = text_of(report.head.title)
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    parts = [
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>",
+        "<p>" + "<br>".join(map(text_of, report.lines)) + "</p>",
+    ]
+    if report.head.note:
+        parts.append(f"<p>{text_of(report.head.note)}</p>")
+    for view in report.views:
+        parts += html_of_view(view)
+    parts.append("<h2>How right it is</h2>")
+    parts.append(f"<p>{text_of(report.error)} {text_of(VALUES_WORDS)}</p>")
+    parts.append("<h2>Settings</h2><table>")
+    parts += [f"<tr><th>{text_of(a)}</th><td>{text_of(b)}</td></tr>" for a, b in report.settings]
+    data = base64.b64encode(report.cameras.encode()).decode()
+    link = f'<a download="{text_of(cameras_name)}" href="data:application/json;base64,{data}">'
+    parts += [
+        "</table><h2>Open it there</h2>",
+        f"<p>With {link}{text_of(cameras_name)}</a> beside this page:</p>",
+        f"<p><code>{text_of(report.command(cameras_name))}</code></p></body></html>\n",
+    ]
+    return "\n".join(parts)
+
+
+def html_of_view(view: ReportView) -> list[str]:
+    """One view: pictures, table, sentences, profiles."""
+    parts = [f'<h2>{text_of(view.title)}</h2><div class="row">']
+    for title, picture in view.pictures:
+        data = base64.b64encode(png_bytes(picture)).decode()
+        name = text_of(title)
+        source = f'<img alt="{name}" src="data:image/png;base64,{data}">'
+        wide = picture.shape[1] / picture.shape[0]  # so all of a row are equally high
+        flex = f"flex: {wide:.3f} 1 {240 * wide:.0f}px"
+        caption = f"<figcaption>{name}</figcaption>"
+        parts.append(f'<figure style="{flex}">{source}{caption}</figure>')
+    parts.append("</div>")
+    if view.rows:
+        head = "".join(f"<th>{column}</th>" for column in COLUMNS[:2])
+        head += "".join(f'<th class="number">{column}</th>' for column in COLUMNS[2:])
+        parts.append(f"<h2>Marks</h2><table><tr>{head}</tr>")
+        for row in view.rows:
+            cells = [f"<td>{text_of(cell)}</td>" for cell in row[:2]]
+            cells += [f'<td class="number">{text_of(cell)}</td>' for cell in row[2:]]
+            parts.append(f"<tr>{''.join(cells)}</tr>")
+        parts.append("</table>")
+    parts += [f"<p>{text_of(note)}</p>" for note in view.notes]
+    parts.append("<p>" + "<br>".join(map(text_of, view.lines)) + "</p>")
+    for profile in view.profiles:
+        parts.append(f"<h2>Profile of {text_of(profile.name)}</h2>{profile_svg(profile)}")
+    return parts
+
+
+def text_of(text: str) -> str:
+    """A text in HTML, whatever it holds."""
+    return html.escape(one_line(text))
+
+
+def png_bytes(picture: np.ndarray) -> bytes:
+    """(H, W, 3) display sRGB as a PNG file."""
+    from PIL import Image
+
+    held = io.BytesIO()
+    pixels = (np.clip(np.nan_to_num(picture), 0, 1) * 255 + 0.5).astype(np.uint8)
+    Image.fromarray(pixels).save(held, format="PNG", optimize=True)
+    return held.getvalue()
+
+
+def profile_svg(profile: Profile) -> str:
+    """The values along a line as a small drawing; gaps where nothing is seen."""
+    (width, height), (left, right, top, bottom) = PROFILE_SIZE, PROFILE_EDGES
+    way, values = profile.rows.T
+    known = np.isfinite(values)
+    low, high = float(values[known].min()), float(values[known].max())
+    low, high = (low - 0.5, high + 0.5) if high - low < 1e-6 else (low, high)
+    last = float(way[-1]) or 1.0
+    x = left + way / last * (width - left - right)
+    y = top + (high - values) / (high - low) * (height - top - bottom)
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
+        f'height="{height}" role="img" font-size="11" font-family="sans-serif">'
+    ]
+    for tick in scale_ticks(low, high, 5):
+        at = top + (high - tick) / (high - low) * (height - top - bottom)
+        parts.append(f'<path d="M{left} {at:.1f}H{width - right}" stroke="#ddd"/>')
+        label = text_of(f"{tick:g} {profile.unit}".rstrip())
+        parts.append(f'<text x="{left - 5}" y="{at + 4:.1f}" text-anchor="end">{label}</text>')
+    for tick in scale_ticks(0.0, last, 8):
+        at = left + tick / last * (width - left - right)
+        parts.append(f'<text x="{at:.1f}" y="{height - 10}" text-anchor="middle">{tick:g} m</text>')
+    for run in runs_of(known):
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x[run], y[run], strict=True))
+        parts.append(
+            f'<polyline points="{points}" fill="none" stroke="#b03020" stroke-width="1.5"/>'
+        )
+    return "".join([*parts, "</svg>"])
+
+
+def with_gaps(profile: np.ndarray) -> np.ndarray:
+    """A profile (n, 2) with a row of NaN wherever its line jumps from one surface to another."""
+    steps = np.diff(profile[:, 0])
+    jumps = np.flatnonzero(steps > JUMP * np.median(steps)) + 1
+    between = (profile[jumps - 1, 0] + profile[jumps, 0]) / 2
+    rows = np.stack([between, np.full(len(jumps), np.nan)], axis=1)
+    return np.insert(profile, jumps, rows, axis=0)
+
+
+def runs_of(known: np.ndarray) -> list[slice]:
+    """Where a row (n,) of bool is True without a gap."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,0 +1,65 @@
+"""launch.py measure on a wall that is known: figures within their uncertainty, refusals."""
+
+import json
+
+import pytest
+
+from shapeshift.app import cli
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.write_cameras import write_cameras
+from tests.support.scene.warm_wall import wall_view, write_wall
+
+
+@pytest.fixture(scope="module")
+def words(tmp_path_factory):
+    """The command's first words: the wall, seen in a view of 96x72 pixels."""
+    folder = tmp_path_factory.mktemp("wall")
+    view = wall_view()
+    write_cameras(CameraList((view,), ("",), "test"), folder / "cameras.json", "ours")
+    wall = write_wall(folder / "wall")
+    return ["measure", str(wall), "--camera", str(folder / "cameras.json"), "--context", "none"]
+
+
+def test_figures_lie_within_their_uncertainty(words, capsys):
+    pixel = 1.5 / wall_view().pinhole()[1]  # metres on the wall
+    corners = ["20,20", "60,20", "60,50", "20,50"]
+    more = ["--distance", "20,36", "76,36", "--polyline", *corners[:3]]
+    more += ["--angle", *corners[:3], "--area", *corners]
+    assert cli.main([*words, *more, "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["measurements"]
+    wanted = [56 * pixel, 70 * pixel, 90.0, 1200 * pixel**2]
+    assert [row["unit"] for row in rows] == ["m", "m", "degrees", "m²"]
+    for row, value in zip(rows, wanted, strict=True):
+        assert abs(row["value"] - value) <= 2 * row["uncertainty"]
+        assert 0 < row["uncertainty"] < 0.05 * value
+
+
+def test_a_known_length_scales_the_rest(words, capsys):
+    more = ["--known", "20,36", "76,36", "14", "--distance", "20,36", "48,36"]
+    assert cli.main([*words, *more]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("distance: 7.") or said.startswith("distance: 6.9")
+    assert cli.main([*words, "--distance", "0,0,0", "0,3,4"]) == 0
+    assert capsys.readouterr().out == "distance: 5.0000 ± 0.0000 m\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ([], "nothing is to be measured"),
+        (["--distance", "20,36"], "2 are wanted"),
+        (["--angle", "1,2,3", "1,2,3"], "3 are wanted"),
+        (["--distance", "0,0", "48,36"], "covers less than half"),
+        (["--distance", "500,0", "48,36"], "the picture ends"),
+        (["--distance", "a,b", "48,36"], "expected numbers"),
+        (["--distance", "1,2,3,4", "48,36"], "column,row or x,y,z"),
+        (["--known", "20,36", "76,36", "0", "--distance", "20,36", "48,36"], "known length"),
+        (["--known", "20,36", "20,36", "1", "--distance", "20,36", "48,36"], "apart"),
+        (["--view", "3", "--distance", "20,36", "48,36"], "cameras 0 to 0"),
+        (["--x", "Steam", "--distance", "20,36", "48,36"], "Steam"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_sentence(words, capsys, more, sentence):
+    assert cli.main([*words, *more]) == 2
+    said = capsys.readouterr().err.strip()
+    assert sentence in said and len(said.splitlines()) == 1
