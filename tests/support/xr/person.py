@@ -140,7 +140,8 @@ class Person:
             ways = np.diff([line["hands"][side]["grip"]["position"] for line in swing], axis=0)
             lengths = np.linalg.norm(ways, axis=1)
             times = np.diff([line["seen_s"] for line in swing + flight])
-            if opened and np.ptp(lengths) < 0.002 and times.max() < LONGEST_FRAME_S and times.min() > 0.04:
+            even = np.ptp(lengths) < 0.002 and times.max() < LONGEST_FRAME_S and times.min() > 0.04
+            if opened and even:
                 return swing, flight
             self.frames(20)  # it comes to rest
         raise AssertionError(f"this machine is too busy for an even swing in {TRIES} tries")
