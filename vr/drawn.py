@@ -48,6 +48,7 @@ class Drawn:
     cards: tuple[Card, ...] = ()
     vignette: float = 0.0  # 0..1
     blink: float = 0.0  # 0..1
+    edges: tuple[Capsule, ...] = ()  # of the room, as lines are, and no splat hides them
 
 
 def drawn_of(

@@ -5,7 +5,9 @@ it, as the runtime's reference space says.  `PlaySpace` (vr/locomotion/play_spac
 that room is in the world.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from shapeshift.scene.pose import Pose, View
 
@@ -15,7 +17,7 @@ NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a PlaySpace
 
 @dataclass(frozen=True)
 class Hand:
-    """One controller as it is at the time that the frame will be seen.
+    """One controller, or a hand without one, as it is at the time that the frame will be seen.
 
     A lost hand, or one whose actions are inactive, has `active` False, no poses, and rests.
     """
@@ -30,6 +32,8 @@ class Hand:
     primary: bool = False  # A or X; the trackpad's own where there is no such button
     secondary: bool = False  # B or Y
     menu: bool = False
+    # (26, 4) place and radius, metres, of a hand that holds no controller
+    joints: np.ndarray | None = field(default=None, compare=False)
 
 
 LOST = Hand()
@@ -54,6 +58,14 @@ def aim_of(hand: Hand) -> Pose:
 
 
 @dataclass(frozen=True)
+class Area:
+    """A rectangle on the floor of the room that is free to walk in."""
+
+    play_from_area: Pose  # its middle; +Y up
+    size_m: tuple[float, float]  # along x and z
+
+
+@dataclass(frozen=True)
 class Pulse:
     """A buzz for a hand."""
 
@@ -74,3 +86,4 @@ class Frame:
     drawn: bool  # False: nothing is shown now, so nothing is to be drawn
     focused: bool  # False: somebody else has the hands; they are LOST
     recentred: bool = False  # the room has a new origin since the last frame
+    area: Area | None = None  # where the runtime knows it

@@ -5,6 +5,7 @@ an open hand's fingers point to -Y; the right hand's back is at +X.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +22,10 @@ THUMB_BASE = np.array([0.008, 0.030, -0.030])  # metres, right hand
 THUMB_OPEN = np.array([[-0.45, -0.55, -0.70], [-0.20, -0.90, -0.40]])  # where its bones point
 THUMB_SHUT = np.array([[-0.80, -0.55, -0.25], [-0.50, -0.60, 0.60]])
 MIRROR = {"right": np.array([1.0, 1.0, 1.0]), "left": np.array([-1.0, 1.0, 1.0])}
+# Of XR_EXT_hand_tracking: the palm, the wrist, first and last joint of each finger.
+PALM_JOINT, WRIST_JOINT, CHAINS = 0, 1, ((2, 5), (6, 10), (11, 15), (16, 20), (21, 25))
+INDEX_JOINTS = (9, 10)  # the last two of the pointing finger
+JOINT_M = (0.006, 0.024)  # radii that look like a hand's
 MOST_ASIDE = 0.8  # radians from straight ahead that the pointing finger turns to the aim
 
 
@@ -39,6 +44,8 @@ def glove(side: str, hand: Hand, holds: bool = False) -> list[Capsule]:
     """The capsules of a hand in the room; none when it is lost."""
     if hand.grip is None:
         return []
+    if hand.joints is not None:
+        return bare_glove(hand.joints, holds)
     to_play = hand.grip.matrix()[:3, :3] * MIRROR[side]  # columns: of the right hand's frame
     at = hand.grip.position
 
@@ -64,11 +71,30 @@ def glove(side: str, hand: Hand, holds: bool = False) -> list[Capsule]:
     return parts
 
 
+def bare_glove(joints: np.ndarray, holds: bool) -> list[Capsule]:
+    """Around the joints (26, 4) that a hand without a controller has."""
+    ends, radii = joints[:, :3], np.clip(joints[:, 3], *JOINT_M)
+    parts = [
+        Capsule(ends[a], ends[b], (float(radii[a]), float(radii[b])), GLOVE)
+        for first, last in CHAINS
+        for a, b in pairwise((WRIST_JOINT, *range(first, last + 1)))
+    ]
+    cuff, wide = LIT if holds else CUFF, float(radii[WRIST_JOINT]) * 1.15
+    back = _unit(ends[WRIST_JOINT] - ends[PALM_JOINT]) * wide
+    return [
+        *parts,
+        Capsule(ends[WRIST_JOINT] + back * 0.3, ends[WRIST_JOINT] + back, (wide,) * 2, cuff),
+    ]
+
+
 def fingertip(side: str, hand: Hand) -> np.ndarray:
     """(3,) metres in the room: the end of the outstretched pointing finger.
 
     As it is with the trigger at rest: pulling it shall not draw the finger off what it touches.
     """
+    if hand.joints is not None:
+        tip, before = hand.joints[INDEX_JOINTS[1]], hand.joints[INDEX_JOINTS[0], :3]
+        return tip[:3] + _unit(tip[:3] - before) * tip[3]
     joints = _finger(0, side, Hand(True, hand.grip, hand.aim))
     along = _unit(joints[3] - joints[2])
     tip = (joints[3] + along * THICK[3]) * MIRROR[side]

@@ -33,6 +33,14 @@ ONE_HAND = {
 }
 
 
+# Of a hand without a controller.
+BARE: tuple[str, ...] = (
+    "Pinch: take, or act by ray",
+    "Fist: take, or hold the world",
+    "Thumb, middle: jump",
+)
+
+
 def hint_lines(profile: str, side: str, rules: Rules, panel_hand: str) -> tuple[str, ...]:
     """ "button: what it does" for each that a hand's controller has."""
     kind = profile.removeprefix("/interaction_profiles/")
@@ -64,7 +72,10 @@ def hints(
         grip = frame.hands[side].grip
         if grip is None:
             continue
-        lines = hint_lines(profiles.get(side, ""), side, rules, panel_hand)
+        if frame.hands[side].joints is not None:
+            lines = (*BARE, "Palm up: panel") if side == panel_hand else BARE
+        else:
+            lines = hint_lines(profiles.get(side, ""), side, rules, panel_hand)
         level = facing(grip.position, frame.head).matrix()
         outwards = level[:3, 0] * (1 if side == "right" else -1)
         place = grip.position + outwards * ASIDE_M + np.array([0.0, ABOVE_M, 0.0])

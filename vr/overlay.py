@@ -144,6 +144,8 @@ class Overlay:
         target.depth_mask = False
         bind_depth(self._capsule, depth, LINE_SLACK)
         self._draw_capsules(drawn.lines, view, clip_from_play, False, size)
+        bind_depth(self._capsule, None, LINE_SLACK)
+        self._draw_capsules(drawn.edges, view, clip_from_play, False, size)
         target.depth_mask = True
         if resolved is not target:
             resolved.use()  # its scissor bounds the copy
@@ -281,7 +283,7 @@ def box_of(drawn: Drawn, view: View, size: tuple[int, int]) -> PixelBox | None:
 
     Software GL takes a third of the time for what lies in a third of the picture.
     """
-    capsules = drawn.hands + drawn.lines
+    capsules = drawn.hands + drawn.lines + drawn.edges
     places = [capsule.a for capsule in capsules] + [capsule.b for capsule in capsules]
     radii = [c.radii[0] for c in capsules] + [c.radii[1] for c in capsules]
     flats = [(card.play_from_card, card.size_m) for card in drawn.cards]

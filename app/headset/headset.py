@@ -47,6 +47,14 @@ class Options(ReadingOptions):
     so that late frames are moved and not torn; it costs a second, coarser drawing of the splats."""
     panel_layer: Annotated[bool, EXPERT] = True
     """Let the runtime place the panel itself, sharp at any size of the eyes' pictures."""
+    controllers: bool = True
+    """No: take hands as the headset's cameras see them even where the runtime makes controllers of
+    them.  Hands that hold none are taken so always."""
+    edges: bool = True
+    """Show the edges of the room that is free to walk in where head or hands come near them, and
+    where the runtime knows them."""
+    obstacles: bool = True
+    """Darken the picture where the head goes into what stands in the scene."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     target_ms: Annotated[float | None, EXPERT] = None
@@ -126,7 +134,6 @@ def wear(options: Options) -> int:
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
     from shapeshift.vr.openxr.instance import Instance, Lost
-    from shapeshift.vr.openxr.session import Session
 
     with Instance() as instance:
         document, editor = open_xr(options.scene or DEMO, options, options.x)
@@ -139,15 +146,21 @@ def wear(options: Options) -> int:
         with (
             Report(options.report, options.lines, options.pictures, options.every) as report,
             open_mirror(has_display(), options.mirror) as mirror,
-            Session(instance, mirror.ctx, options.eye_part, options.pixels) as session,
+            open_session(instance, mirror.ctx, options) as session,
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
             editor.bodies,
         ):
-            rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
+            rules = Rules(
+                options.walking_hand, options.turning, vignette=options.vignette,
+                obstacles=options.obstacles,
+            )  # fmt: skip
             wearing = Wearing(
-                options.panel_hand, options.floor, options.hints, options.depth, options.panel_layer
-            )
+                options.panel_hand, options.floor, options.hints, options.depth,
+                options.panel_layer, options.edges,
+            )  # fmt: skip
+            if not (options.controllers or session.bare_hands.there):
+                say(f"{instance.runtime} sees no hands; controllers are taken.")
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
@@ -162,6 +175,13 @@ def wear(options: Options) -> int:
             finally:
                 report.write(describe(instance, session) | pacing.report())
     return 0
+
+
+def open_session(instance, ctx, options: Options):
+    """The session that the options ask for.  Raises NoHeadset, Lost."""
+    from shapeshift.vr.openxr.session import Session
+
+    return Session(instance, ctx, options.eye_part, options.pixels, options.controllers)
 
 
 @contextmanager
@@ -196,6 +216,7 @@ def describe(instance, session) -> dict:
         "space": session.play.kind,
         "recentrings": session.recentrings,
         "profiles": session.profiles,
+        "hand_tracking": session.bare_hands.there,
         "pixels": session.pixels.name,
         "eyes": session.sizes,
         "depth": session.layers.depth,

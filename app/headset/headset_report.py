@@ -17,7 +17,8 @@ from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.files.whole_file import open_lines, write_whole
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.record import Record
-from shapeshift.vr.frame import SIDES, Frame, Hand
+from shapeshift.vr.frame import SIDES, Area, Frame, Hand
+from shapeshift.vr.glove import fingertip
 from shapeshift.vr.openxr.life import Life
 from shapeshift.vr.openxr.swapchain import read
 from shapeshift.vr.pace import FramePace
@@ -104,7 +105,7 @@ def frame_row(done: DoneFrame) -> dict:
             {**pose_row(view.world_from_eye), "tangents": numbers(view.tangents)}
             for view in frame.views
         ],
-        "hands": {side: hand_row(hand) for side, hand in frame.hands.items()},
+        "hands": {side: hand_row(side, hand) for side, hand in frame.hands.items()},
         "standing": {**pose_row(play_space.world_from_play), "scale": rounded(play_space.scale)},
         "held": {side: world.held(side) for side in SIDES},
         "offers": [
@@ -115,6 +116,8 @@ def frame_row(done: DoneFrame) -> dict:
             obj.name: {**pose_row(obj.world_from_object), "x": control_row(obj.x, DECIMALS)}
             for obj in world.drawn().objects
         },
+        "dark": rounded(done.state.user.comfort.blink),
+        "area": area_row(frame.area) if frame.area is not None else None,
         "panel": done.panel(),
         "layers": done.layers,
         "events": [event for record in done.records for event in record.events],
@@ -124,7 +127,7 @@ def frame_row(done: DoneFrame) -> dict:
     }
 
 
-def hand_row(hand: Hand) -> dict:
+def hand_row(side: str, hand: Hand) -> dict:
     return {
         "active": hand.active,
         "grip": pose_row(hand.grip) if hand.grip is not None else None,
@@ -132,7 +135,13 @@ def hand_row(hand: Hand) -> dict:
         "squeeze": rounded(hand.squeeze),
         "trigger": rounded(hand.trigger),
         "stick": numbers(hand.stick),
+        "finger": numbers(fingertip(side, hand)) if hand.grip is not None else None,
+        "bare": hand.joints is not None,
     }
+
+
+def area_row(area: Area) -> dict:
+    return {**pose_row(area.play_from_area), "size_m": numbers(area.size_m)}
 
 
 def pose_row(pose: Pose) -> dict:

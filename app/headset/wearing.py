@@ -12,6 +12,7 @@ class Wearing:
     hints: bool = True  # names of buttons, notices
     depth: bool = True  # of the splats: hides hands behind them, and goes to the compositor
     panel_layer: bool = True  # the panel is a layer of the compositor's
+    edges: bool = True  # of the room that is free to walk in
 
 
 WEARING = Wearing()

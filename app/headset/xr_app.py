@@ -26,6 +26,7 @@ from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.appearance import plain_color
 from shapeshift.scene.pose import View
 from shapeshift.scene.world.record import Record
+from shapeshift.vr.area import area_edges
 from shapeshift.vr.card import Card
 from shapeshift.vr.drawn import Drawn, drawn_of
 from shapeshift.vr.floor import REST, Grid, clearness
@@ -170,6 +171,8 @@ class XrApp:
         panel = self.eyes.panel.texture
         touched, hands = person.touched, frame.hands
         over = drawn_of(hands, carried, person.comfort, touched, outlines, cards, panel)
+        if self._wearing.edges:
+            over = replace(over, edges=area_edges(frame))
         if over.panel is None or not self._wearing.panel_layer:
             return over
         apart = replace(over.panel, version=self.eyes.panel.version, apart=True)

@@ -15,6 +15,7 @@ from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, m
 from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import play_space_before, underfoot
 from shapeshift.vr.locomotion.teleport import ground_of
+from shapeshift.vr.obstacles import Sight, look
 from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
 
 
@@ -30,6 +31,7 @@ class XrUser:
         self.world, self.eye, self.floor_y, self.rules = world, eye, floor_y, rules
         self.touching, self.travel = Touching(), Travel()
         self.touched, self.comfort = Touched(), Comfort()  # of the last frame, to be shown
+        self._sight = Sight()
         self._jumps = False
 
     def before_scene(self, frame: Frame, scale: float = 1.0) -> PlaySpace:
@@ -57,6 +59,11 @@ class XrUser:
         if self.comfort.home:
             play_space = self.before_scene(frame)
         follow(self.world, frame, play_space, self.comfort.jumps)
+        if self.rules.obstacles:
+            head = play_space.point(frame.head.position)
+            self._sight = look(self._sight, self.world, head, play_space.scale)
+            dark = max(self.comfort.blink, self._sight.dark)
+            self.comfort = replace(self.comfort, blink=dark)
         return play_space
 
     def felt(self, records: Sequence) -> tuple[Pulse, ...]:

@@ -1,5 +1,6 @@
 """What lights up: the outline of what a hand would take, what buttons do, cards."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -121,6 +122,14 @@ def test_every_controller_says_what_it_has_and_nothing_else():
     assert "X: jump: point, let go" in hint_lines(touch, "left", RULES, "left")
     assert "A: jump: point, let go" in hint_lines(touch, "right", RULES, "left")
     assert "Stick: walk" in hint_lines(touch, "right", Rules(walks="right"), "left")
+
+
+def test_a_bare_hand_has_no_buttons_to_name():
+    hand = replace(hand_at((0.2, 1.2, -0.4)), joints=np.zeros((26, 4)))
+    profiles = dict.fromkeys(SIDES, "/interaction_profiles/valve/index_controller")
+    left, right = (card.lines for card in hints(a_frame(hand, hand), 0, profiles, RULES, "left"))
+    assert left == (*right, "Palm up: panel")
+    assert [line.split(":")[0] for line in right] == ["Pinch", "Fist", "Thumb, middle"]
 
 
 def test_hints_are_beside_the_hands_for_ten_seconds():

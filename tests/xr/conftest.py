@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from shapeshift.vr.frame import SIDES
 from tests.support.xr.person import Person
 from tests.support.xr.validation import complaints, switched_on
 from tests.support.xr.xr_stand import Program, Runtime, Stand, find_runtime, start_program
@@ -52,9 +53,9 @@ def start() -> Iterator[Callable[..., Program]]:
 
 
 @contextmanager
-def dressed(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
+def dressed(stand: Stand, start: Callable[..., Program], *options: str) -> Iterator[Person]:
     """Somebody before the three things on the table; at the end all must have been in order."""
-    program = start(stand, "--quality", "best", **switched_on(stand.folder))
+    program = start(stand, "--quality", "best", *options, **switched_on(stand.folder))
     with program.headset(stand.port) as remote:
         made = Person(program, remote)
         made.until(lambda line: line["focused"], "focused")
@@ -75,4 +76,16 @@ def person(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
 def served_person(served: Stand, start: Callable[..., Program]) -> Iterator[Person]:
     """The same, with a runtime that can be told things."""
     with dressed(served, start) as made:
+        yield made
+
+
+@pytest.fixture
+def bare(request, stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
+    """Somebody whose hands are seen: controllers lie aside, or (True) are not asked for."""
+    unasked = getattr(request, "param", False)
+    with dressed(stand, start, *(["--no-controllers"] if unasked else [])) as made:
+        for side in SIDES:
+            hand = made.controller(side)
+            hand.there, hand.follows = unasked, True
+        made.until(lambda line: all(line["hands"][s]["bare"] for s in SIDES), "bare hands")
         yield made

@@ -38,6 +38,7 @@ class Rules:
     fly_m_s: float = 1.0
     dead: float = 0.15  # of a stick that drifts
     vignette: float = 0.8  # at full speed; 0: none
+    obstacles: bool = True  # the head in one of them sees nothing
 
     def __post_init__(self) -> None:
         if self.walks not in SIDES:

@@ -123,7 +123,10 @@ class Hands:
         if direction != (0.0, 0.0):
             stick = direction
         click["primary"] |= pressed
-        return Hand(True, grip, aim, squeeze, trigger, stick, **click)
+        return Hand(
+            True, grip, aim, squeeze, trigger, stick, click["stick_click"], click["primary"],
+            click["secondary"], click["menu"],
+        )  # fmt: skip
 
     def _pose(self, name: str, side: str, play_space: Any, time_ns: int) -> Pose | None:
         """None where the controller is off, unseen or has no number."""

@@ -19,7 +19,8 @@ import numpy as np
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
-from shapeshift.vr.frame import FAR_M, NEAR_M, Frame
+from shapeshift.vr.frame import FAR_M, NEAR_M, Frame, Hand
+from shapeshift.vr.openxr.bounds import Bounds
 from shapeshift.vr.openxr.display import display_period
 from shapeshift.vr.openxr.events import (
     ControllersChanged,
@@ -31,6 +32,7 @@ from shapeshift.vr.openxr.events import (
 from shapeshift.vr.openxr.graphics import bind_current, check_requirements
 from shapeshift.vr.openxr.hands import Hands, pose_of
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
+from shapeshift.vr.openxr.joints import HandTrackers
 from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
 from shapeshift.vr.openxr.life import BEGIN, END, Life
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
@@ -53,6 +55,7 @@ class Session:
         ctx: moderngl.Context,
         part: float = 1.0,  # of the runtime's width and height of an eye
         pixels: str = "",  # name of a Format; "": the best
+        controllers: bool = True,  # False: hands are seen without, even where there are any
     ) -> None:
         self._instance, self._ctx, self._xr = instance, ctx, instance.xr
         self.life, self.pace = Life(), FramePace()
@@ -69,7 +72,9 @@ class Session:
         self._handle = self._create()
         self.play = open_play_space(instance, self._handle)
         self._view_space = open_head_space(instance, self._handle)
+        self._bounds = Bounds(instance, self._handle)
         self.hands.attach(self._handle)
+        self._controllers, self.bare_hands = controllers, HandTrackers(instance, self._handle)
         self.pace.display_s = display_period(instance, self._handle)
         self.layers = self._make_layers(part, pixels)
 
@@ -159,6 +164,7 @@ class Session:
                         self._enter_state(state)
                     case Recentred():
                         self._pending.append(event)
+                        self._bounds.ask()
                     case ControllersChanged():
                         self.profiles = self.hands.profiles()
                     case GoingAway():
@@ -190,10 +196,20 @@ class Session:
             self._locate_head(now)
             views, known = self._locate_eyes(now)
             focused = self.life.focused
-            hands = self.hands.read(self.play.handle, now, focused)
+            hands = self._read_hands(now, focused)
+            area = self._bounds.area(self.play, now)
         drawn = bool(state.should_render) and known
         recentred = self._recentred(now)
-        return Frame(views, self._head, hands, seen_s, period_s, drawn, focused, recentred)
+        return Frame(views, self._head, hands, seen_s, period_s, drawn, focused, recentred, area)
+
+    def _read_hands(self, now: int, focused: bool) -> dict[str, Hand]:
+        """Controllers, and in the place of one that is not there the bare hand."""
+        hands, bare = self.hands.read(self.play.handle, now, focused), self.bare_hands
+        if focused and bare.there:
+            for side, hand in hands.items():
+                if not (self._controllers and hand.active):
+                    hands[side] = bare.hand(side, self.play.handle, now, self._head)
+        return hands
 
     def _locate_head(self, now: int) -> None:
         found = locate(self._xr, self._view_space, self.play, now)
@@ -253,6 +269,7 @@ class Session:
     def close(self) -> None:
         """Gives all back, also what was lost with the runtime."""
         self.layers.close()
+        self.bare_hands.close()
         ended = (self.hands.detach, self.hands.close)
         for end in (*ended, lambda: self._xr.destroy_session(self._handle)):
             try:

@@ -39,8 +39,7 @@ def moved_by(changed: str, kind: str) -> bool:
 def open_play_space(instance: Instance, session: Any) -> Space:
     """Play space: y = 0 is the floor, as the runtime knows it or as a standing eye suggests."""
     xr = instance.xr
-    offered = {kind for kind in KINDS if int(getattr(xr.ReferenceSpaceType, kind)) in
-               {int(each) for each in xr.enumerate_reference_spaces(session)}}  # fmt: skip
+    offered = _offered(xr, session)
     if LOCAL_FLOOR not in instance.extensions:
         offered.discard("LOCAL_FLOOR")
     try:
@@ -54,6 +53,18 @@ def open_play_space(instance: Instance, session: Any) -> Space:
 def open_head_space(instance: Instance, session: Any) -> Space:
     """Between the eyes."""
     return _open(instance.xr, session, "VIEW", IDENTITY)
+
+
+def open_stage(instance: Instance, session: Any) -> Space | None:
+    """The middle of the room that is free to walk in; None where there is no such thing."""
+    xr = instance.xr
+    return _open(xr, session, "STAGE", IDENTITY) if "STAGE" in _offered(xr, session) else None
+
+
+def _offered(xr, session: Any) -> set[str]:
+    """Of KINDS."""
+    known = {int(each) for each in xr.enumerate_reference_spaces(session)}
+    return {kind for kind in KINDS if int(getattr(xr.ReferenceSpaceType, kind)) in known}
 
 
 def locate(xr, space: Space, base: Space, time_ns: int) -> tuple[Pose, bool, bool] | None:

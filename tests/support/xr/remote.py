@@ -47,14 +47,24 @@ class Controller:
     stick: tuple[float, float] = (0.0, 0.0)
     pressed: set[str] = field(default_factory=set)  # of BUTTONS
     there: bool = True
+    follows: bool = False  # its fingers are seen: the runtime makes joints of `curls`
+    curls: tuple[float, ...] = (0.0,) * 5  # of the fingers, little to thumb, 0 straight
 
     def message(self) -> bytes:
-        still = (0.0,) * 11  # velocity, turning, five fingers
+        still = (*(0.0,) * 6, *self.curls)  # velocity, turning, five fingers
         fingers, pad = (self.trigger, self.squeeze, self.squeeze), (0.0, 0.0, 0.0)
         clicks = [name in self.pressed for name in BUTTONS]
         where = pose7(self.position, self.wxyz)
         return struct.pack(
-            CONTROLLER, *where, *still, *fingers, *self.stick, *pad, False, self.there, *clicks
+            CONTROLLER,
+            *where,
+            *still,
+            *fingers,
+            *self.stick,
+            *pad,
+            self.follows,
+            self.there,
+            *clicks,
         )
 
 

@@ -202,12 +202,13 @@ class Program:
 
 
 def start_program(
-    stand: Stand, *arguments: str, reports: bool = True, **environment: str
-) -> Program:
-    """`launch.py vr` with its lines and output, and its report, in the stand's folder."""
+    stand: Stand, *arguments: str, reports: bool = True, program: Path = ROOT / "launch.py",
+    **environment: str,
+) -> Program:  # fmt: skip
+    """`launch.py vr`, or a program like it; its lines, output and report in the stand's folder."""
     out = ["--lines", stand.folder / "lines.jsonl"]
     out += ["--report", stand.folder / "report.json"] if reports else []
-    command = [sys.executable, ROOT / "launch.py", "vr", *arguments, *out]
+    command = [sys.executable, program, "vr", *arguments, *out]
     with (stand.folder / "told.txt").open("wb") as told:
         process = subprocess.Popen(
             [str(part) for part in command],
