@@ -316,7 +316,7 @@ def choose_scale(
     level = (low + high) / 2 if options.level is None else options.level
     span = high - low if options.span is None else options.span
     if not -1e6 <= level <= 1e6:
-        raise UsageError(f"--level is {level:g}, expected a value.")
+        raise UsageError(f"--level is {level:g}, expected a value up to 1e6 either way.")
     return ColorScale(level - span / 2, level + span / 2, palette)
 
 

@@ -53,7 +53,8 @@ class Mark:
             )
         if self.kind == "circle" and not 0 < self.radius_m <= FARTHEST:
             raise ValueError(
-                f"the circle '{self.name}' has the radius {self.radius_m}; metres are wanted."
+                f"the circle '{self.name}' has the radius {self.radius_m:.3g}; metres above 0 "
+                "are wanted."
             )
         if self.kind == "box" and not _is_convex(points):
             raise ValueError(f"the box '{self.name}' has eight corners that are none of a box.")
@@ -102,7 +103,8 @@ class Isotherm:
         """Refuses what bounds nothing: ValueError, one sentence."""
         if not self.low < self.high:
             raise ValueError(
-                f"an isotherm goes from {self.low:g} to {self.high:g}; the lower value first."
+                f"an isotherm goes from {self.low:g} to {self.high:g}; two numbers are wanted, the "
+                "lower value first."
             )
 
     def holds(self, values: np.ndarray) -> np.ndarray:

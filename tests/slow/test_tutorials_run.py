@@ -25,7 +25,12 @@ BLOCK = re.compile(
 )
 LEAVES = {
     "photos.md": ["out/first.shift", "out/first/0002_x1.000.png", "out/first_rgb.spz"],
-    "thermal.md": ["out/thermal/0001_x0.250.png", "out/lens/0000_x0.000.png", "out/heat.spz"],
+    "thermal.md": [
+        "out/thermal/0001_x0.250.png",
+        "out/lens/0000_x0.000.png",
+        "out/heat.spz",
+        "out/alarms.png",
+    ],
     "objects.md": [
         "out/cut/workshop.scene.json",
         "out/cut/isolated/0001_x1.000.png",

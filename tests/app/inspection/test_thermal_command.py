@@ -33,8 +33,10 @@ from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.inspection.marks import Isotherm, Mark, read_mark, spot_at
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.models import make_random_model
 from tests.support.scene.warm_wall import STOPS, celsius_at, traced, wall_view, write_wall
+from tests.support.splat_scenes import one_splat
 
 PIXEL_C = 0.8  # °C across a pixel, 15 mm: splats in order lean to the nearer ones by less
 NO_GL = ("--context", "none")
@@ -255,3 +257,24 @@ def test_the_held_out_error_is_what_the_photos_are_off_by(wall, tmp_path):
         train = tuple(replace(photo, split="train") for photo in photos)
         with pytest.raises(BadFile, match="is held out for testing"):
             held_out_error(renderer, thermal_stop, document, replace(capture, photos=train))
+
+
+def test_what_has_no_heat_hides_heat_and_has_none(wall, drawn):
+    """A white ball before the wall: unknown where it is, the wall's degrees around it."""
+    ball = SceneObject("ball", one_splat(means=[[0, 0, 0.4]], opacity=[0.99]))
+    document = Document(Scene((SceneObject("wall", read_model(wall), x=1.0), ball)))
+    with open_renderer("none", "tiles") as (renderer, _):
+        values = draw_values(renderer, thermal_scene(document), wall_view())
+    assert not values.known[36, 48] and values.known[36, 20]
+    beside = np.s_[15:-15, 15:25]
+    assert np.abs(values.values - drawn.values)[beside].max() < 0.2
+    spot = Mark("Sp1", "spot", np.zeros((1, 3)))
+    assert read_mark(spot, values).samples == 0
+
+
+def test_objects_that_mean_another_range_are_refused(wall):
+    model = read_model(wall)
+    other = replace(model, stops=(STOPS[0], replace(STOPS[1], value_range=(0.0, 50.0))))
+    pair = (SceneObject("a", model), SceneObject("b", other))
+    with pytest.raises(UsageError, match="different palettes, ranges or units"):
+        thermal_scene(Document(Scene(pair)))
