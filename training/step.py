@@ -16,6 +16,7 @@ from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.depth_loss import DepthTerm
 from shapeshift.training.losses.losses import ImageLoss, Target
 from shapeshift.training.losses.min_opacity import SHARE, add_min_opacity_gradient
+from shapeshift.training.losses.min_scale import MinScale
 
 
 class TrainingStep:
@@ -27,6 +28,7 @@ class TrainingStep:
         self.activation = Activation(device, layout, voxel)
         self.rows = None  # (R,) int32 on the device: the anchors of the last drawing; None: all
         self.gathered: dict[str, object] = {}  # what the optimiser has of these, by group
+        self.min_scale: MinScale | None = None  # where splats have a least size
         self.pose_gradient: PoseGradient | None = None  # where poses are refined
         self.ms: dict[str, float] | None = None  # of each pass, summed; a dict switches it on ...
         self.clock = time.perf_counter  # ... by this clock, seconds
@@ -88,6 +90,8 @@ class TrainingStep:
         with self.timed("heads backward"):
             if min_opacity_share:
                 add_min_opacity_gradient(device, drawing.splats, grad, min_opacity_share)
+            if self.min_scale is not None:
+                self.min_scale.add_gradient(drawing.splats, grad, self.rows)
             grads = self.backward(grad)
         if self.pose_gradient is not None:
             with self.timed("pose"):

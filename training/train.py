@@ -26,6 +26,7 @@ from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.min_scale import MinScale
 from shapeshift.training.photos import (
     BLACK,
     LoadedPhoto,
@@ -113,11 +114,14 @@ class Trainer(Run):
         self.photo_contrast: dict[tuple, float] = {}
         refined = by_modality if settings.poses == "refine" else {}
         self.poses = PoseRefinement(refined)
+        views = [photo.view for photo in photos]
+        self.min_scale = MinScale(device, views, self.layout.splats, settings.min_scale_px)
         if resume is None:
             self.initialise(photos, report)
         else:
             self.restore(*resume)
         self.step = TrainingStep(device, self.layout, self.voxel, self.adam)
+        self.step.min_scale = self.min_scale
         self.step.pose_gradient = PoseGradient(device) if refined else None
         self.guard = DivergenceGuard(self.adam.state() | self.poses.state())
         self.next_snapshot = self.iteration + SNAPSHOT_EVERY
@@ -142,6 +146,7 @@ class Trainer(Run):
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.rate_scale, self.run_length = 1.0, settings.iterations
         self.adam = Adam(self.device, values, self.all_rates())
+        self.min_scale.look(self.adam["anchors"])
         self.stats, self.visibility = self.fresh_statistics(count)
 
     def fresh_statistics(self, count: int) -> tuple[DensificationStats, Visibility]:
@@ -167,6 +172,7 @@ class Trainer(Run):
         self.visibility.load(state)
         self.exposures.load(state)
         self.poses.load(state)
+        self.min_scale.load(state, self.adam["anchors"])
 
     def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
         """(state, notes) from which `resume` goes on to the same bits."""
@@ -178,7 +184,8 @@ class Trainer(Run):
             "lr_warmup_start": self.lr_warmup.start,
         }  # fmt: skip
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
-        return self.adam.state() | known | self.poses.state(), notes
+        known |= self.poses.state() | self.min_scale.state()
+        return self.adam.state() | known, notes
 
     @property
     def anchors_count(self) -> int:
@@ -313,6 +320,7 @@ class Trainer(Run):
         """Another state, of perhaps other anchors; all as it was where memory does not suffice."""
         fresh = self.fresh_statistics(len(state["anchors.value"]))
         self.adam.load(state)
+        self.min_scale.look(self.adam["anchors"])
         self.poses.load(state)
         self.stats, self.visibility = fresh
 
