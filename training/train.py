@@ -38,7 +38,11 @@ from shapeshift.training.run import SETTLE, Run
 from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
 from shapeshift.training.settings import Rates, TrainSettings
 from shapeshift.training.step import TrainingStep
-from shapeshift.training.supervision.backgrounds import background_warning, choose_background
+from shapeshift.training.supervision.backgrounds import (
+    background_warning,
+    choose_background,
+    has_one_exposure,
+)
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
 from shapeshift.training.view_checks import validate_views
@@ -109,7 +113,7 @@ class Trainer(Run):
         self.layout = settings.layout(self.encoding.d)
         self.anchor_cap = anchor_cap(settings, self.layout, self.encoding, self.stops)
         self.targets = Targets(device)
-        self.exposures = Exposures(device, by_modality)
+        self.exposures = Exposures(device, by_modality, has_one_exposure(photos))
         self.lr_warmup = LrWarmup()
         self.photo_contrast: dict[tuple, float] = {}
         refined = by_modality if settings.poses == "refine" else {}

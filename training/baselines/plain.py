@@ -34,7 +34,7 @@ from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.run import SETTLE, Run
 from shapeshift.training.schedule import Budget, Schedule
-from shapeshift.training.supervision.backgrounds import choose_background
+from shapeshift.training.supervision.backgrounds import choose_background, has_one_exposure
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
 
@@ -83,7 +83,7 @@ class PlainTrainer(Run):
         self.schedule = Schedule({self.stop.name: photos}, settings.seed, background)
         self.extent = extent_of([p.view for p in photos])
         self.targets = Targets(device)
-        self.exposures = Exposures(device, self.schedule.photos)
+        self.exposures = Exposures(device, self.schedule.photos, has_one_exposure(photos))
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, 1.0
         self.adam = Adam(device, self.first_values(photos, report), self.all_rates())

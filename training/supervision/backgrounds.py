@@ -10,6 +10,7 @@ BACKDROP = 0.06  # display sRGB: a photographed backdrop is lit unevenly, see do
 EDGE = 0.02  # of a photo's sides: its outermost pixels, where a subject stands before something
 ALIKE = 0.7  # of these, in every modality, that have the colour: some photos cut their subject
 EMPTY = 0.2  # of all pixels, at least, that have it: the black rims of undistorted photos are fewer
+DARK = 0.5  # of the brightest channel: a darker backdrop looks much alike at every exposure
 Background = tuple[float, float, float]
 
 
@@ -48,6 +49,16 @@ def shared_color(photos: list[LoadedPhoto] | tuple) -> Background | None:
         return None
     empty = [near(photo.rgba[..., :3], color).mean() for photo in photos]
     return tuple((color / 255).tolist()) if np.mean(empty) >= EMPTY else None
+
+
+def has_one_exposure(photos: list[LoadedPhoto] | tuple) -> bool:
+    """Whether a bright backdrop in all photos has one colour: then they have one exposure.
+
+    What else differs is no camera's doing: an object on a turntable turns in its light, and photos
+    evened out by that would have as many backdrops as gains.
+    """
+    color = shared_color(photos)
+    return color is not None and max(color) >= DARK
 
 
 def background_warning(color: Background) -> str:

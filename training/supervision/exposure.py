@@ -34,8 +34,11 @@ NONE: Gain = (1.0, 1.0, 1.0)
 class Exposures:
     """The gains of a run's photos."""
 
-    def __init__(self, device, photos: dict[str, list[LoadedPhoto]]) -> None:
-        self.device = device
+    def __init__(
+        self, device, photos: dict[str, list[LoadedPhoto]], one_exposure: bool = False
+    ) -> None:
+        """one_exposure: the photos are known to have it, and none is looked at."""
+        self.device, self.one_exposure = device, one_exposure
         self.kernel = device.program(KERNELS / "exposure.cl")["exposure_rows"]
         names = [(photo.modality, photo.name) for each in photos.values() for photo in each]
         self.row = {name: row for row, name in enumerate(names)}
@@ -63,6 +66,8 @@ class Exposures:
 
     def has_begun(self, fraction: float, step: int) -> bool:
         """Whether photos are looked at, at this share of the run and after so many steps."""
+        if self.one_exposure:
+            return False
         return fraction >= self.begin or step >= self.begin_step
 
     def reset(self, fraction: float, step: int) -> None:

@@ -13,9 +13,11 @@ from shapeshift.training.evaluation.evaluate import known_background
 from shapeshift.training.photos import LoadedPhoto, load_photos
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import (
+    DARK,
     EMPTY,
     background_warning,
     choose_background,
+    has_one_exposure,
     rim_of,
     shared_color,
 )
@@ -52,6 +54,16 @@ def test_a_subject_before_one_colour(rgb):
     assert choose_background("auto", None, photos) == shared_color(photos)
     assert choose_background("auto", (0.5, 0, 0), photos) == (0.5, 0, 0)
     assert choose_background("random", None, photos) is None
+
+
+@pytest.mark.parametrize("level", [0, round(255 * DARK) - 1, round(255 * DARK), 255])
+def test_a_bright_backdrop_tells_that_all_photos_have_one_exposure(level):
+    """A dark one does not: black is black at every exposure."""
+    photos = [photo((level, 0, 0), subject=(0, 30, 25, 35 + i)) for i in range(3)]
+    assert has_one_exposure(photos) == (level >= 255 * DARK)
+    brighter = replace(photos[0], rgba=photos[0].rgba // 2)
+    assert not has_one_exposure([*photos[1:], brighter])
+    assert not has_one_exposure([])
 
 
 def test_light_that_differs_by_up_to_six_hundredths_is_the_same_colour():

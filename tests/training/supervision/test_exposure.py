@@ -132,6 +132,13 @@ def test_a_model_that_does_not_show_the_photos_says_nothing_of_them(device, like
     assert (exposures.gain(photos[0]) != NONE) == counts == bool(exposures.warnings())
 
 
+def test_photos_of_one_exposure_are_not_looked_at(device):
+    """However far the run is: what the model shows wrongly must not become a gain."""
+    photos = {"RGB": [photo_of(opaque(np.full((4, 4, 3), 128, np.uint8)))]}
+    assert Exposures(device, photos).has_begun(FROM, 0)
+    assert not Exposures(device, photos, one_exposure=True).has_begun(1.0, 1 << 30)
+
+
 def test_few_or_unknown_photos_are_left_as_they_are(device):
     logs = np.array([-0.5, 0.5] * FEWEST)[:FEWEST, None] * np.ones(3)
     exposures, photos = known(device, logs)
