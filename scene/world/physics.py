@@ -288,9 +288,8 @@ class Physics:
         )
         rules = self._world.integration_parameters
         rules.dt = 1 / self.hz / substeps
-        starts = [
-            (hold, self._world.rigid_bodies[hold.hand].position) for hold in self._holds.values()
-        ]
+        hands = self._world.rigid_bodies
+        starts = [(hold, hands[hold.hand].position) for hold in self._holds.values()]
         tally = ContactTally(self._world, self._ids, -self._world.gravity.y)
         for k in range(substeps):
             move_hands(self._world, starts, (k + 1) / substeps)

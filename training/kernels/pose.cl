@@ -3,9 +3,9 @@
 // Writes:  sums (ITEMS, 3): a work-item's share of the gradient by a turn, in the world's axes.
 // Units:   metres; radians.
 //
-// Turned by a small w, a mean m moves by w x (m - eye), a quaternion q by half of the product (0, w)
-// q: so the gradient by w is (m - eye) x dL/dm, and half of what dL/dq has of that product.  Culled
-// splats' gradients are zero; their means may be NaN, so they are left out, not multiplied.
+// Turned by a small w, a mean m moves by w x (m - eye), a quaternion q by half of the product
+// (0, w) q: so the gradient by w is (m - eye) x dL/dm, and half of what dL/dq has of that product.
+// Culled splats' gradients are zero; their means may be NaN, so they are left out, not multiplied.
 __kernel void turn_gradient(int count, int each, float eye_x, float eye_y, float eye_z,
                             __global const float *means, __global const float *wxyz,
                             __global const float *by_means, __global const float *by_wxyz,
