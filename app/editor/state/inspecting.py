@@ -175,7 +175,7 @@ class Inspecting:
     def rename(self, name: str, text: str) -> bool:
         """False where the text is no name, or another mark's."""
         text = text.strip()
-        if text == name or text != name_line(text) or text in (m.name for m in self.file.marks):
+        if not text or text != name_line(text) or text in (m.name for m in self.file.marks):
             return False
         marks = tuple(replace(m, name=text) if m.name == name else m for m in self.file.marks)
         pairs = tuple(

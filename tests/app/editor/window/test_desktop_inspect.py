@@ -158,7 +158,13 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
     hands.move(*on_wall(viewer, 0.0, 0.25))
     hands.key("Delete")
     assert [m.name for m in tool.file.marks] == ["Sp1", "Ar1"]
-    assert tool.rename("Sp1", "Motor") and not tool.rename("Ar1", "Motor")
+    hands.click(*widgets.middle("Sp1"))
+    hands.click(*widgets.middle("##name of Sp1"))
+    hands.key("a", "Control_L")
+    hands.type("Motor")
+    hands.key("Return")
+    assert [m.name for m in tool.file.marks] == ["Motor", "Ar1"] and tool.on
+    assert not tool.rename("Ar1", "Motor") and not tool.rename("Ar1", " ")
 
     # Saved beside the scene by the button alone, then read when it is opened.
     beside = marks_path(wall)
