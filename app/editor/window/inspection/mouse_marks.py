@@ -46,7 +46,7 @@ KEYS = (
     ("Shift+drag", "a line on the surface"),
     ("Delete", "delete the chosen mark"),
     ("Esc", "choose no mark, leave"),
-    ("drag a handle of the scale", "the ends of the palette"),
+    ("scale", "drag a handle: an end of the palette"),
 )
 STILL_S = 0.25  # so long nothing must move before a view is measured
 MOST_PX = 640  # longer side of the picture that is measured
@@ -299,7 +299,7 @@ class MouseMarks:
         value, depth = tool.pointed
         words = words_of(value, tool.picture, self._seen.unit())
         if np.isfinite(value):
-            words += f"  {depth:.2f} m"
+            words += f"  {depth * tool.file.metres_per_unit:.2f} m"
         if not shows or box is None:
             x, y = self._window.cursor
             draw_words(words, (x + 14 * ui_scale, y + 10 * ui_scale), ui_scale)
