@@ -172,7 +172,7 @@ class Inspecting:
         self.chosen = ""
         self.edit(replace(self.file, marks=marks, differences=pairs))
 
-    def rename(self, name: str, text: str) -> bool:
+    def name_mark(self, name: str, text: str) -> bool:
         """False where the text is no name, or another mark's."""
         text = text.strip()
         if not text or text != name_line(text) or text in (m.name for m in self.file.marks):
@@ -262,7 +262,7 @@ class Inspecting:
 
     # ---- files
 
-    def save(self) -> None:
+    def keep(self) -> None:
         """Writes NAME.marks.json beside the scene; says why not, or where."""
         state, path = self._state, self._path
         if path is None:

@@ -65,7 +65,7 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
     }
     clicked = button_row(tips, ui_scale, 2)
     if clicked == "Save marks":
-        tool.save()
+        tool.keep()
     elif clicked:
         actions.report()
 
@@ -109,7 +109,7 @@ def _chosen(tool: Inspecting, ui_scale: float) -> None:
         f"##name of {name}", name, imgui.InputTextFlags_.enter_returns_true
     )
     tip("Its name; Enter takes it over.", ui_scale)
-    if done and not tool.rename(name, text) and text != name:
+    if done and not tool.name_mark(name, text) and text != name:
         imgui.set_keyboard_focus_here(-1)
     imgui.same_line()
     if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:

@@ -164,7 +164,7 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
     hands.type("Motor")
     hands.key("Return")
     assert [m.name for m in tool.file.marks] == ["Motor", "Ar1"] and tool.on
-    assert not tool.rename("Ar1", "Motor") and not tool.rename("Ar1", " ")
+    assert not tool.name_mark("Ar1", "Motor") and not tool.name_mark("Ar1", " ")
 
     # Saved beside the scene by the button alone, then read when it is opened.
     beside = marks_path(wall)
@@ -184,7 +184,7 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
     # Somebody else's file is not written over.
     beside.write_text(json.dumps({"shapeshift_marks": 1, "marks": []}))
     tool.delete("Motor")
-    tool.save()
+    tool.keep()
     assert "somebody else" in state.problem and tool.unsaved
     assert not tool.may_close() and tool.may_close()  # told once
 
