@@ -45,6 +45,8 @@ def open_image(path: Path) -> Image.Image:
         raise BadFile(
             f"{path}: the image file is missing; put it there or drop the frame"
         ) from None
+    except BadFile:  # of a grid, in its own words
+        raise
     except (UnidentifiedImageError, Image.DecompressionBombError, *BROKEN) as error:
         raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
 

@@ -1,5 +1,6 @@
 """The range of thermal photos that are numbers, where the capture states none: from themselves."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from shapeshift.scene.captures.photo import FLOATS, GREY_16, numbers_of, open_im
 
 LOOKED_AT = 24  # photos of a modality
 PERCENTILES = (0.1, 99.9)  # between which the range begins; a dead pixel is beyond
+LARGEST = 1e9  # of a value that anybody measures
 MARGIN = 0.05  # of what lies between, added at each end: the hottest spot is not cut off
 
 
@@ -39,7 +41,7 @@ def with_own_ranges(
         ends = stop.value_range or _own_range(mine)
         photos = [replace(p, counts=ends) if p.modality == stop.name else p for p in photos]
         unit = stop.unit or ("°C" if kind == "radiometric" else "")
-        palette = stop.palette or ("ironbow" if kind == "radiometric" else "")
+        palette = stop.palette or "ironbow"  # without one values are no scale
         out.append(replace(stop, value_range=ends, unit=unit, palette=palette))
     return tuple(out), photos, tuple(doubts)
 
@@ -63,5 +65,12 @@ def _own_range(photos: list[Photo]) -> tuple[float, float]:
     if not len(every):
         raise BadFile(f"{some[0].path}: no number in it nor in the others; copy them again")
     low, high = np.percentile(every.astype(np.float64), PERCENTILES)
+    if not max(abs(low), abs(high)) <= LARGEST:
+        raise BadFile(
+            f"{some[0].path}: numbers up to {high:.3g}; say with 'value_range' what counts"
+        )
     more = MARGIN * (high - low) or 0.5
-    return float(low - more), float(high + more)
+    digits = 2 - math.floor(math.log10(high - low + 2 * more))  # three of the range, outwards
+    step = 10.0**-digits
+    ends = (math.floor((low - more) / step) * step, math.ceil((high + more) / step) * step)
+    return round(ends[0], digits), round(ends[1], digits)

@@ -13,7 +13,7 @@ from shapeshift.scene.captures.number_photos import (
     open_grid,
     radiometric_celsius,
 )
-from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.photo import load_photo, open_image
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
 from tests.support.scene.captures import simple, write_transforms
@@ -59,11 +59,14 @@ def test_a_range_that_nobody_states_is_that_of_the_photos(tmp_path, ending):
     scale = 100.0 if ending == ".png" else 1.0  # 16 bits: counts, whatever they mean
     low, high = np.array(heat.value_range) / scale
     assert 20 - 4 < low < 20 and 86 < high < 86 + 4
+    assert heat.palette == "ironbow"
     assert heat.unit == ("°C" if ending == ".jpg" else "")
     for i in (0, 3):
         grey = load_photo(capture.photos[i]).rgb[..., 0].astype(float)
         shown = low + (high - low) * grey / 255
         assert np.abs(shown - RAMP - 2 * i).max() < 0.5 * (high - low) / 255 + 0.02  # a count
+    shown = 100.0 if ending == ".png" else 1.0
+    assert heat.value_range == (1690 * shown / 100, 8910 * shown / 100)  # in three digits
     write_capture(capture)  # says the range from now on
     assert read_capture(tmp_path).stops[-1].value_range == heat.value_range
 
@@ -151,5 +154,8 @@ def test_an_npy_that_is_no_grid_is_refused(tmp_path, values):
         open_grid(tmp_path / "a.npy")
     assert "\n" not in str(refused.value)
     (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\x01\x00")
-    with pytest.raises(BadFile, match=r"a\.npy: "):
-        open_grid(tmp_path / "a.npy")
+    with pytest.raises(BadFile, match=r"^a\.npy: |/a\.npy: ") as refused:
+        open_image(tmp_path / "a.npy")
+    assert "PNG" not in str(refused.value)  # its own sentence, not that of a picture
+    with pytest.raises(BadFile, match="missing"):
+        open_image(tmp_path / "b.npy")
