@@ -27,7 +27,7 @@ from shapeshift.renderer.colors.palette import (
     behind,
     over_background,
     overlay_heat,
-    palette_colors,
+    palette_between,
 )
 from shapeshift.renderer.colors.tint import tinted
 from shapeshift.renderer.colors.two_looks import (
@@ -307,7 +307,8 @@ class Renderer:
         colors = self._ways[i]
         if not (self.drawing.draws_heat and colors.way == BESIDE):
             return self.drawing.image(i)
-        return overlay_heat(self.drawing.image(i), self.drawing.heat(i), colors.palette)
+        ends = self.settings.heat_ends
+        return overlay_heat(self.drawing.image(i), self.drawing.heat(i), colors.palette, ends)
 
     def resolved(self, i: int = 0, out: np.ndarray | None = None) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background,
@@ -315,12 +316,13 @@ class Renderer:
         """
         if self._debug:
             return bilinear(self._debug[i][0], self._views[i].size)
-        colors, view = self._ways[i], self._views[i]
+        colors, view, ends = self._ways[i], self._views[i], self.settings.heat_ends
         rgba = bilinear(self.drawing.image(i), view.size)
         if self.drawing.draws_heat and colors.way == BESIDE:
-            rgba = overlay_heat(rgba, bilinear(self.drawing.heat(i), view.size), colors.palette)
+            heat = bilinear(self.drawing.heat(i), view.size)
+            rgba = overlay_heat(rgba, heat, colors.palette, ends)
         elif colors.way == PICTURE:
-            rgba = apply_palette(rgba, colors.palette)
+            rgba = apply_palette(rgba, colors.palette, ends)
         return over_background(rgba, behind(self.settings.background, view), out)
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
@@ -328,7 +330,7 @@ class Renderer:
         if self._resolve is None:
             raise ValueError("this renderer has no GL context to present with; use resolved().")
         name = "" if self._debug else self._ways[i].palette
-        palette = palette_colors(name) if name else None
+        palette = palette_between(name, self.settings.heat_ends) if name else None
         image = opaque(self._debug[i][0]) if self._debug else self.drawing.presentable(i)
         heat = self.drawing.presentable_heat(i) if self.drawing.draws_heat and name else None
         background, view = self.settings.background, self._views[i]

@@ -56,6 +56,9 @@ class RenderSettings:
     recolor_degrees: float = 0.0  # colours again after the eye has moved so far around an object
     skip_unseen: bool = False  # no colours (Scaffold-GS: nothing) for anchors that no view can see
 
+    # Shares of a thermal stop's range that the ends of its palette stand for: level and span.  Not
+    # where several palettes show at once, which have no one picture of values.
+    heat_ends: tuple[float, float] = (0.0, 1.0)
     debug: str = ""  # one of DEBUG_VIEWS instead of the picture
 
     def __post_init__(self) -> None:
@@ -68,6 +71,9 @@ class RenderSettings:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; choose one of {text}.")
         if not isinstance(self.background, Sky):
             check_color(self.background, "background")
+        low, high = self.heat_ends
+        if not -1e6 <= low < high <= 1e6:
+            raise ValueError(f"heat_ends are {low:g} and {high:g}, expected the lower one first.")
         for name, least, most in (
             ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
             ("min_transmittance", 1e-6, 0.1), ("depth_scale", 0.0, 1.0),

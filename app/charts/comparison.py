@@ -9,16 +9,19 @@ from shapeshift.scene.pose import View
 
 REST_S = 0.4  # so long nothing must move before two frames are spent on a comparison
 MOST_DB = 200.0  # for pictures that are equal
-NO_SHORTCUTS = ("background", "debug")  # fields that cost neither time nor likeness
+NO_SHORTCUTS = ("background", "debug", "heat_ends")  # fields that cost neither time nor likeness
 
 
 def exact(settings: RenderSettings, drawing: str) -> RenderSettings:
-    """The setting that leaves nothing out, over the same background.
+    """The setting that leaves nothing out, over the same background and in the same
+    colours of heat.
 
     `drawing` is what the renderer draws with: quads blend into float32 then, tiles always do.
     """
     target = "rgba32f" if drawing.startswith("quads") else settings.target
-    return RenderSettings(background=settings.background, target=target)
+    return RenderSettings(
+        background=settings.background, target=target, heat_ends=settings.heat_ends
+    )
 
 
 def is_exact(settings: RenderSettings, drawing: str) -> bool:

@@ -62,6 +62,13 @@ def inspect_view(
     return InspectedView(values, photo, photo_stop, (), (), ())
 
 
+def first_photo(document: Document, thermal: ThermalScene) -> str:
+    """The stop that is shown beside the heat: the first that is not thermal; "": there is none."""
+    stops = (stop for model in document.models for stop in model.stops)
+    others = (s.name for s in stops if s.kind != "thermal" and s.name != thermal.stop.name)
+    return next(others, "")
+
+
 def with_readings(inspected: InspectedView, file: MarksFile) -> InspectedView:
     """The view with what it reads of all marks, differences and isotherms of a file."""
     values = inspected.values

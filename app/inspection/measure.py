@@ -36,8 +36,10 @@ class Options(ReadingOptions):
     area: Annotated[tuple[str, ...], Opt(metavar="PLACE")] = ()
     """Three places or more: the corners of a polygon, in order.  Default: not measured."""
     known: tuple[str, str, str] | None = None
-    """Two places and the metres between them: all lengths are scaled so.  Default: lengths are
-    those of the scene."""
+    """Two places and the metres between them: all lengths are scaled so.  Default: the scale in
+    NAME.marks.json beside the scene, else lengths are those of the scene."""
+    save: bool = False
+    """Keep the scale of --known in NAME.marks.json beside the scene."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands: shapes may differ.  Default: the first stop, and in a scene file
     what it says for each object."""
@@ -67,7 +69,9 @@ def run(options: Options) -> int:
     from shapeshift.app.inspection.draw_values import depth_picture
     from shapeshift.app.terminal import print_json, print_text
 
-    if not any(getattr(options, kind) for kind in KINDS):
+    if options.save and options.known is None:
+        raise UsageError("--save keeps the scale of a known length; name one: --known A B METRES.")
+    if not (options.save or any(getattr(options, kind) for kind in KINDS)):
         raise UsageError(f"nothing is to be measured; add --{', --'.join(KINDS[:-1])} or --area.")
     size = parse_size(options.size) if options.size else None
     cameras = None
@@ -78,12 +82,14 @@ def run(options: Options) -> int:
     view = choose_view(options, document, cameras, size)
     with open_renderer(options.context, options.drawing) as (renderer, _):
         picture = depth_picture(renderer, document.scene, view)
-    found = measurements(options, picture, document.origin)
+    found, scale = measurements(options, picture, document.origin)
+    if options.save:
+        keep_scale(options.scene, scale)
     if options.json:
         rows = [{"kind": m.kind, "value": m.value, "uncertainty": m.uncertainty, "unit": m.unit}
                 for m in found]  # fmt: skip
         print_json({"measurements": rows})
-    else:
+    elif found:
         print_text("\n".join(f"{each.kind}: {each}" for each in found))
     return 0
 
@@ -104,35 +110,72 @@ def choose_view(options: Options, document: "Document", cameras, size) -> "View"
 
 def measurements(
     options: Options, picture: "ValuePicture", origin: "np.ndarray"
-) -> "list[Measurement]":
-    """What the options ask for, in the order of KINDS.  Raises UsageError, one sentence."""
+) -> "tuple[list[Measurement], Scale]":
+    """What the options ask for, in the order of KINDS, and the scale of its lengths.
+
+    Raises UsageError, BadFile, one sentence.
+    """
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.inspection.lengths import measure
 
     try:
         scale = known_scale(options, picture, origin)
-        return [
+        found = [
             measure(kind, [point_of(text, picture, origin, f"--{kind}") for text in texts], scale)
             for kind in KINDS
             if (texts := getattr(options, kind))
         ]
+        return found, scale
     except ValueError as error:
         raise UsageError(str(error)) from None
 
 
 def known_scale(options: Options, picture: "ValuePicture", origin: "np.ndarray") -> "Scale":
-    """What --known says.  Raises UsageError, ValueError."""
+    """What --known says, else the marks beside the scene.  Raises UsageError, BadFile,
+    ValueError.
+    """
     from shapeshift.app.errors import UsageError
     from shapeshift.app.inspection.mark_texts import parse_numbers
+    from shapeshift.app.terminal import say
     from shapeshift.scene.inspection.lengths import Scale
+    from shapeshift.scene.inspection.marks_file import kept_scale, marks_path
 
     if options.known is None:
-        return Scale()
+        factor = kept_scale(options.scene)
+        if factor != 1:
+            say(
+                f"Lengths are multiplied by {factor:.6g}, as {marks_path(options.scene).name} says."
+            )
+        return Scale(factor)
     numbers = parse_numbers(options.known[2], "--known")
     if len(numbers) != 1:
         raise UsageError(f"--known ends with '{options.known[2]}', expected metres.")
     ends = [point_of(text, picture, origin, "--known") for text in options.known[:2]]
     return Scale.of_known(ends, numbers[0])
+
+
+def keep_scale(scene: Path, scale: "Scale") -> None:
+    """Writes it into the marks beside the scene.  Raises UsageError, BadFile."""
+    from dataclasses import replace
+
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.paths import full, is_bundled
+    from shapeshift.app.terminal import say
+    from shapeshift.scene.inspection.marks_file import (
+        MarksFile,
+        marks_path,
+        read_marks_file,
+        write_marks_file,
+    )
+
+    path = marks_path(scene)
+    if is_bundled(path):
+        raise UsageError(f"{scene.name} came with the program; copy it into a folder of yours.")
+    if not 1e-6 <= scale.factor <= 1e6:
+        raise UsageError(f"the scale is {scale.factor:g}, expected 1e-6 to 1e6; check --known.")
+    file = read_marks_file(path) if path.exists() else MarksFile()
+    write_marks_file(replace(file, metres_per_unit=scale.factor), path)
+    say(f"scale {scale.factor:.6g} kept in {full(path)}")
 
 
 def point_of(text: str, picture: "ValuePicture", origin: "np.ndarray", said: str) -> "Point":

@@ -87,7 +87,7 @@ def with_marks(
     for reading in readings:
         if not reading.samples:
             continue
-        outline = _outline(reading, picture, height)
+        outline = outline_of(reading, picture, height)
         for color, width in ((BEHIND, 3), (LINE, 1)):
             for line in outline:
                 draw.line([tuple(p) for p in line], fill=color, width=width)
@@ -108,8 +108,8 @@ def with_marks(
     return np.asarray(drawn, np.float32) / 255
 
 
-def _outline(reading: MarkReading, picture: ValuePicture, size: int) -> list[np.ndarray]:
-    """Lines (n, 2) of pixels that show where a mark is."""
+def outline_of(reading: MarkReading, picture: ValuePicture, size: int) -> list[np.ndarray]:
+    """Lines (n, 2) of pixels of the picture's view that show where a mark is."""
     mark = reading.mark
     pixels, depth = picture.pixel_of(mark.points)
     if mark.kind == "spot":

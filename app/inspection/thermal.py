@@ -227,6 +227,7 @@ def choose_views(options: Options, document: "Document", cameras, size) -> "list
 def photo_stop(options: Options, document: "Document", thermal: "ThermalScene") -> str:
     """The name of the stop that is shown as the photo; "": none.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
+    from shapeshift.app.inspection.inspect_view import first_photo
 
     stops = [stop for model in document.models for stop in model.stops]
     if options.photo == "none":
@@ -237,8 +238,7 @@ def photo_stop(options: Options, document: "Document", thermal: "ThermalScene") 
             names = ", ".join(dict.fromkeys(stop.name for stop in stops))
             raise UsageError(f"--photo is '{options.photo}'; the scene has {names}.")
         return named[0]
-    others = (s.name for s in stops if s.kind != "thermal" and s.name != thermal.stop.name)
-    return next(others, "")
+    return first_photo(document, thermal)
 
 
 def with_new_marks(

@@ -1,6 +1,6 @@
 """Palettes of thermal stops, and how much of a palette the control value asks for."""
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from shapeshift.scene.scene import Scene
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, used on display values
 STEPS = 256
+ALL_VALUES = (0.0, 1.0)  # shares of a stop's range that the ends of its palette stand for
+LEAST_SHARE = 1 / 1000  # between the two ends
 ROWS = 32  # of a picture at a time: they stay in the cache
 
 # (place in 0..1, display sRGB): what a thermal camera shows, cold to hot; luminance only grows
@@ -108,6 +110,20 @@ def palette_colors(name: str) -> np.ndarray:
     return colors
 
 
+@lru_cache(maxsize=64)
+def palette_between(name: str, ends: tuple[float, float]) -> np.ndarray:
+    """(256, 3) float32 display sRGB: the palette laid between two shares of the range, its first
+    and last colour beyond them; the very table of `palette_colors` for ALL_VALUES.
+    """
+    if ends == ALL_VALUES:
+        return palette_colors(name)
+    low, high = ends
+    share = (np.linspace(0, 1, STEPS) - low) / max(high - low, LEAST_SHARE)
+    colors = palette_values(share, name).astype(np.float32)
+    colors.flags.writeable = False
+    return colors
+
+
 def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
     """(palette name, weight 0..1, stop) of the visible object that is nearest to a thermal stop, or
     has a selector that is: what a legend tells.
@@ -141,23 +157,27 @@ def legend_opacity(weight: float) -> float:
     return min(2 * weight, 1.0)
 
 
-def apply_palette(rgba: np.ndarray, name: str) -> np.ndarray:
+def apply_palette(
+    rgba: np.ndarray, name: str, ends: tuple[float, float] = ALL_VALUES
+) -> np.ndarray:
     """Premultiplied (H, W, 4) with palette[luminance] for its colour; same shape.
 
     The palette colours what is there, not the background: colour is divided by alpha first.
     """
     alpha = rgba[..., 3]
-    false = palette_values((rgba[..., :3] @ LUMINANCE) / np.maximum(alpha, 1e-6), name)
+    false = palette_values((rgba[..., :3] @ LUMINANCE) / np.maximum(alpha, 1e-6), name, ends)
     shown = [false * alpha[..., None], alpha[..., None]]
     return np.concatenate(shown, axis=-1).astype(rgba.dtype)
 
 
-def overlay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
+def overlay_heat(
+    rgba: np.ndarray, heat: np.ndarray, name: str, ends: tuple[float, float] = ALL_VALUES
+) -> np.ndarray:
     """Premultiplied (H, W, 4) and its heat, (H, W, 2) value and weight, both times alpha:
     with the palette's colour of the value, as much as the weight; as (H, W, 4).
     """
     value, weight = heat[..., 0], heat[..., 1]
-    false = palette_values(value / np.maximum(weight, 1e-6), name)
+    false = palette_values(value / np.maximum(weight, 1e-6), name, ends)
     out = rgba.copy()
     out[..., :3] += false * weight[..., None]
     return out
@@ -191,12 +211,13 @@ def over_background(
     return out
 
 
-def palette_values(values: np.ndarray, name: str) -> np.ndarray:
+def palette_values(
+    values: np.ndarray, name: str, ends: tuple[float, float] = ALL_VALUES
+) -> np.ndarray:
     """(..., 3) display sRGB of values (...), held to 0..1; NaN stays."""
     place = np.clip(values, 0, 1) * (STEPS - 1)
-    return np.stack(
-        [np.interp(place, np.arange(STEPS), c) for c in palette_colors(name).T], axis=-1
-    )
+    colors = palette_between(name, ends)
+    return np.stack([np.interp(place, np.arange(STEPS), c) for c in colors.T], axis=-1)
 
 
 def _gray() -> np.ndarray:

@@ -14,6 +14,7 @@ from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.photo import decoded, over_black
+from shapeshift.scene.captures.value_ranges import with_own_ranges
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
 LARGEST_NUMBER = 1e30  # of a value range: what float32 products hold
@@ -58,6 +59,7 @@ class CaptureWorld:
         doubts: tuple[str, ...] = (),
     ) -> Capture:
         """The finished capture; `guessed` = nobody said what the modalities are."""
+        stops, photos, more = with_own_ranges(stops, photos)
         notes = {"up_in_file": self.up} | (notes or {})
         if background is None:
             background = plain_background(photos)
@@ -75,7 +77,7 @@ class CaptureWorld:
             colors,
             background,
             notes,
-            doubts,
+            doubts + more,
         )
 
 

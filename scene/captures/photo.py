@@ -15,6 +15,12 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lens_resampling import LARGEST, resampled
+from shapeshift.scene.captures.number_photos import (
+    GRIDS,
+    is_radiometric,
+    open_grid,
+    radiometric_celsius,
+)
 from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27
@@ -31,12 +37,16 @@ GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
 def open_image(path: Path) -> Image.Image:
     """The image file, its header read; BadFile when it is missing or no image."""
     try:
+        if path.suffix.lower() in GRIDS:
+            return open_grid(path)
         with quiet():
             return Image.open(path)
     except FileNotFoundError:
         raise BadFile(
             f"{path}: the image file is missing; put it there or drop the frame"
         ) from None
+    except BadFile:  # of a grid, in its own words
+        raise
     except (UnidentifiedImageError, Image.DecompressionBombError, *BROKEN) as error:
         raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
 
@@ -138,7 +148,11 @@ def decoded(
     A JPEG comes smaller by a divisor of `factor`, at most half of it: it is decoded so, which
     costs less and is nearly the mean over the area.
     """
-    with loaded(path, factor, most) as (image, size):
+    own = counts is not None and is_radiometric(path)  # its numbers, not the picture's colours
+    with loaded(path, 1 if own else factor, most) as (image, size):
+        if own:
+            grey = shares(radiometric_celsius(path, size), FLOATS, counts, path)
+            return Image.fromarray(np.rint(255 * grey).astype(np.uint8)), size
         if counts is not None or image.mode in (*GREY_16, FLOATS):
             grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
             return Image.fromarray(np.rint(255 * grey).astype(np.uint8)), size
@@ -173,7 +187,10 @@ def read_pixels(
 
     counts: numbers of a grey photo that stand for 0 and 1.
     """
-    with loaded(path) as (image, _):
+    with loaded(path) as (image, size):
+        if counts is not None and is_radiometric(path):
+            grey = shares(radiometric_celsius(path, size), FLOATS, counts, path)
+            return np.repeat(grey[..., None], 3, axis=2), None
         if counts is not None or image.mode in (*GREY_16, FLOATS):
             grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
             return np.repeat(grey[..., None], 3, axis=2), None
@@ -183,6 +200,14 @@ def read_pixels(
             rgba[..., :3] *= rgba[..., 3:]
             return np.ascontiguousarray(rgba[..., :3]), alpha
         return floats(image, "RGB"), None
+
+
+def numbers_of(photo: Photo) -> np.ndarray:
+    """(H, W) float32 of a grey photo's own numbers, as they are in its file; NaN: none."""
+    with loaded(photo.path) as (image, size):
+        if is_radiometric(photo.path):
+            return radiometric_celsius(photo.path, size)
+        return np.asarray(image, np.float32)
 
 
 def charge_pixels(path: Path, size: tuple[int, int], most: int = 0) -> None:

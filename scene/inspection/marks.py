@@ -137,14 +137,32 @@ def read_mark(mark: Mark, picture: ValuePicture) -> MarkReading:
         return MarkReading(mark, value, value, value, seen, depth, pixel)
     if mark.kind == "line":
         return _read_line(mark, picture, depth)
-    inside = mark.holds(picture.points) & picture.known
+    rows, columns = _pixels_of(mark, picture)
+    known = np.isfinite(picture.values[rows, columns] + picture.depth_m[rows, columns])
+    inside = mark.holds(picture.points[rows, columns]) & known
     if not inside.any():
         return MarkReading(mark, depth_m=depth)
-    values = picture.values[inside]
-    row, column = np.argwhere(inside)[int(np.argmax(values))]
-    depth = float(np.median(picture.depth_m[inside]))
+    values = picture.values[rows, columns][inside]
+    row, column = np.argwhere(inside)[int(np.argmax(values))] + (rows.start, columns.start)
+    depth = float(np.median(picture.depth_m[rows, columns][inside]))
     bounds = (float(values.min()), float(values.mean()), float(values.max()))
     return MarkReading(mark, *bounds, len(values), depth, (column + 0.5, row + 0.5))
+
+
+def _pixels_of(mark: Mark, picture: ValuePicture) -> tuple[slice, slice]:
+    """Rows and columns outside of which no pixel can lie in a circle or a box: of its corners, a
+    ball's being those of a cube around it.  All, where one of them is behind the eye.
+    """
+    corners = mark.points
+    if mark.kind == "circle":
+        corners = box_around("", corners[0], np.full(3, mark.radius_m)).points
+    pixels, _ = picture.pixel_of(corners)
+    height, width = picture.values.shape
+    if not np.isfinite(pixels).all():
+        return slice(0, height), slice(0, width)
+    low = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, (width, height)).astype(int)
+    high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, (width, height)).astype(int)
+    return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
 
 
 def _read_line(mark: Mark, picture: ValuePicture, depth: float) -> MarkReading:

@@ -72,6 +72,15 @@ def marks_path(scene: Path) -> Path:
     return scene.with_name(f"{name or scene.name}{ENDING}")
 
 
+def kept_scale(scene: Path) -> float:
+    """What lengths of a scene are multiplied by, as the marks beside it say; 1: there are none.
+
+    Raises BadFile, one sentence.
+    """
+    path = marks_path(scene)
+    return read_marks_file(path).metres_per_unit if path.exists() else 1.0
+
+
 def read_marks_file(path: Path) -> MarksFile:
     """Raises BadFile, one sentence."""
     fields = Fields(read_json(path, most_bytes=MOST_BYTES, unique=True), path.name, ADVICE)

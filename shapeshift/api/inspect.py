@@ -22,7 +22,12 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.inspection.lengths import Measurement, Point, Scale
 from shapeshift.scene.inspection.lengths import measure as measured
 from shapeshift.scene.inspection.marks import Mark, MarkReading, read_mark
-from shapeshift.scene.inspection.marks_file import marks_path, moved_marks, read_marks_file
+from shapeshift.scene.inspection.marks_file import (
+    kept_scale,
+    marks_path,
+    moved_marks,
+    read_marks_file,
+)
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import View
 
@@ -124,14 +129,15 @@ class InspectedScene(OpenedScene):
 
         places: (column, row) of a view, on the surface at the scene's x, or (x, y, z) metres in the
         world, which count as exact.  known: two places and the metres between them, from which the
-        scale comes.  Raises UsageError.
+        scale comes; None: the scale that NAME.marks.json beside the scene has, if it has one.
+        Raises UsageError, BadFile.
 
             wide = scene.measure("distance", (120, 200), (420, 210))
             print(wide.value, wide.uncertainty, wide.unit)
         """
         picture = self._depths(camera, size)
         try:
-            scale = Scale()
+            scale = Scale(kept_scale(self.path) if self.path is not None else 1.0)
             if known is not None:
                 scale = Scale.of_known([_point(picture, p) for p in known[:2]], float(known[2]))
             return measured(kind, [_point(picture, place) for place in places], scale)

@@ -50,7 +50,7 @@ def test_every_example_is_known_and_told_of():
     assert all(f"`{path.name}`" in told for path in FOLDER.iterdir() if path.suffix != ".md")
 
 
-LONG = {"11_objects.py", "12_styles.py"}  # half a minute of a core each
+LONG = {"11_objects.py", "12_styles.py", "14_inspect.py"}  # half a minute of a core each
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,12 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.theme import Box
-from shapeshift.renderer.colors.palette import legend_opacity, palette_colors, thermal_blend
+from shapeshift.renderer.colors.palette import (
+    ALL_VALUES,
+    legend_opacity,
+    palette_between,
+    thermal_blend,
+)
 from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
 from shapeshift.scene.scene import Scene
 
@@ -13,6 +18,8 @@ Vec = imgui.ImVec2
 WIDTH = 16.0  # logical pixels, of the colours
 PAD = 12.0
 STRIPES = 128
+HANDLE = 7.0  # half the height of a handle, and how far it reaches beyond the colours
+GRASP = 9.0  # so near to a handle it is meant
 # unit of temperature: kelvins a degree, and the kelvins of its zero
 KELVIN = {"\u00b0C": (1.0, 273.15), "\u00b0F": (5 / 9, 459.67 * 5 / 9), "K": (1.0, 0.0)}
 
@@ -23,16 +30,18 @@ def draw_scale_bar(
     ui_scale: float,
     draw: imgui.ImDrawList | None = None,
     wanted: str = "",
+    ends: tuple[float, float] | None = None,
 ) -> None:
     """Draws the bar with its ticks into a box, over the picture or into a list that is given; it
-    fades in with the thermal stop.  wanted: a unit of temperature instead of the stop's own.
+    fades in with the thermal stop.  wanted: a unit of temperature instead of the stop's own.  ends:
+    shares of the range that the palette's ends stand for, each with a handle; None: all, and none.
     """
     palette, weight, stop = thermal_blend(scene)
     weight = legend_opacity(weight)
     if not palette or stop is None or stop.value_range is None or not weight > 0.01:
         return
     left, top, right, bottom = box
-    width, pad, line = WIDTH * ui_scale, PAD * ui_scale, imgui.get_text_line_height()
+    pad, line = PAD * ui_scale, imgui.get_text_line_height()
     draw = draw or imgui.get_background_draw_list()
     ground = theme.color(theme.SURFACE, 0.80 * weight)
     draw.add_rect_filled(Vec(left, top), Vec(right, bottom), ground, 8 * ui_scale)
@@ -40,15 +49,50 @@ def draw_scale_bar(
     draw.push_clip_rect(Vec(left, top), Vec(right, bottom))
     unit, low, high = in_unit(stop.unit, *stop.value_range, wanted)
     draw.add_text(Vec(left + pad, top + pad / 2), ink, unit or stop.name)
-    first, last = top + line + 1.2 * pad, bottom - pad  # of the colours, top and bottom
-    bar = left + pad + width
-    _stripes(draw, palette, weight, Vec(left + pad, first), Vec(bar, last))
+    start, first, bar, last = colors_box(box, ui_scale)
+    colors = palette_between(palette, ends or ALL_VALUES)
+    _stripes(draw, colors, weight, Vec(start, first), Vec(bar, last))
+    for share in ends or ():
+        y, reach = height_of(share, box, ui_scale), HANDLE * ui_scale
+        corners = Vec(start - reach, y - reach), Vec(start - reach, y + reach), Vec(start + 2, y)
+        draw.add_triangle_filled(*corners, theme.color(theme.ACCENT, weight))
+        draw.add_line(Vec(start, y), Vec(bar, y), theme.color(theme.ACCENT, weight), 2 * ui_scale)
     values = nice_ticks(low, high)
     for value, text in zip(values, tick_text(values), strict=True):
         y = last - (last - first) * (value - low) / (high - low if high > low else 1.0)
         draw.add_line(Vec(bar, y), Vec(bar + 5 * ui_scale, y), ink, max(1.0, ui_scale))
         draw.add_text(Vec(bar + 10 * ui_scale, y - line / 2), ink, text)
     draw.pop_clip_rect()
+
+
+def colors_box(box: Box, ui_scale: float) -> Box:
+    """Where the colours of a bar are that is drawn into a box."""
+    left, top, _, bottom = box
+    pad, line = PAD * ui_scale, imgui.get_text_line_height()
+    return left + pad, top + line + 1.2 * pad, left + pad + WIDTH * ui_scale, bottom - pad
+
+
+def height_of(share: float, box: Box, ui_scale: float) -> float:
+    """Where on the screen a share of the range is; beyond the range at its end."""
+    _, first, _, last = colors_box(box, ui_scale)
+    return last - (last - first) * min(max(share, 0.0), 1.0)
+
+
+def share_at(y: float, box: Box, ui_scale: float) -> float:
+    """The share of the range that is there."""
+    _, first, _, last = colors_box(box, ui_scale)
+    return min(max((last - y) / max(last - first, 1e-6), 0.0), 1.0)
+
+
+def handle_at(
+    x: float, y: float, box: Box, ends: tuple[float, float], ui_scale: float
+) -> int | None:
+    """Which of the two handles lies there: 0 is the lower one; None: neither."""
+    start, _, bar, _ = colors_box(box, ui_scale)
+    reach = GRASP * ui_scale
+    away = [abs(y - height_of(share, box, ui_scale)) for share in ends]
+    near = int(away[1] <= away[0])
+    return near if start - reach - 2 <= x <= bar + reach and away[near] <= reach else None
 
 
 def in_unit(unit: str, low: float, high: float, wanted: str) -> tuple[str, float, float]:
@@ -68,12 +112,11 @@ def has_scale(scene: Scene) -> bool:
 
 
 def _stripes(
-    draw: imgui.ImDrawList, palette: str, weight: float, low: imgui.ImVec2, high: imgui.ImVec2
+    draw: imgui.ImDrawList, colors: np.ndarray, weight: float, low: imgui.ImVec2, high: imgui.ImVec2
 ) -> None:
-    """The palette from cold (bottom) to hot (top) as a smooth gradient."""
+    """The colours (256, 3) of a palette from cold (bottom) to hot (top) as a smooth gradient."""
     steps = np.linspace(255, 0, STRIPES + 1).astype(int)
-    colors = palette_colors(palette)[steps].tolist()  # (STRIPES + 1, 3)
-    inks = [theme.color((red, green, blue), weight) for red, green, blue in colors]
+    inks = [theme.color((red, green, blue), weight) for red, green, blue in colors[steps].tolist()]
     edges = np.linspace(low.y, high.y, STRIPES + 1)
     for i in range(STRIPES):
         draw.add_rect_filled_multi_color(

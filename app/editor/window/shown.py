@@ -7,6 +7,7 @@ import moderngl
 
 from shapeshift.app.charts.comparison import Comparison, is_exact, measure_error, same_picture
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
+from shapeshift.renderer.colors.palette import ALL_VALUES
 from shapeshift.renderer.colors.two_looks import same_shape
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
@@ -149,9 +150,11 @@ def keeps_order(settings: RenderSettings) -> bool:
 
 
 def picture_key(scene: Scene, view: View, settings: RenderSettings) -> tuple:
-    """What a picture depends on, the scene first; the background needs no splats."""
+    """What a picture depends on, the scene first; the background and the ends of a palette, which
+    come in as it is presented, need no splats.
+    """
     pose = view.world_from_eye
-    quality = replace(settings, background=(0.0, 0.0, 0.0))
+    quality = replace(settings, background=(0.0, 0.0, 0.0), heat_ends=ALL_VALUES)
     return (
         scene, pose.position.tobytes(), pose.wxyz.tobytes(), view.tangents, view.whole, view.size,
         quality,

@@ -12,11 +12,8 @@ from shapeshift.app.editor.panels.panel import Section, draw_panel
 from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
 from shapeshift.app.editor.panels.sections.camera_panel import draw_cameras, draw_edges
 from shapeshift.app.editor.panels.sections.export_panel import draw_export
-from shapeshift.app.editor.panels.sections.look_panel import draw_look
 from shapeshift.app.editor.panels.sections.objects_panel import draw_objects
-from shapeshift.app.editor.panels.sections.performance_panel import draw_performance
-from shapeshift.app.editor.panels.sections.regions_panel import draw_regions
-from shapeshift.app.editor.panels.sections.stops_panel import draw_stops
+from shapeshift.app.editor.panels.sections.plain_sections import plain_sections
 from shapeshift.app.editor.panels.slider import draw_slider_bar
 from shapeshift.app.editor.panels.status_line import draw_status
 from shapeshift.app.editor.state.arrange import poll_bodies
@@ -40,6 +37,8 @@ from shapeshift.app.editor.window.film.films import attach_films
 from shapeshift.app.editor.window.gizmo import Gizmo
 from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.app.editor.window.inspection.attach_inspection import attach_inspection
+from shapeshift.app.editor.window.inspection.mouse_marks import Seen
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
 from shapeshift.app.editor.window.parts import attach_parts
@@ -97,7 +96,15 @@ class Viewer:
         self.films = attach_films(window, state, self.viewpoint, *more)
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
-        self._add_sections()
+        seen = Seen(
+            renderer, self.shown.forget, lambda: self._moving, lambda: self.layout,
+            lambda: self.settings.temperature,
+        )  # fmt: skip
+        self.inspecting = attach_inspection(
+            window, state, self.viewpoint, self.hooks, self.parts, seen, options, folders.exports
+        )
+        drawn = (self.shell.draw_settings, self.dial, self.readings)
+        self.hooks.sections += plain_sections(state, *drawn)
         kept = KeptPalette(state, self.settings, self.shell.keep)
         self.hooks.opened.append(kept.use)
         self.hooks.each_frame.append(kept.poll)
@@ -166,26 +173,6 @@ class Viewer:
         hooks.each_frame.append(exporting.poll)
         hooks.opened.append(exporting.forget)
         hooks.status.append(exporting.status)
-
-    def _add_sections(self) -> None:
-        """What of the panel needs no more than the state and what was measured."""
-        state, dial, readings = self.state, self.dial, self.readings
-        asked = dial.wanted
-        self.hooks.sections += [
-            Section("Stops", lambda scale: draw_stops(state, scale), open_first=True),
-            Section("Look", lambda scale: draw_look(state, scale), open_first=True),
-            Section(
-                "Regions",
-                lambda scale: draw_regions(state, scale),
-                open_first=bool(state.regions.items),
-            ),
-            Section("Settings", self.shell.draw_settings),
-            Section(
-                "Performance",
-                lambda scale: draw_performance(state, dial, readings, scale),
-                open_first=asked,
-            ),
-        ]
 
     # ---- frames
 
@@ -339,7 +326,8 @@ class Viewer:
             right = state.split.right(state.scene) if state.split.on else state.scene
             for scene, box in ((state.scene, layout.left_legend), (right, layout.legend)):
                 if box is not None:
-                    draw_scale_bar(scene, box, scale, wanted=self.settings.temperature)
+                    unit, ends = self.settings.temperature, state.settings.heat_ends
+                    draw_scale_bar(scene, box, scale, wanted=unit, ends=ends)
             debug, stats = state.settings.debug, self.readings.stats
             draw_legend(debug_legend(debug, stats), layout.free, scale)
             hooks, words = self.hooks, [words() for words in self.hooks.status]

@@ -1,12 +1,22 @@
 """launch.py measure on a wall that is known: figures within their uncertainty, refusals."""
 
 import json
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+import shapeshift as ss
 from shapeshift.app import cli
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
+from shapeshift.scene.inspection.marks import Mark
+from shapeshift.scene.inspection.marks_file import (
+    MarksFile,
+    marks_path,
+    read_marks_file,
+    write_marks_file,
+)
 from tests.support.scene.warm_wall import wall_view, write_wall
 
 
@@ -41,6 +51,25 @@ def test_a_known_length_scales_the_rest(words, capsys):
     assert said.startswith("distance: 7.") or said.startswith("distance: 6.9")
     assert cli.main([*words, "--distance", "0,0,0", "0,3,4"]) == 0
     assert capsys.readouterr().out == "distance: 5.0000 ± 0.0000 m\n"
+
+
+def test_a_scale_is_kept_beside_the_scene(words, capsys):
+    """By --save, for this command and for Python; other marks of the file stay."""
+    beside = marks_path(Path(words[1]))
+    write_marks_file(MarksFile((Mark("Sp1", "spot", np.zeros((1, 3))),)), beside)
+    try:
+        assert cli.main([*words, "--known", "0,0,0", "0,0,2", "5", "--save"]) == 0
+        assert "scale 2.5" in capsys.readouterr().err
+        assert [mark.name for mark in read_marks_file(beside).marks] == ["Sp1"]
+        assert cli.main([*words, "--distance", "0,0,0", "0,3,4"]) == 0
+        said = capsys.readouterr()
+        assert said.out == "distance: 12.5000 ± 0.0000 m\n" and "multiplied by 2.5" in said.err
+        found = ss.load(words[1]).measure("distance", (0, 0, 0), (0, 3, 4), size=(32, 24))
+        assert found.value == pytest.approx(12.5)
+        assert cli.main([*words, "--distance", "0,0,0", "0,3,4", "--save"]) == 2
+        assert "--known" in capsys.readouterr().err
+    finally:
+        beside.unlink()
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,12 @@ from shapeshift.renderer.colors.palette import (
     apply_palette,
     legend_opacity,
     overlay_heat,
+    palette_between,
     palette_colors,
+    palette_values,
     thermal_blend,
 )
+from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.scene.scene import Scene, SceneObject
 
@@ -111,3 +114,22 @@ def test_the_palette_colors_what_is_there_and_leaves_coverage_alone():
 @pytest.mark.parametrize(("weight", "shown"), [(0, 0), (0.25, 0.5), (0.5, 1), (0.75, 1), (1, 1)])
 def test_a_legend_fades_in_until_half_of_the_picture_is_thermal(weight, shown):
     assert legend_opacity(weight) == shown
+
+
+def test_a_palette_is_laid_between_two_shares_of_the_range():
+    """Its first and last colour beyond them; the table's own step, 1/255, is how sharp they are."""
+    whole = palette_colors("ironbow")
+    assert palette_between("ironbow", (0.0, 1.0)) is whole
+    part = palette_between("ironbow", (0.2, 0.6))
+    at = np.linspace(0, 1, 256)
+    assert (part[at <= 0.2] == whole[0]).all() and (part[at >= 0.6] == whole[-1]).all()
+    for share in (0.0, 0.25, 0.5, 1.0):
+        here = palette_values(np.array([0.2 + 0.4 * share]), "ironbow", (0.2, 0.6))
+        there = palette_values(np.array([share]), "ironbow")
+        np.testing.assert_allclose(here, there, atol=0.02)
+    rgba = np.array([[[0.4, 0.4, 0.4, 1.0]]], np.float32)
+    shown = apply_palette(rgba, "gray", (0.2, 0.6))
+    np.testing.assert_allclose(shown[0, 0, :3], 0.5, atol=0.01)
+    for ends in ((0.5, 0.5), (0.6, 0.5), (np.nan, 1.0), (0.0, np.inf)):
+        with pytest.raises(ValueError, match="heat_ends"):
+            RenderSettings(heat_ends=ends)

@@ -67,7 +67,7 @@ def test_what_is_no_number_is_black(tmp_path):
 @pytest.mark.parametrize(
     "values, heat, told",
     [
-        (picture([1]).astype(np.float32), {"counts": None}, "counts"),
+        (picture([1]).astype(np.float32), {"counts": None, "kind": "layer"}, "counts"),
         (np.zeros((12, 16, 3), np.uint8), {}, "greyscale"),
         (picture([1]).astype(np.float32), {"counts": [5, 5]}, "counts"),
         (picture([1]).astype(np.float32), {"counts": 5}, "counts"),

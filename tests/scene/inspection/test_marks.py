@@ -106,6 +106,29 @@ def test_what_is_hidden_or_outside_is_not_known():
             make()
 
 
+def test_only_the_pixels_that_may_lie_in_an_area_are_looked_at():
+    """The same as looking at all, for areas anywhere: aside, behind and around the eye too."""
+    rng, found = np.random.default_rng(3), 0
+    for eye in ((0.0, 0.0, 1.5), (0.7, 0.3, 0.6)):
+        picture = traced(eye)
+        for _ in range(100):
+            centre = rng.normal(0, (0.6, 0.4, 0.5))
+            half = rng.uniform(0.01, 0.8, 3)
+            for mark in (
+                box_around("Ar1", centre, half), Mark("Ci1", "circle", centre[None], half[0]),
+            ):  # fmt: skip
+                inside = mark.holds(picture.points) & picture.known
+                reading = read_mark(mark, picture)
+                assert reading.samples == inside.sum()
+                if inside.any():
+                    found += 1
+                    values = np.where(inside, picture.values, -np.inf)
+                    row, column = np.unravel_index(int(np.argmax(values)), values.shape)
+                    assert reading.hottest == (column + 0.5, row + 0.5)
+                    assert reading.mean == picture.values[inside].mean()
+    assert found > 100
+
+
 def test_isotherms_hold_their_bounds_as_they_say():
     values = np.array([np.nan, 10.0, np.nextafter(10.0, 11), 20.0, np.nextafter(20.0, 21)])
     assert Isotherm("above", low=10).holds(values).tolist() == [False, False, True, True, True]

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import moderngl
 import numpy as np
@@ -42,6 +43,7 @@ class PlainRenderer:
     def __init__(self, ctx: moderngl.Context) -> None:
         self.settings = RenderSettings()
         self.backends = {"drawing": "none", "mlps": "none", "sort": "none"}
+        self.drawing = SimpleNamespace(draws_heat=False)
         self.updates = self.draws = self.presents = 0
         self.view, self.drawn_at = None, self.settings
 
@@ -62,6 +64,14 @@ class PlainRenderer:
         picture = np.full((height, width, 3), 0.5, np.float32)
         picture[::2] += 0.01 * self.drawn_at.min_pixels
         return picture
+
+    def image(self, i: int = 0) -> np.ndarray:
+        """Nothing is covered, so nothing is measured."""
+        width, height = self.view.size
+        return np.zeros((height, width, 4), np.float32)
+
+    def surface(self, view) -> SimpleNamespace:
+        return SimpleNamespace(depth=lambda least: np.full(view.size[::-1], np.inf))
 
     def stale_order_db(self, views) -> float:
         return 51.0

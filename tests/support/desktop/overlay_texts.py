@@ -33,6 +33,7 @@ TABLES = {
     "sections.export_panel": {"DEGREES": ALL, "FORMAT_TIPS": VALUES},
     "sections.film_panel": {"AROUND": ALL, "PAST": ALL},
     "sections.histogram_panel": {"EXPLAINED": ALL},
+    "sections.inspect_panel": {"COLUMNS": ALL, "BOUND_TIPS": ALL, "MEASURES": ALL},
     "sections.look_panel": {"TWO_STOPS": ALL, "PALETTE_TIP": ALL, "DEBUG_NAMES": VALUES},
     "sections.objects_panel": {"MODES": VALUES, "FOUR_VIEW_NAMES": VALUES, "DEEDS": ALL},
     "sections.parts_panel": {
@@ -44,7 +45,8 @@ TABLES = {
     "sections.stops_panel": {"MODE_NAMES": VALUES},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
-KEY_TABLES = ("objects", "parts", "split", "touch")  # of app/editor/window: KEYS of the sheet
+# of app/editor/window: KEYS of the sheet
+KEY_TABLES = ("inspection.mouse_marks", "objects", "parts", "split", "touch")
 STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
 LETTERS = re.compile(r"[A-Za-z]{2}")
 KEY = r"(Ctrl|Shift|Alt|Esc|Enter|Space|Tab|[A-Z]|F\d+|\d|[+\u2013])"

@@ -13,15 +13,17 @@ class Textures:
         self._kept: dict[str, tuple[np.ndarray, moderngl.Texture]] = {}
 
     def number(self, name: str, picture: np.ndarray) -> int:
-        """ImGui's number of a picture (H, W, 3) uint8; `name` has one at a time."""
+        """ImGui's number of a picture (H, W, 3) or, with alpha, (H, W, 4) uint8; `name` has one at
+        a time.
+        """
         kept = self._kept.get(name)
         if kept is not None and kept[0] is picture:
             return kept[1].glo
         if kept is not None:
             self._overlay.remove_texture(kept[1])
             kept[1].release()
-        height, width = picture.shape[:2]
-        texture = self._ctx.texture((width, height), 3, picture.tobytes(), alignment=1)
+        height, width, channels = picture.shape
+        texture = self._ctx.texture((width, height), channels, picture.tobytes(), alignment=1)
         self._overlay.register_texture(texture)
         self._kept[name] = (picture, texture)
         return texture.glo

@@ -1,0 +1,142 @@
+"""The panel's section "Inspect": marks with their values, isotherms, level and span, a report."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.scale_bar import in_unit
+from shapeshift.app.editor.panels.widgets.panel_rows import button_row, item_label, tip
+from shapeshift.app.editor.state.inspecting import Inspecting
+from shapeshift.app.editor.texts.table import said
+from shapeshift.scene.inspection.marks import Bound
+
+Vec = imgui.ImVec2
+COLUMNS = ("min", "mean", "max")
+BOUND_TIPS: dict[Bound, str] = {
+    "above": "All that is hotter is red, over every stop.",
+    "below": "All that is colder is blue, over every stop.",
+}
+MEASURES = "Click a spot, drag a box, Shift+drag a line; right drag orbits. Key Y."
+
+
+@dataclass(frozen=True)
+class InspectActions:
+    """What the section's buttons do."""
+
+    toggle: Callable[[], None]  # the tool
+    auto: Callable[[], None]  # level and span of what is seen
+    report: Callable[[], None]
+
+
+def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scale: float) -> None:
+    """All of the section; wanted: a unit of temperature instead of the stop's own."""
+    thermal = tool.thermal
+    if thermal is None:
+        imgui.text_wrapped(said("The thermal stops of these objects do not agree; show one."))
+        return
+    changed, _ = imgui.checkbox(item_label("lay marks"), tool.on)
+    tip(MEASURES, ui_scale)
+    if changed:
+        actions.toggle()
+    unit = in_unit(thermal.stop.unit, 0, 1, wanted)[0]
+    if tool.file.marks:
+        _table(tool, wanted, unit, ui_scale)
+    if tool.chosen:
+        _chosen(tool, ui_scale)
+    for kind, words in BOUND_TIPS.items():
+        _bound(tool, kind, words, wanted, ui_scale)
+    low, high = in_unit(thermal.stop.unit, *tool.ends, wanted)[1:]
+    level, span = (low + high) / 2, high - low
+    imgui.text_disabled(said("level {level:.1f}, span {span:.1f}", level=level, span=span))
+    tips = {
+        "Auto": "The palette shows what this view has, from its coldest to its hottest.",
+        "All values": "The palette shows all of the range that the photos could.",
+    }
+    clicked = button_row(tips, ui_scale, 2)
+    if clicked == "Auto":
+        actions.auto()
+    elif clicked:
+        tool.ends = tool.value_range
+    tips = {
+        "Save marks": "NAME.marks.json beside the scene: read when it is opened again.",
+        "Report": "One HTML file with pictures and tables of this view, among the exports.",
+    }
+    clicked = button_row(tips, ui_scale, 2)
+    if clicked == "Save marks":
+        tool.keep()
+    elif clicked:
+        actions.report()
+
+
+def _table(tool: Inspecting, wanted: str, unit: str, ui_scale: float) -> None:
+    """A row a mark, by which it is chosen."""
+    flags = imgui.TableFlags_.sizing_stretch_prop
+    if not imgui.begin_table("##marks", 1 + len(COLUMNS), flags):
+        return
+    imgui.table_next_row()
+    for number, name in enumerate(("", *COLUMNS)):
+        imgui.table_set_column_index(number)
+        imgui.text_disabled(said(name) if name else unit)
+    thermal = tool.thermal
+    assert thermal is not None  # draw_inspect has seen to it
+    for mark in tool.file.marks:
+        imgui.table_next_row()
+        imgui.table_set_column_index(0)
+        chosen = mark.name == tool.chosen
+        span = imgui.SelectableFlags_.span_all_columns
+        if imgui.selectable(f"{mark.name}##mark {mark.name}", chosen, span)[0]:
+            tool.chosen = "" if chosen else mark.name
+        tip("Choose it to rename or delete it.", ui_scale)
+        reading = tool.readings.get(mark.name)
+        if reading is None:
+            continue
+        values = (reading.least, reading.mean, reading.most)
+        for number, value in enumerate(values[:1] if mark.kind == "spot" else values):
+            imgui.table_set_column_index(2 if mark.kind == "spot" else 1 + number)
+            shown = in_unit(thermal.stop.unit, value, value, wanted)[1]
+            imgui.text_unformatted(f"{shown:.1f}" if np.isfinite(shown) else "--")
+    imgui.end_table()
+
+
+def _chosen(tool: Inspecting, ui_scale: float) -> None:
+    """The name of the chosen mark, to be typed, and the button that deletes it."""
+    gap, name = imgui.get_style().item_spacing.x, tool.chosen
+    width = 0.6 * (imgui.get_content_region_avail().x - gap)
+    imgui.set_next_item_width(width)
+    done, text = imgui.input_text(
+        f"##name of {name}", name, imgui.InputTextFlags_.enter_returns_true
+    )
+    tip("Its name; Enter takes it over.", ui_scale)
+    if done and not tool.name_mark(name, text) and text != name:
+        imgui.set_keyboard_focus_here(-1)
+    imgui.same_line()
+    if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:
+        tool.delete(name)
+    tip("Delete the mark; Ctrl+Z brings it back while the tool is on.", ui_scale)
+
+
+def _bound(tool: Inspecting, kind: Bound, words: str, wanted: str, ui_scale: float) -> None:
+    """An isotherm: on or off, and its number."""
+    thermal, isotherm = tool.thermal, tool.isotherm(kind)
+    assert thermal is not None  # draw_inspect has seen to it
+    own = thermal.stop.unit
+    changed, on = imgui.checkbox(item_label(kind), isotherm is not None)
+    tip(words, ui_scale)
+    if changed:
+        low, high = tool.ends
+        tool.bound(kind, (low + (0.75 if kind == "above" else 0.25) * (high - low)) if on else None)
+        isotherm = tool.isotherm(kind)
+    if isotherm is None:
+        return
+    imgui.same_line(0.4 * imgui.get_window_size().x)
+    imgui.set_next_item_width(-1)
+    value = isotherm.low if kind == "above" else isotherm.high
+    unit, shown, _ = in_unit(own, value, value, wanted)
+    style = f"%.1f {unit.replace('%', '%%')}".rstrip()
+    low, high = in_unit(own, *tool.value_range, wanted)[1:]
+    done, new = imgui.drag_float(f"##{kind}", shown, (high - low) / 500, 0, 0, style)
+    tip("Drag it, or Ctrl+click it and type.", ui_scale)
+    if done and np.isfinite(new) and abs(new) <= 1e6:
+        tool.bound(kind, in_unit(unit, new, new, own)[1] if unit != own else new)

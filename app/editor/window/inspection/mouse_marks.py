@@ -1,0 +1,326 @@
+"""The mouse and the keys of the tool "Inspect", and when a view is measured."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import glfw
+import numpy as np
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.marks_over import (
+    alarm_layer,
+    draw_mark,
+    draw_rubber,
+    draw_words,
+    words_of,
+)
+from shapeshift.app.editor.panels.scale_bar import handle_at, has_scale, height_of, share_at
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.inspecting import Inspecting
+from shapeshift.app.editor.state.layout import Layout
+from shapeshift.app.editor.state.parts.parts_tool import PartsTool
+from shapeshift.app.editor.texts.table import said
+from shapeshift.app.editor.window.hands import TURN
+from shapeshift.app.editor.window.window import (
+    CLICK_PIXELS,
+    DoubleClick,
+    Drag,
+    Event,
+    KeyDown,
+    Press,
+    Release,
+    Window,
+)
+from shapeshift.app.inspection.draw_values import draw_values
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.inspection.marks import Kind
+from shapeshift.scene.pose import View
+
+KEYS = (
+    ("Y", "lay marks, on and off"),
+    ("click, drag", "a spot, a box; right drag orbits"),
+    ("Shift+drag", "a line on the surface"),
+    ("Delete", "delete the chosen mark"),
+    ("Esc", "choose no mark, leave"),
+    ("scale", "drag a handle: an end of the palette"),
+)
+STILL_S = 0.25  # so long nothing must move before a view is measured
+MOST_PX = 640  # longer side of the picture that is measured
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the tool needs of the window's own drawing."""
+
+    renderer: Renderer
+    forget: Callable[[], None]  # the renderer has drawn something else meanwhile
+    moving: Callable[[], bool]
+    layout: Callable[[], Layout]
+    unit: Callable[[], str]  # of temperature, that is wanted
+
+
+class MouseMarks:
+    """What hands do to an `Inspecting`, and what it has over the picture."""
+
+    def __init__(
+        self, tool: Inspecting, state: EditorState, window: Window, viewpoint: Viewpoint,
+        parts: PartsTool, seen: Seen,
+    ) -> None:  # fmt: skip
+        self._tool, self._state, self._window = tool, state, window
+        self._viewpoint, self._parts, self._seen = viewpoint, parts, seen
+        self._handle: int | None = None  # of the scale, that the mouse holds
+        self._pressed: tuple[float, float] | None = None  # logical pixels
+        self._end: tuple[float, float] | None = None  # of a drag; None: still a click
+        self._kind: Kind = "box"  # that a drag lays
+        self._key: tuple = ()  # of what is seen, and since when
+        self._since = 0.0
+        self._measured: tuple = ()  # key of what was measured last
+        self._models: tuple = ()  # of that: no other gets the id of one of them
+        self._cursor = window.cursor  # where the mouse was looked up last
+        self._layer: tuple = (None, (), np.zeros((1, 1, 4), np.uint8))
+        self._was_on = False
+
+    # ---- input
+
+    def handle_event(self, event: Event) -> bool:
+        """True for what concerns the tool, its key and the handles of the scale."""
+        if self._tool.thermal is None:
+            return False
+        if isinstance(event, KeyDown):
+            return not self._window.popup_open and self._press_key(event)
+        if self._drags_handle(event):
+            return True
+        if not self._tool.on:
+            return False
+        match event:
+            case Press(button="left"):
+                held = self._window.held
+                shift = held(glfw.KEY_LEFT_SHIFT) or held(glfw.KEY_RIGHT_SHIFT)
+                self._kind = "line" if shift else "box"
+                self._pressed, self._end = (event.x, event.y), None
+            case Drag(button="left") if self._pressed is not None:
+                x, y = self._pressed
+                if self._end or abs(event.x - x) + abs(event.y - y) > CLICK_PIXELS:
+                    self._end = (event.x, event.y)
+            case Release(button="left") if self._pressed is not None:
+                self._let_go(self._pressed, self._end)
+                self._pressed = self._end = None
+            case Drag(button="right"):
+                self._viewpoint.leave_camera()
+                self._viewpoint.camera.turn(-event.dx * TURN, -event.dy * TURN)
+            case DoubleClick():
+                pass  # two clicks: the camera stays
+            case _:
+                return False
+        return True
+
+    def _press_key(self, event: KeyDown) -> bool:
+        tool = self._tool
+        match event.key:
+            # A key is named after a US keyboard; on a German one Y is printed on its Z.
+            case glfw.KEY_Y | glfw.KEY_Z if not event.ctrl:
+                self.toggle()
+            case glfw.KEY_DELETE if tool.on and tool.chosen:
+                tool.delete(tool.chosen)
+            case glfw.KEY_ESCAPE if tool.on and self._pressed is not None:
+                self._pressed = self._end = None
+            case glfw.KEY_ESCAPE if tool.on and tool.chosen:
+                tool.chosen = ""
+            case glfw.KEY_ESCAPE if tool.on:
+                tool.on = False
+            case _ if tool.on and event.shortcut == "z" and not event.shift:
+                return tool.undo()
+            case _:
+                return False
+        return True
+
+    def toggle(self) -> None:
+        """The tool, in the place of another that has the mouse."""
+        self._tool.on = not self._tool.on
+        self._pressed = self._end = None
+        if self._tool.on and self._parts.on:
+            self._parts.toggle()
+
+    def opens(self) -> bool:
+        """Once when the tool is taken: its section unfolds."""
+        opened, self._was_on = self._tool.on and not self._was_on, self._tool.on
+        return opened
+
+    def _drags_handle(self, event: Event) -> bool:
+        state, layout = self._state, self._seen.layout()
+        box, scale = layout.legend, self._window.ui_scale
+        if box is None or not has_scale(state.scene):
+            self._handle = None
+            return False
+        match event:
+            case Press(button="left"):
+                ends = state.settings.heat_ends
+                self._handle = handle_at(event.x, event.y, box, ends, scale)
+                return self._handle is not None
+            case Drag(button="left") if self._handle is not None:
+                low, high = self._tool.value_range
+                first, last = self._tool.ends
+                here = low + share_at(event.y, box, scale) * (high - low)
+                self._tool.ends = (first, here) if self._handle else (here, last)
+                return True
+            case Release(button="left") if self._handle is not None:
+                self._handle = None
+                return True
+        return False
+
+    def _let_go(self, start: tuple[float, float], end: tuple[float, float] | None) -> None:
+        """A click chooses the mark that is there, else lays a spot; a drag lays a box or a line."""
+        tool = self._tool
+        under = self._mark_at(start) if end is None else ""
+        if under:
+            tool.chosen = under
+            return
+        self._measure()
+        kind: Kind = self._kind if end is not None else "spot"
+        tool.lay(kind, self._pixel(start), self._pixel(end or start))
+
+    def _mark_at(self, place: tuple[float, float]) -> str:
+        """The name of a mark whose middle is seen there, logical pixels; "": none is."""
+        marks = self._tool.file.marks
+        if not marks or self._tool.picture is None:
+            return ""
+        through = replace(self._tool.picture, view=self._logical_view())
+        pixels, _ = through.pixel_of(np.array([mark.place for mark in marks]))
+        away = np.nan_to_num(np.linalg.norm(pixels - place, axis=1), nan=np.inf)
+        nearest = int(np.argmin(away))
+        return marks[nearest].name if away[nearest] <= 2 * CLICK_PIXELS else ""
+
+    def _logical_view(self) -> View:
+        width, height = self._window.logical_size
+        return replace(self._viewpoint.view(), size=(int(width), int(height)))
+
+    def _pixel(self, place: tuple[float, float]) -> tuple[float, float]:
+        """A place in logical pixels as one of the picture that is measured."""
+        width, height = self._window.logical_size
+        columns, rows = measured_size(self._window.size)
+        return place[0] * columns / width, place[1] * rows / height
+
+    # ---- frames
+
+    def each_frame(self) -> bool:
+        """Measures the view once it is still; True while that is waited for.
+
+        A window in which nothing moves, the mouse neither, measures nothing.
+        """
+        tool, state = self._tool, self._state
+        if self._parts.on:
+            tool.on = False
+        if not state.has_legend or tool.thermal is None:
+            return False
+        key, now = self._seen_now(), time.perf_counter()
+        if key != self._key:
+            self._key, self._since = key, now
+        tool.is_current = self._measured == key
+        cursor, on_scene = self._window.cursor, self._window.on_scene
+        moved, self._cursor = cursor != self._cursor, cursor
+        shows = state.overlay and on_scene and has_scale(state.scene)
+        asks = tool.on or bool(tool.file.marks or tool.file.isotherms) or (shows and moved)
+        waits = asks and not tool.is_current and not self._seen.moving()
+        if waits and now - self._since >= STILL_S:
+            self._measure()
+            waits = False
+        pointing = tool.is_current and on_scene and (tool.on or shows)
+        tool.point(self._pixel(cursor) if pointing else None)
+        if waits and shows:
+            self._cursor = (-1.0, -1.0)  # it has moved: asked until it is answered
+        return waits
+
+    def _seen_now(self) -> tuple:
+        """What values and depths depend on; not on x."""
+        view, objects = self._viewpoint.view(), self._state.scene.objects
+        poses = tuple((o.world_from_object.matrix().tobytes(), o.visible) for o in objects)
+        eye = view.world_from_eye.matrix().tobytes()
+        return eye, view.tangents, view.size, poses, tuple(id(o.model) for o in objects)
+
+    def _measure(self) -> None:
+        """Values and depths of what is seen now, unless they are there."""
+        tool, view, key = self._tool, self._viewpoint.view(), self._seen_now()
+        if tool.thermal is None or (self._measured == key and tool.picture is not None):
+            return
+        renderer = self._seen.renderer
+        renderer.settings = RenderSettings()
+        self._measured = key
+        self._models = tuple(obj.model for obj in self._state.scene.objects)
+        try:
+            small = replace(view, size=measured_size(view.size))
+            tool.saw(draw_values(renderer, tool.thermal, small))
+        except BadFile as error:
+            tool.on = False
+            self._state.problem = str(error)
+        self._seen.forget()
+
+    def forget(self) -> None:
+        """Another scene."""
+        self._measured, self._handle, self._pressed, self._end = (), None, None, None
+        self._tool.opened()
+
+    def status(self) -> str:
+        """For the line at the lower edge."""
+        if self._tool.on:
+            return said("click: a spot, drag: a box, Shift+drag: a line")
+        return said("marks not saved") if self._tool.unsaved else ""
+
+    def draw(self, ui_scale: float) -> None:
+        """Alarms, marks, and what lies under the mouse."""
+        tool, state = self._tool, self._state
+        if not state.overlay or tool.thermal is None:
+            return
+        if tool.is_current and tool.picture is not None and tool.file.isotherms:
+            self._draw_alarms()
+        view, unit = self._logical_view(), self._seen.unit()
+        for mark in tool.file.marks:
+            reading = tool.readings.get(mark.name) if tool.is_current else None
+            words = ""
+            if reading is not None and reading.samples and tool.picture is not None:
+                value = reading.mean if mark.kind == "spot" else reading.most
+                words = words_of(value, tool.picture, unit)
+            draw_mark(mark, reading, view, words, mark.name == tool.chosen, ui_scale)
+        if self._pressed is not None and self._end is not None:
+            draw_rubber(self._kind, self._pressed, self._end)
+        self._draw_pointed(ui_scale)
+
+    def _draw_pointed(self, ui_scale: float) -> None:
+        """Degrees and metres under the mouse, at their height beside the scale, or at the mouse."""
+        tool, box = self._tool, self._seen.layout().legend
+        if not tool.is_current or tool.picture is None or not self._window.on_scene:
+            return
+        shows = box is not None and has_scale(self._state.scene)
+        if not (shows or tool.on):
+            return
+        value, depth = tool.pointed
+        words = words_of(value, tool.picture, self._seen.unit())
+        if np.isfinite(value):
+            words += f"  {depth * tool.file.metres_per_unit:.2f} m"
+        if not shows or box is None:
+            x, y = self._window.cursor
+            draw_words(words, (x + 14 * ui_scale, y + 10 * ui_scale), ui_scale)
+            return
+        low, high = tool.value_range
+        share = (value - low) / (high - low) if np.isfinite(value) else 0.5
+        y = height_of(share, box, ui_scale) - imgui.get_text_line_height() / 2
+        draw_words(words, (box[0] - 4 * ui_scale, y), ui_scale, right=True)
+
+    def _draw_alarms(self) -> None:
+        picture, isotherms = self._tool.picture, self._tool.file.isotherms
+        assert picture is not None  # draw has seen to it
+        if self._layer[0] is not picture or self._layer[1] != isotherms:
+            self._layer = (picture, isotherms, alarm_layer(picture, isotherms))
+        number = self._window.textures.number("alarms", self._layer[2])
+        width, height = self._window.logical_size
+        corner, end = imgui.ImVec2(0, 0), imgui.ImVec2(width, height)
+        imgui.get_background_draw_list().add_image(number, corner, end)
+
+
+def measured_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Of the picture that is measured of a view of `size` pixels (W, H)."""
+    part = min(1.0, MOST_PX / max(size))
+    return max(round(size[0] * part), 1), max(round(size[1] * part), 1)

@@ -1,0 +1,150 @@
+"""Photos that are numbers and no picture: grids in .npy and CSV files, and FLIR's radiometric JPEG.
+
+A radiometric JPEG (R-JPEG) is a picture for people with the camera's own numbers in APP1 segments
+that begin with "FLIR": records of a directory "FFF", one with the raw numbers, one with what makes
+temperatures of them by Planck's law.  flyr (EUPL 1.2, an optional extra) knows them.
+"""
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.runtime_models.files.npy import BAD_HEADER
+from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.model import BadFile
+
+GRIDS = (".npy", ".csv")
+JPEGS = (".jpg", ".jpeg", ".jfif")
+MOST_NUMBERS = 1 << 24  # the largest thermal cameras have a million
+NUMBER = 12  # bytes of memory a number of a grid
+RAW = 40  # the same of a radiometric JPEG
+TEXT = 40  # bytes of memory a letter of a CSV file, while it is split
+MOST_BYTES = 1 << 26  # of a CSV or a radiometric JPEG
+HEAD_LINES = 20  # of words that programs write before a grid
+FLIR = re.compile(rb"\xff\xe1..FLIR\x00", re.DOTALL)  # where such a segment begins
+LOOKED_AT = 1 << 16  # bytes of a JPEG: the first segment begins before
+PNG_SIZE = re.compile(rb"\x89PNG\r\n\x1a\n....IHDR(....)(....)", re.DOTALL)
+ASPECT = 0.02  # by how much the numbers may be wider or narrower than their picture
+
+
+def open_grid(path: Path) -> Image.Image:
+    """The numbers of a .npy or CSV file as a picture of mode F.  Raises BadFile, FileNotFoundError.
+
+    NaN stays: nothing was measured there.
+    """
+    values = _npy(path) if path.suffix.lower() == ".npy" else _csv(path)
+    return Image.fromarray(np.array(values, np.float32))
+
+
+def _npy(path: Path) -> np.ndarray:
+    try:
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except FileNotFoundError:
+        raise
+    except (ValueError, OSError, OverflowError, EOFError, *BAD_HEADER):
+        raise BadFile(f"{path_end(path)}: no .npy of plain numbers; save it again") from None
+    is_grid = isinstance(values, np.ndarray) and values.ndim == 2 and values.dtype.kind in "fui"
+    if not is_grid or not 0 < values.size <= MOST_NUMBERS:
+        raise BadFile(
+            f"{path_end(path)}: {getattr(values, 'shape', '?')!s:.40} of "
+            f"{getattr(values, 'dtype', '?')!s:.20}; a photo is (rows, columns) of numbers"
+        )
+    Memory().of(path).charge(NUMBER * values.size, f"{values.size:,} numbers")
+    return values
+
+
+def _csv(path: Path) -> np.ndarray:
+    """Lines of numbers between commas, semicolons or tabs; with semicolons or tabs a comma is a
+    decimal point.  Lines of words before them are left out.
+    """
+    where, size = path_end(path), path.stat().st_size
+    if not 0 < size <= MOST_BYTES:
+        raise BadFile(f"{where}: {size:,} bytes; a grid of numbers has 1 to {MOST_BYTES:,}")
+    Memory().of(path).charge(TEXT * size, f"{size:,} letters")
+    text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    lines = [line.rstrip(",; \t\r") for line in text.splitlines()]
+    rows: list[np.ndarray] = []
+    for number, line in enumerate(lines):
+        if not line.strip():
+            continue
+        row = _row(line)
+        if row is None and not rows and number < HEAD_LINES:
+            continue
+        if row is None or (rows and len(row) != len(rows[0])):
+            wanted = f"{len(rows[0])} numbers" if rows else "numbers between commas"
+            raise BadFile(f"{where}: line {number + 1} is not {wanted}; save the grid again")
+        rows.append(row)
+    if len(rows) < 2 or len(rows[0]) < 2:
+        raise BadFile(f"{where}: no grid of numbers; lines of numbers with commas are wanted")
+    return np.stack(rows)
+
+
+def _row(line: str) -> np.ndarray | None:
+    """The numbers of a line; None: there are others than numbers."""
+    between = next((sign for sign in ";\t" if sign in line), ",")
+    line = line.replace(",", ".") if between != "," else line
+    try:
+        return np.array([float(word) if word.strip() else np.nan for word in line.split(between)])
+    except ValueError:
+        return None
+
+
+def is_radiometric(path: Path) -> bool:
+    """Whether a file is a JPEG with a FLIR camera's own numbers."""
+    if path.suffix.lower() not in JPEGS:
+        return False
+    try:
+        with path.open("rb") as file:
+            return FLIR.search(file.read(LOOKED_AT)) is not None
+    except OSError:
+        return False
+
+
+def can_read_radiometric() -> bool:
+    """Whether flyr is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("flyr") is not None
+
+
+def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
+    """(H, W) float32 °C of a radiometric JPEG, in the size (W, H) of its picture.
+
+    Emissivity, distance and air are those that the camera was set to.  Raises BadFile.
+    """
+    where = path_end(path)
+    try:
+        import flyr
+    except ImportError:
+        raise BadFile(
+            f"{where}: a radiometric JPEG; its temperatures want the package flyr: pip install flyr"
+        ) from None
+    data = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b""
+    sides = [
+        [int.from_bytes(side, "big") for side in found.groups()]
+        for found in PNG_SIZE.finditer(data)
+    ]
+    if not data or any(width * height > MOST_NUMBERS for width, height in sides):
+        raise BadFile(f"{where}: more numbers than a thermal camera has; copy it again")
+    most = max([len(data) // 2, *(width * height for width, height in sides)])
+    Memory().of(path).charge(RAW * most, f"{most:,} numbers")
+    try:
+        celsius = np.asarray(flyr.unpack(io.BytesIO(data)).celsius, np.float32)
+    except Exception as error:  # of a parser that checks nothing: any
+        raise BadFile(
+            f"{where}: its thermal numbers cannot be read ({error}); copy it again"
+        ) from None
+    height, width = celsius.shape
+    if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
+        raise BadFile(
+            f"{where}: {width}x{height} numbers in a picture of {size[0]}x{size[1]}; both must "
+            "show the same field of view"
+        )
+    picture = Image.fromarray(celsius)
+    if picture.size != size:
+        picture = picture.resize(size, Image.Resampling.BILINEAR)
+    return np.asarray(picture, np.float32)

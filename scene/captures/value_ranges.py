@@ -1,0 +1,76 @@
+"""The range of thermal photos that are numbers, where the capture states none: from themselves."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.captures.capture import Photo
+from shapeshift.scene.captures.number_photos import can_read_radiometric, is_radiometric
+from shapeshift.scene.captures.photo import FLOATS, GREY_16, numbers_of, open_image
+
+LOOKED_AT = 24  # photos of a modality
+PERCENTILES = (0.1, 99.9)  # between which the range begins; a dead pixel is beyond
+LARGEST = 1e9  # of a value that anybody measures
+MARGIN = 0.05  # of what lies between, added at each end: the hottest spot is not cut off
+
+
+def with_own_ranges(
+    stops: Sequence[Stop], photos: list[Photo]
+) -> tuple[tuple[Stop, ...], list[Photo], tuple[str, ...]]:
+    """Stops with ranges, photos with counts, and what a person should know.
+
+    Of thermal modalities without 'counts'.  Photos of floating-point numbers and radiometric ones
+    are values: a stated range is in their unit.  16 bits with a range are read over all of it.
+    """
+    out, doubts = [], []
+    for stop in stops:
+        mine = [photo for photo in photos if photo.modality == stop.name]
+        kind = _kind(mine) if stop.kind == "thermal" else ""
+        if kind == "radiometric" and not can_read_radiometric():
+            doubts.append(
+                f"The photos of {stop.name} hold temperatures, but only their colours are read; "
+                "for degrees: pip install flyr."
+            )
+            kind = ""
+        if not kind or (kind == "counts" and stop.value_range is not None):
+            out.append(stop)
+            continue
+        ends = stop.value_range or _own_range(mine)
+        photos = [replace(p, counts=ends) if p.modality == stop.name else p for p in photos]
+        unit = stop.unit or ("°C" if kind == "radiometric" else "")
+        palette = stop.palette or "ironbow"  # without one values are no scale
+        out.append(replace(stop, value_range=ends, unit=unit, palette=palette))
+    return tuple(out), photos, tuple(doubts)
+
+
+def _kind(photos: list[Photo]) -> str:
+    """radiometric, values (floating-point numbers) or counts (16 bits), by the first; "": none."""
+    if not photos or any(photo.counts is not None for photo in photos):
+        return ""
+    path = photos[0].path
+    if is_radiometric(path):
+        return "radiometric"
+    with open_image(path) as image:
+        return "values" if image.mode == FLOATS else "counts" if image.mode in GREY_16 else ""
+
+
+def _own_range(photos: list[Photo]) -> tuple[float, float]:
+    """What some of the photos hold.  Raises BadFile."""
+    some = photos[:: -(-len(photos) // LOOKED_AT)]
+    known = [numbers[np.isfinite(numbers)] for numbers in map(numbers_of, some)]
+    every = np.concatenate([numbers[:: max(1, len(numbers) // 100_000)] for numbers in known])
+    if not len(every):
+        raise BadFile(f"{some[0].path}: no number in it nor in the others; copy them again")
+    low, high = np.percentile(every.astype(np.float64), PERCENTILES)
+    if not max(abs(low), abs(high)) <= LARGEST:
+        raise BadFile(
+            f"{some[0].path}: numbers up to {high:.3g}; say with 'value_range' what counts"
+        )
+    more = MARGIN * (high - low) or 0.5
+    digits = 2 - math.floor(math.log10(high - low + 2 * more))  # three of the range, outwards
+    step = 10.0**-digits
+    ends = (math.floor((low - more) / step) * step, math.ceil((high + more) / step) * step)
+    return round(ends[0], digits), round(ends[1], digits)

@@ -1,0 +1,220 @@
+"""The tool "Inspect" in the real window: real mouse and keys on a wall whose degrees are known.
+
+The wall has 50 + 50 x degrees at x metres (tests/support/scene/warm_wall.py).
+"""
+
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapeshift.app.editor.desktop import Options, Viewer
+from shapeshift.app.editor.panels.scale_bar import height_of
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import opened_scene
+from shapeshift.app.editor.state.files.opened import read_files
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
+from tests.support.desktop.desktop_stand import run_frames
+from tests.support.desktop.objects_stand import place_of
+from tests.support.desktop.real_hands import RealHands
+from tests.support.desktop.widgets import Widgets
+from tests.support.scene.warm_wall import STOPS, celsius_at, write_wall
+
+NEAR_C = 1.0  # a pixel of the window is 3 mm there, a splat's spacing half a degree
+PATIENCE_S = 30.0
+
+
+@pytest.fixture(scope="module")
+def renderer(window):
+    with Renderer(window.ctx, drawing="quads") as renderer:
+        yield renderer
+
+
+@pytest.fixture
+def wall(tmp_path) -> Path:
+    return write_wall(tmp_path / "wall")
+
+
+def viewer_of(window, renderer, wall: Path, x: str = "Thermal") -> Viewer:
+    found = read_files([wall], lambda path, told: read_model(path), CameraReading(), None)
+    state = EditorState(read_model)
+    scene, edited = opened_scene(found, x)
+    state.open_sources(found.sources, scene, None, edited)
+    state.bodies.follow = lambda edited: None
+    viewer = Viewer(window, renderer, state, Options(pictures=wall.parent / "work" / "pictures"))
+    viewer.shell.actions.sections.update({"Stops": False, "Look": False, "Camera": False})
+    run_frames(viewer, 4)
+    return viewer
+
+
+@pytest.fixture
+def viewer(window, renderer, wall):
+    viewer = viewer_of(window, renderer, wall)
+    yield viewer
+    viewer.parts.finder.close()
+
+
+@pytest.fixture
+def hands(viewer, display):
+    with RealHands(viewer, display) as hands:
+        hands.move(600, 20)
+        yield hands
+        hands.button(False)
+        hands.hold_key("Shift_L", False)
+        hands.move(600, 20)
+
+
+def settle(viewer) -> None:
+    """Frames until the view that is still has been measured."""
+    end = time.monotonic() + PATIENCE_S
+    run_frames(viewer, 1)
+    while not viewer.inspecting.is_current and time.monotonic() < end:
+        time.sleep(0.05)
+        run_frames(viewer, 1)
+    run_frames(viewer, 2)
+    assert viewer.inspecting.is_current
+
+
+def on_wall(viewer, x: float, y: float = 0.0) -> tuple[float, float]:
+    """Logical pixels of a place of the wall, metres."""
+    return place_of(viewer, (x, y, 0.0))
+
+
+def test_marks_are_laid_read_found_again_kept_and_reported(
+    window, renderer, wall, viewer, hands, monkeypatch
+):
+    tool, state, widgets = viewer.inspecting, viewer.state, Widgets(monkeypatch)
+    # Degrees and metres under the mouse, beside the scale, without the tool.
+    hands.move(*on_wall(viewer, 0.2))
+    settle(viewer)
+    value, depth = tool.pointed
+    assert value == pytest.approx(celsius_at(0.2), abs=NEAR_C)
+    in_eye = viewer.viewpoint.view().eye_from_world() @ (0.2, 0, 0, 1)
+    assert depth == pytest.approx(-in_eye[2], rel=0.01)
+
+    # The tool: a click, a drag, Shift and a drag.
+    hands.key("y")
+    assert tool.on
+    camera = viewer.viewpoint.view().eye_from_world().copy()
+    hands.click(*on_wall(viewer, 0.1))
+    hands.drag(on_wall(viewer, -0.1, -0.1), on_wall(viewer, 0.0, 0.1))
+    hands.hold_key("Shift_L", True)
+    hands.drag(on_wall(viewer, -0.15, 0.15), on_wall(viewer, 0.15, 0.15))
+    hands.hold_key("Shift_L", False)
+    assert [(m.name, m.kind) for m in tool.file.marks] == [
+        ("Sp1", "spot"), ("Ar1", "box"), ("Li1", "line"),
+    ]  # fmt: skip
+    assert np.array_equal(viewer.viewpoint.view().eye_from_world(), camera)  # no drag turned it
+    read = tool.readings
+    assert read["Sp1"].mean == pytest.approx(celsius_at(0.1), abs=NEAR_C)
+    for name, low, high in (("Ar1", -0.1, 0.0), ("Li1", -0.15, 0.15)):
+        assert read[name].least == pytest.approx(celsius_at(low), abs=NEAR_C)
+        assert read[name].most == pytest.approx(celsius_at(high), abs=NEAR_C)
+        assert read[name].mean == pytest.approx(celsius_at((low + high) / 2), abs=NEAR_C)
+    np.testing.assert_allclose(tool.file.marks[0].points, [[0.1, 0, 0]], atol=0.005)
+
+    # From another view they are found again: values come when it is still.
+    hands.drag(on_wall(viewer, 0.0), on_wall(viewer, 0.08, 0.05), 2)  # a box, taken back
+    hands.key("z", "Control_L")
+    assert len(tool.file.marks) == 3
+    x, y = on_wall(viewer, 0.0)
+    hands.move(x, y)
+    hands.button(True, "right")
+    hands.move(x + 40, y + 20)
+    hands.button(False, "right")
+    assert not np.array_equal(viewer.viewpoint.view().eye_from_world(), camera)
+    settle(viewer)
+    assert tool.readings["Sp1"].mean == pytest.approx(celsius_at(0.1), abs=NEAR_C)
+    before = read["Li1"].mean
+    assert tool.readings["Li1"].mean == pytest.approx(before, abs=NEAR_C)
+
+    # A still window measures nothing and draws no splats.
+    frames = renderer.update
+    calls: list[object] = []
+    monkeypatch.setattr(renderer, "update", lambda scene: calls.append(scene) or frames(scene))
+    run_frames(viewer, 5)
+    assert not calls and not viewer.polling
+    monkeypatch.undo()
+    widgets = Widgets(monkeypatch)
+
+    # Isotherms, over the photo stop, too.
+    tool.bound("above", 55.0)
+    state.set_x(0, 0.0)
+    run_frames(viewer, 3)
+    picture = viewer.window.picture().astype(int)
+    places = (on_wall(viewer, x, 0.25) for x in (-0.4, 0.4))
+    left, right = (picture[round(y), round(x)] for x, y in places)
+    assert right[0] > left[0] + 60 and right[0] > right[2] + 60  # red lies there alone
+    tool.bound("above", None)
+
+    # The table chooses; Delete deletes; a name that is typed stays.
+    hands.click(*widgets.middle("Li1"))
+    assert tool.chosen == "Li1"
+    hands.move(*on_wall(viewer, 0.0, 0.25))
+    hands.key("Delete")
+    assert [m.name for m in tool.file.marks] == ["Sp1", "Ar1"]
+    hands.click(*widgets.middle("Sp1"))
+    hands.click(*widgets.middle("##name of Sp1"))
+    hands.key("a", "Control_L")
+    hands.type("Motor")
+    hands.key("Return")
+    assert [m.name for m in tool.file.marks] == ["Motor", "Ar1"] and tool.on
+    assert not tool.name_mark("Ar1", "Motor") and not tool.name_mark("Ar1", " ")
+
+    # Saved beside the scene by the button alone, then read when it is opened.
+    beside = marks_path(wall)
+    assert tool.unsaved and not beside.exists()
+    run_frames(viewer, 2)
+    hands.click(*widgets.middle("Save marks"))
+    assert not tool.unsaved and [m.name for m in read_marks_file(beside).marks] == ["Motor", "Ar1"]
+    hands.click(*widgets.middle("Report"))
+    (report,) = (wall.parent / "work" / "exports").glob("*.html")
+    text = report.read_text()
+    assert "Motor" in text and text.count("data:image/png") == 2 and "Ar1" in text
+    again = viewer_of(window, renderer, wall)
+    assert [m.name for m in again.inspecting.file.marks] == ["Motor", "Ar1"]
+    assert not again.inspecting.unsaved and again.may_close()
+    again.parts.finder.close()
+
+    # Somebody else's file is not written over.
+    beside.write_text(json.dumps({"shapeshift_marks": 1, "marks": []}))
+    tool.delete("Motor")
+    tool.keep()
+    assert "somebody else" in state.problem and tool.unsaved
+    assert not tool.may_close() and tool.may_close()  # told once
+
+
+def test_the_handles_of_the_scale_are_level_and_span(viewer, hands, monkeypatch):
+    tool, state, widgets = viewer.inspecting, viewer.state, Widgets(monkeypatch)
+    box, scale = viewer.layout.legend, viewer.window.ui_scale
+    column, row = (int(v) for v in on_wall(viewer, -0.2))
+    assert tool.ends == (0.0, 100.0)
+    before = viewer.window.picture()[row, column].astype(int)
+    x = box[0] + 20
+    top, middle = (height_of(share, box, scale) for share in (1.0, 0.5))
+    hands.drag((x, top), (x, middle))
+    low, high = tool.ends
+    assert low == 0.0 and high == pytest.approx(50.0, abs=1.0)
+    settle_picture = viewer.window.picture()[row, column].astype(int)
+    assert settle_picture.sum() > before.sum() + 60  # 40 degrees of 50 are brighter than of 100
+    hands.key("y")
+    settle(viewer)
+    run_frames(viewer, 2)
+    hands.click(*widgets.middle("Auto"))
+    low, high = tool.ends  # the wall is 1.2 m wide
+    assert 20 <= low < 30 and 70 < high <= 80
+    hands.click(*widgets.middle("All values"))
+    assert tool.ends == (0.0, 100.0) and state.settings.heat_ends == (0.0, 1.0)
+
+
+def test_a_scene_without_heat_has_no_such_section(window, renderer, tmp_path):
+    wall = write_wall(tmp_path / "plain", STOPS[:1])
+    viewer = viewer_of(window, renderer, wall, "RGB")
+    section = next(s for s in viewer.hooks.sections if s.name == "Inspect")
+    assert not section.shown() and viewer.inspecting.thermal is None
+    viewer.parts.finder.close()

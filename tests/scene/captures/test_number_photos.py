@@ -1,0 +1,161 @@
+"""Thermal photos that are numbers: grids, TIFF, radiometric JPEG, and the range that they give."""
+
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.number_photos import (
+    is_radiometric,
+    open_grid,
+    radiometric_celsius,
+)
+from shapeshift.scene.captures.photo import load_photo, open_image
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.write_capture import write_capture
+from tests.support.scene.captures import simple, write_transforms
+from tests.support.scene.flir_files import write_flir
+
+RAMP = np.linspace(20.0, 80.0, 12 * 16).reshape(12, 16)
+
+
+def write_numbers(path, values: np.ndarray) -> None:
+    kind = path.suffix
+    if kind == ".npy":
+        np.save(path, values)
+    elif kind == ".csv":
+        np.savetxt(path, values, fmt="%.6f", delimiter=",")
+    elif kind == ".tif":
+        Image.fromarray(values.astype(np.float32)).save(path)
+    elif kind == ".png":
+        Image.fromarray(np.rint(values * 100).astype(np.uint16)).save(path)
+    else:
+        write_flir(path, values, (16, 12), png=True)
+
+
+def capture_of(folder, ending: str, count: int = 4, **heat) -> Capture:
+    """Photos of heat, each two degrees hotter than the one before."""
+    frames, rest = simple(folder, count + 1)
+    for i in range(count):
+        name = f"heat{i}{ending}"
+        write_numbers(folder / name, RAMP + 2 * i)
+        frames[i] |= {"modality": "Heat", "file_path": name}
+    frames[count] |= {"modality": "RGB"}
+    stop = {"name": "Heat", "x": 1, "kind": "thermal"} | heat
+    write_transforms(folder, frames, **rest, modalities=[{"name": "RGB", "x": 0}, stop])
+    return read_capture(folder)
+
+
+@pytest.mark.parametrize("ending", [".npy", ".csv", ".tif", ".png", ".jpg"])
+def test_a_range_that_nobody_states_is_that_of_the_photos(tmp_path, ending):
+    """All values from 20 to 86 lie in it, and no more than the margin beyond them."""
+    if ending == ".jpg":
+        pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
+    capture = capture_of(tmp_path, ending)
+    heat = capture.stops[-1]
+    scale = 100.0 if ending == ".png" else 1.0  # 16 bits: counts, whatever they mean
+    low, high = np.array(heat.value_range) / scale
+    assert 20 - 4 < low < 20 and 86 < high < 86 + 4
+    assert heat.palette == "ironbow"
+    assert heat.unit == ("°C" if ending == ".jpg" else "")
+    for i in (0, 3):
+        grey = load_photo(capture.photos[i]).rgb[..., 0].astype(float)
+        shown = low + (high - low) * grey / 255
+        assert np.abs(shown - RAMP - 2 * i).max() < 0.5 * (high - low) / 255 + 0.02  # a count
+    shown = 100.0 if ending == ".png" else 1.0
+    assert heat.value_range == (1690 * shown / 100, 8910 * shown / 100)  # in three digits
+    write_capture(capture)  # says the range from now on
+    assert read_capture(tmp_path).stops[-1].value_range == heat.value_range
+
+
+@pytest.mark.parametrize("ending", [".npy", ".tif"])
+def test_numbers_in_a_range_that_is_stated_are_values(tmp_path, ending):
+    capture = capture_of(tmp_path, ending, value_range=[20, 80], unit="°C", palette="ironbow")
+    assert capture.stops[-1].value_range == (20.0, 80.0)
+    grey = load_photo(capture.photos[0]).rgb[..., 0]
+    np.testing.assert_allclose(grey, 255 * (RAMP - 20) / 60, atol=0.51)
+
+
+@pytest.mark.parametrize("png", [False, True])
+def test_degrees_of_a_radiometric_photo_are_those_of_planck(tmp_path, png):
+    """A raw number is about 0.02 °C there."""
+    pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
+    celsius = np.linspace(-10, 120, 60 * 80).reshape(60, 80)
+    path = write_flir(tmp_path / "a.jpg", celsius, (80, 60), png)
+    assert is_radiometric(path)
+    np.testing.assert_allclose(radiometric_celsius(path, (80, 60)), celsius, atol=0.05)
+    larger = radiometric_celsius(path, (160, 120))  # the picture has more pixels
+    assert larger.shape == (120, 160)
+    np.testing.assert_allclose(larger.reshape(60, 2, 80, 2).mean(axis=(1, 3)), celsius, atol=1.5)
+    with pytest.raises(BadFile, match="field of view"):
+        radiometric_celsius(path, (100, 60))
+    data = path.read_bytes()
+    for broken in (data[:2000], data.replace(b"FFF\0", b"XXX\0", 1)[:-3000]):
+        path.write_bytes(broken)
+        with pytest.raises(BadFile, match="thermal numbers") as refused:
+            radiometric_celsius(path, (80, 60))
+        assert "\n" not in str(refused.value)
+
+
+def test_without_the_reader_a_sentence_says_so(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "flyr", None)
+    path = write_flir(tmp_path / "a.jpg", RAMP, (16, 12))
+    with pytest.raises(BadFile, match="pip install flyr"):
+        radiometric_celsius(path, (16, 12))
+    monkeypatch.setattr(
+        "shapeshift.scene.captures.value_ranges.can_read_radiometric", lambda: False
+    )
+    capture = capture_of(tmp_path, ".jpg")  # their colours, as before
+    assert capture.stops[-1].value_range is None
+    assert any("pip install flyr" in doubt for doubt in capture.doubts)
+    assert not is_radiometric(tmp_path / "images" / "000.png")
+
+
+@pytest.mark.parametrize(
+    "text, wanted",
+    [
+        ("1,2\n3,4\n", [[1, 2], [3, 4]]),
+        ("\ufeff1;2,5\r\n3;4\r\n", [[1, 2.5], [3, 4]]),
+        ("Camera,E8\nunit,C\n\n1,2,\n3,,\n", None),
+        ("Camera,E8\nunit,C\n\n1,2,\n3,4,\n", [[1, 2], [3, 4]]),
+        ("1\tnan\n3\t4", [[1, np.nan], [3, 4]]),
+        ("1,2\n3\n", None),
+        ("1,2\n3,x\n", None),
+        ("words\n", None),
+        ("", None),
+        ("1,2\n", None),
+        ("1\n2\n", None),
+    ],
+)
+def test_a_csv_is_lines_of_numbers(tmp_path, text, wanted):
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    if wanted is None:
+        with pytest.raises(BadFile, match=r"a\.csv: ") as refused:
+            open_grid(path)
+        assert "\n" not in str(refused.value)
+    else:
+        np.testing.assert_array_equal(np.asarray(open_grid(path)), np.float32(wanted))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.zeros((2, 3, 4)), np.zeros(5), np.zeros((0, 3)), np.zeros((2, 2), complex),
+        np.array([["a", "b"]]), np.array([[None, 1]], object),
+    ],
+)  # fmt: skip
+def test_an_npy_that_is_no_grid_is_refused(tmp_path, values):
+    np.save(tmp_path / "a.npy", values, allow_pickle=True)
+    with pytest.raises(BadFile, match=r"a\.npy: ") as refused:
+        open_grid(tmp_path / "a.npy")
+    assert "\n" not in str(refused.value)
+    (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\x01\x00")
+    with pytest.raises(BadFile, match=r"^a\.npy: |/a\.npy: ") as refused:
+        open_image(tmp_path / "a.npy")
+    assert "PNG" not in str(refused.value)  # its own sentence, not that of a picture
+    with pytest.raises(BadFile, match="missing"):
+        open_image(tmp_path / "b.npy")
