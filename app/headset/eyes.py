@@ -9,6 +9,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.pose import View
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
+from shapeshift.vr.locomotion.height import raised
 from shapeshift.vr.openxr.layers import QuadPicture
 from shapeshift.vr.overlay import Overlay
 from shapeshift.vr.scene_depth import EyeDepth, SceneDepth
@@ -63,9 +64,12 @@ class Eyes:
             texture.release()
 
 
-def quad_of(drawn: Drawn) -> QuadPicture | None:
-    """The panel as a layer of its own, where it is one."""
+def quad_of(drawn: Drawn, lift_m: float = 0.0) -> QuadPicture | None:
+    """The panel as a layer of its own, where it is one, in the runtime's room, which ours is
+    raised over.
+    """
     panel = drawn.panel
     if panel is None or not panel.apart:
         return None
-    return QuadPicture(panel.texture, panel.version, panel.play_from_panel, panel.size_m)
+    pose = raised(panel.play_from_panel, -lift_m)
+    return QuadPicture(panel.texture, panel.version, pose, panel.size_m)

@@ -7,12 +7,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
+
+if TYPE_CHECKING:
+    from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
 
@@ -29,15 +32,26 @@ class Options(ReadingOptions):
     quality: Literal["auto", "best", "balanced", "fast"] = "auto"
     """auto: shortcuts only where the exact picture of both eyes takes longer than the headset's
     frames last, and fewer pixels while frames are late; best: exact, always."""
-    turning: Literal["snap", "smooth", "none"] = "snap"
+    posture: Literal["standing", "seated"] | None = None
+    """seated: the room is raised so that your eyes are 1.6 m over its floor; Recentre measures
+    anew.  Default: as the panel was set last, at first standing."""
+    hands: Literal["both", "left", "right"] | None = None
+    """left, right: everything with that controller alone.  Default: as set last, at first both."""
+    turning: Literal["snap", "smooth", "none"] | None = None
     """What the stick that does not walk does: turn by 30 degrees at a time, turn evenly, or
-    nothing, so that one turns with the body alone."""
-    walking_hand: Literal["left", "right"] = "left"
-    """The hand whose stick walks; the other turns and flies."""
-    panel_hand: Literal["left", "right"] = "left"
-    """The hand that carries the panel; the other points at it."""
-    vignette: float = 0.8
-    """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black."""
+    nothing, so that one turns with the body alone.  Default: as set last, at first snap."""
+    walking_hand: Literal["left", "right"] | None = None
+    """The hand whose stick walks; the other turns and flies.  Default: as set last, at first
+    left."""
+    panel_hand: Literal["left", "right"] | None = None
+    """The hand that carries the panel; the other points at it.  Default: as set last, at first
+    left."""
+    vignette: float | None = None
+    """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black.
+    Default: as set last, at first 0.8."""
+    text_size: float | None = None
+    """Size of the panel with its text, 0.75 to 2; 1: capitals a degree high at arm's length.
+    Default: as set last, at first 1."""
     floor: bool = True
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
     hints: bool = True
@@ -96,6 +110,7 @@ def run(options: Options) -> int:
 def check(options: Options) -> None:
     """UsageError, one sentence, for what makes no sense."""
     from shapeshift.app.errors import UsageError
+    from shapeshift.app.headset.worn_settings import LEAST_SIZE, MOST_SIZE
 
     if not 0.1 <= options.eye_part <= 2:
         raise UsageError(f"--eye-part is {options.eye_part:g}, expected 0.1 to 2.")
@@ -104,8 +119,11 @@ def check(options: Options) -> None:
             raise UsageError(f"{name} is {value}, expected a number above 0.")
         if value is not None and options.quality != "auto":
             raise UsageError(f"{name} is for --quality auto; leave one of the two out.")
-    if not 0 <= options.vignette <= 1:
+    if options.vignette is not None and not 0 <= options.vignette <= 1:
         raise UsageError(f"--vignette is {options.vignette:g}, expected 0 to 1.")
+    if options.text_size is not None and not LEAST_SIZE <= options.text_size <= MOST_SIZE:
+        size = f"{options.text_size:g}, expected {LEAST_SIZE:g} to {MOST_SIZE:g}"
+        raise UsageError(f"--text-size is {size}.")
     if options.frames < 0:
         raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
     if options.every < 1:
@@ -124,6 +142,8 @@ def wear(options: Options) -> int:
     from shapeshift.app.cli import has_display
     from shapeshift.app.document import DARK
     from shapeshift.app.drawing import make_folder
+    from shapeshift.app.editor.state.user.settings import ProgramSettings
+    from shapeshift.app.editor.window.shell import speak_first
     from shapeshift.app.headset.eyes import Eyes
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
@@ -131,12 +151,15 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
     from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.xr_app import XrApp
+    from shapeshift.app.paths import config_folder
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
     from shapeshift.vr.openxr.instance import Instance, Lost
 
     with Instance() as instance:
+        worn = worn_settings(options)
         document, editor = open_xr(options.scene or DEMO, options, options.x)
+        speak_first(ProgramSettings.read(config_folder()), editor.messages)
         pacing = Pacing(
             document.background_or(DARK), options.quality, options.floor_db or FLOOR_DB,
             options.target_ms, options.stereo_colors,
@@ -151,13 +174,9 @@ def wear(options: Options) -> int:
             Eyes(mirror.ctx, session.sizes) as eyes,
             editor.bodies,
         ):
-            rules = Rules(
-                options.walking_hand, options.turning, vignette=options.vignette,
-                obstacles=options.obstacles,
-            )  # fmt: skip
+            rules = Rules(obstacles=options.obstacles)
             wearing = Wearing(
-                options.panel_hand, options.floor, options.hints, options.depth,
-                options.panel_layer, options.edges,
+                options.floor, options.hints, options.depth, options.panel_layer, options.edges,
             )  # fmt: skip
             if not (options.controllers or session.bare_hands.there):
                 say(f"{instance.runtime} sees no hands; controllers are taken.")
@@ -165,6 +184,7 @@ def wear(options: Options) -> int:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
+                worn,
             )  # fmt: skip
             try:
                 with interrupting(xr_app), xr_app.state.parts.finder:
@@ -175,6 +195,15 @@ def wear(options: Options) -> int:
             finally:
                 report.write(describe(instance, session) | pacing.report())
     return 0
+
+
+def worn_settings(options: Options) -> "KeptSettings":
+    """What the panel kept, and what the options say instead for this session."""
+    from shapeshift.app.headset.worn_settings import KeptSettings, WornSettings
+    from shapeshift.app.paths import config_folder
+
+    said = {each.name: getattr(options, each.name) for each in fields(WornSettings)}
+    return KeptSettings(config_folder(), **said)
 
 
 def open_session(instance, ctx, options: Options):

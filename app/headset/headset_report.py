@@ -107,6 +107,7 @@ def frame_row(done: DoneFrame) -> dict:
         ],
         "hands": {side: hand_row(side, hand) for side, hand in frame.hands.items()},
         "standing": {**pose_row(play_space.world_from_play), "scale": rounded(play_space.scale)},
+        "lift_m": rounded(done.state.fit.lift_m),
         "held": {side: world.held(side) for side in SIDES},
         "offers": [
             {"hand": offer.side, "object": offer.object, "by": offer.by}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from imgui_bundle import imgui
 
@@ -21,6 +22,8 @@ from shapeshift.app.editor.state.film.gallery import Gallery
 from shapeshift.app.editor.state.film.style_work import StyleWork
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.track import ON_STOP, shown_words
+from shapeshift.app.editor.texts.table import said
+from shapeshift.app.headset.comfort_section import draw_comfort
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.performance_section import draw_figures
 from shapeshift.app.headset.room_section import (
@@ -35,8 +38,8 @@ from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.stance import resized
-from shapeshift.vr.panel.carried import Carried, carry, left_over
-from shapeshift.vr.panel.plane import Place
+from shapeshift.vr.panel.carried import Carried, Palm, carry, left_over
+from shapeshift.vr.panel.plane import NOBODY, Place
 from shapeshift.vr.panel.stick import MIDDLE, scroll, slide
 
 TICK = (0.25, 0.012)  # strength and seconds of the buzz when something is pointed at
@@ -57,11 +60,9 @@ class MenuActions:
 class WristMenu:
     """Keeps the panel between frames; `carried` is where it is, `picture` what is on it."""
 
-    def __init__(
-        self, state: XrState, actions: MenuActions, picture: PanelPicture, hand: str = "left"
-    ) -> None:
+    def __init__(self, state: XrState, actions: MenuActions, picture: PanelPicture) -> None:
         self._state, self._actions, self.picture = state, actions, picture
-        self.carried = Carried(PANEL, home=hand)
+        self.carried = Carried(PANEL, home=state.worn.now.carries)
         self._frame: Frame | None = None  # that is under way
         self._seconds = 0.0
         self._held: dict[str, str | None] = {}
@@ -97,6 +98,7 @@ class WristMenu:
             Section("Look", lambda scale: draw_look(editor, scale)),
             Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
+            Section("Comfort", lambda scale: draw_comfort(state.worn.now, self._choose)),
             Section("Help", lambda scale: draw_help()),
         ]
 
@@ -104,6 +106,7 @@ class WristMenu:
         """What hands do to the panel; the frame with what it leaves of them."""
         self._frame, self._seconds = frame, seconds
         self._follow_hands()
+        self._follow_settings()
         self.gallery.each_frame()
         self.styles.poll()
         carried = self.carried = carry(self.carried, frame, seconds)
@@ -168,7 +171,7 @@ class WristMenu:
             state.parts.on, state.parts.count, state.parts.factor,
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
             self._foot.sure_s > 0, editor.messages.note, self.gallery.shown, self.styles.progress,
-            state.figures if self._figures_seen else None,
+            state.figures if self._figures_seen else None, state.worn.now,
         )  # fmt: skip
 
     def _fill(self) -> None:
@@ -215,6 +218,25 @@ class WristMenu:
         if any(abs(stop.x - x) <= ON_STOP for stop in editor.stops(index)):
             self._actions.pulse(side, *CLICK)
 
+    def _choose(self, **values: Any) -> None:
+        """A setting of the section Comfort, which stays."""
+        try:
+            self._state.worn.choose(**values)
+        except OSError as why:
+            self._state.editor.messages.fail(said("The settings cannot be kept: {why}.", why=why))
+
+    def _follow_settings(self) -> None:
+        """The panel is at the hand, and as large, as the settings have it."""
+        worn, carried = self._state.worn.now, self.carried
+        plane = replace(PANEL, metres_per_pixel=PANEL.metres_per_pixel * worn.text_size)
+        if plane != carried.plane:
+            self.carried = carried = replace(carried, plane=plane)
+        if worn.carries != carried.home:
+            self.carried = replace(
+                carried, home=worn.carries, pinned=carried.open, palm=Palm(), pointing=NOBODY,
+                play_from_panel=None, sticks={},
+            )  # fmt: skip
+
     def _follow_hands(self) -> None:
         """The slider of what a hand takes is the one that is shown."""
         held, editor = dict(self._state.user.touched.held), self._state.editor
@@ -240,7 +262,7 @@ class WristMenu:
             return row
 
         def place(at: Place) -> list[float]:
-            return [round(float(number), 6) for number in PANEL.play_point(pose, at)]
+            return [round(float(number), 6) for number in carried.plane.play_point(pose, at)]
 
         boxes = dict(self.picture.boxes)
         row["object"] = obj.name if obj is not None else ""

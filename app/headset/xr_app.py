@@ -19,6 +19,7 @@ from shapeshift.app.headset.pacing import Pacing, StereoChart
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.performance_section import Figures
 from shapeshift.app.headset.wearing import WEARING, Wearing
+from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.renderer.renderer import Renderer
@@ -60,6 +61,7 @@ class XrApp:
         report: Report,
         rules: Rules = RULES,
         wearing: Wearing = WEARING,
+        worn: KeptSettings | None = None,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.report, self._wearing = report, wearing
@@ -69,10 +71,13 @@ class XrApp:
         user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
         touch = TouchState(editor, True, keys=False)
         parts = PartsTool(editor, lambda: None)
-        self.state = XrState(editor, touch, pacing, user, parts, floor_shown=wearing.floor)
+        worn = worn or KeptSettings()
+        self.state = XrState(
+            editor, touch, pacing, user, parts, floor_shown=wearing.floor, worn=worn
+        )
         self._parts_hand = PartsHand(parts)
         actions = MenuActions(self.recentre, self.leave, self.pulse)
-        self.menu = WristMenu(self.state, actions, eyes.panel, wearing.panel_hand)
+        self.menu = WristMenu(self.state, actions, eyes.panel)
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
         self._outlines, self._late = Outlines(), Late()
@@ -117,7 +122,12 @@ class XrApp:
         """One frame: the person, the world, the pictures of both eyes."""
         seconds = self._time_passed(frame)
         self.pulses.clear()
-        if not self._stood or frame.recentred:
+        state = self.state
+        frame, moves = state.fit.worn(frame, seconds)
+        state.user.rules = state.worn.now.rules(state.user.rules)
+        if moves:
+            self._stand(frame)
+        elif not self._stood or frame.recentred:
             self.recentre(frame)
         self._stood |= frame.drawn  # before, nobody knows where the head is
         self._seen_s = frame.seen_s
@@ -243,7 +253,8 @@ class XrApp:
             if depths is not None:
                 eyes.write_depth(i, framebuffer, play_views[i], depths[i], over)
 
-        self.session.submit(eyes.textures, write if depths else None, quad_of(over))
+        quad = quad_of(over, self.state.fit.lift_m)
+        self.session.submit(eyes.textures, write if depths else None, quad)
         eyes.fill_panel(play_views, over)
 
     def _choose_quality(self, views: list[View]) -> None:
@@ -260,7 +271,13 @@ class XrApp:
         pace.restart()
 
     def recentre(self, frame: Frame) -> None:
-        """Back to where the scene is looked at first, at the size it has now."""
+        """Back to where the scene is looked at first, at the size it has now; who sits is raised
+        anew.
+        """
+        self.state.fit.measure(frame.head)
+        self._stand(frame)
+
+    def _stand(self, frame: Frame) -> None:
         self.state.play_space = self.state.user.before_scene(frame, self.state.play_space.scale)
         self.state.user.jumped()
         floor_y, under = self.state.user.floor_y, self.state.play_space.point(underfoot(frame.head))

@@ -228,7 +228,9 @@ def test_sections_of_the_desktop_do_here_what_they_do_there(wearer):
     wearer.press("leg")
     assert wearer.shown == "leg"
     wearer.scroll(1.0)
+    wearer.scroll_to("Objects")
     wearer.press("Objects")
+    wearer.scroll(1.0)
     wearer.unfold("Look")
     wearer.press("debug")
     left, top, right, _ = wearer.menu.picture.boxes["debug"]
