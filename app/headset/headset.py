@@ -3,7 +3,7 @@
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
 from math import inf
 from pathlib import Path
@@ -15,6 +15,7 @@ from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
+    from shapeshift.app.headset.scene_shelf import SceneShelf
     from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
@@ -172,7 +173,6 @@ def wear(options: Options) -> int:
             open_session(instance, mirror.ctx, options) as session,
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
-            editor.bodies,
         ):
             rules = Rules(obstacles=options.obstacles)
             wearing = Wearing(
@@ -184,16 +184,16 @@ def wear(options: Options) -> int:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
-                worn,
+                worn, shelf_of(options),
             )  # fmt: skip
             try:
-                with interrupting(xr_app), xr_app.state.parts.finder:
+                with interrupting(xr_app), closing(xr_app):
                     xr_app.loop(options.frames)
             except Lost:
                 report.ended = "runtime lost"
                 raise
             finally:
-                report.write(describe(instance, session) | pacing.report())
+                report.write(describe(instance, session) | xr_app.state.pacing.report())
     return 0
 
 
@@ -204,6 +204,15 @@ def worn_settings(options: Options) -> "KeptSettings":
 
     said = {each.name: getattr(options, each.name) for each in fields(WornSettings)}
     return KeptSettings(config_folder(), **said)
+
+
+def shelf_of(options: Options) -> "SceneShelf":
+    """Scenes for the panel; a run that is measured puts none into the list."""
+    from shapeshift.app.headset.scene_shelf import SceneShelf
+    from shapeshift.app.paths import config_folder
+
+    measured = bool(options.frames or options.report or options.lines)
+    return SceneShelf(config_folder(), options, options.scene or DEMO, keeps=not measured)
 
 
 def open_session(instance, ctx, options: Options):

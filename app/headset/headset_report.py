@@ -97,6 +97,7 @@ def frame_row(done: DoneFrame) -> dict:
         "seen_s": rounded(frame.seen_s),
         "time_s": rounded(world.time_s),  # of the physics
         "state": done.life.state,
+        "scene": done.state.editor.edited.name,
         "drawn": frame.drawn,
         "focused": frame.focused,
         "recentred": frame.recentred,

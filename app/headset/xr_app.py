@@ -2,7 +2,9 @@
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
 import moderngl
 
@@ -11,17 +13,22 @@ from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
 from shapeshift.app.headset.parts_hand import PartsHand
-from shapeshift.app.headset.performance_section import Figures
+from shapeshift.app.headset.save_start import save_start
+from shapeshift.app.headset.scene_shelf import SceneShelf
+from shapeshift.app.headset.sections.performance_section import Figures
+from shapeshift.app.headset.shutter import Shutter
 from shapeshift.app.headset.wearing import WEARING, Wearing
 from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
+from shapeshift.app.paths import WorkFolders
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.appearance import plain_color
@@ -34,9 +41,10 @@ from shapeshift.vr.floor import REST, Grid, clearness
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.glove import Capsule
 from shapeshift.vr.hints import hints
-from shapeshift.vr.locomotion.locomotion import RULES, Rules
+from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.openxr.session import Session
+from shapeshift.vr.openxr.swapchain import read
 from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.touching import strongest
@@ -62,39 +70,85 @@ class XrApp:
         rules: Rules = RULES,
         wearing: Wearing = WEARING,
         worn: KeptSettings | None = None,
+        shelf: SceneShelf | None = None,
+        shutter: Shutter | None = None,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.report, self._wearing = report, wearing
-        self.background = document.background_or(DARK)
-        eye = document.view(ANY_SIZE).world_from_eye
-        editor.settings = replace(editor.settings, background=self.background)
-        user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
-        touch = TouchState(editor, True, keys=False)
-        parts = PartsTool(editor, lambda: None)
-        worn = worn or KeptSettings()
-        self.state = XrState(
-            editor, touch, pacing, user, parts, floor_shown=wearing.floor, worn=worn
-        )
-        self._parts_hand = PartsHand(parts)
-        actions = MenuActions(self.recentre, self.leave, self.pulse)
-        self.menu = WristMenu(self.state, actions, eyes.panel)
+        self._worn, self.shelf = worn or KeptSettings(), shelf or SceneShelf()
+        self.shutter = shutter or Shutter(WorkFolders.of().pictures)
+        self._closing = ExitStack()
+        self._closing.callback(self.shutter.close)
+        self._scene = ExitStack()  # what ends with the scene that is open
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
-        self._outlines, self._late = Outlines(), Late()
+        self._late = Late()
         self._worn_s = 0.0  # since the hands were there for the first time
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
         self._figured_s = 0.0  # when the panel's figures were made
         self._drawing_ms = 0.0  # of the splats of both eyes, last
-        self._stood = False  # whether the person has been put before the scene
         self.interrupted = False  # by Ctrl-C: no frame is left half done
         self._leaving = False
+        self._enter(document, editor, pacing, rules, wearing.floor)
+
+    def _enter(
+        self, document: Document, editor: EditorState, pacing: Pacing, rules: Rules, floor: bool
+    ) -> None:
+        """A scene that was opened, with a panel of its own."""
+        self._scene.close()
+        self._scene.enter_context(editor.bodies)
+        self.background = document.background_or(DARK)
+        eye = document.view(ANY_SIZE).world_from_eye
+        editor.settings = replace(editor.settings, background=self.background)
+        user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
+        touch = TouchState(editor, True, keys=False)
+        parts = PartsTool(editor, lambda: None)
+        self._scene.enter_context(parts.finder)
+        self.state = XrState(editor, touch, pacing, user, parts, floor_shown=floor, worn=self._worn)
+        self._parts_hand = PartsHand(parts)
+        actions = MenuActions(
+            self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start
+        )
+        self.menu = WristMenu(self.state, actions, self.eyes.panel)
+        self._outlines = Outlines()
+        self._stood = False  # whether the person has been put before the scene
+
+    def _change_scene(self) -> None:
+        """Once another one is read, the session goes on in it."""
+        messages = self.state.editor.messages
+        opened = self.shelf.poll(messages.fail)
+        if opened is None:
+            return
+        document, editor = opened
+        before, carried = self.state, self.menu.carried
+        pacing = before.pacing.for_scene(document.background_or(DARK))
+        rules = before.user.rules
+        self._enter(document, editor, pacing, rules, before.floor_shown)
+        self.state.fit = before.fit
+        self.state.user.travel = Travel(blink=1.0)  # it comes out of the dark
+        self.menu.carried = carried
+        self.session.pace.restart()
+
+    def _keep_start(self, frame: Frame) -> None:
+        """The scene begins here from now on: it is saved, as on a desk, and Recentre comes here."""
+        state = self.state
+        eye = state.play_space.pose(frame.head)
+        if save_start(state.editor, eye):
+            state.user.eye = eye
+            self.shelf.remember(state.editor.edited.path)
+
+    def close(self) -> None:
+        """Ends what is being made for the scene, and waits for pictures."""
+        self._scene.close()
+        self._closing.close()
 
     def loop(self, frames: int = 0) -> None:
         """Until the runtime, the person at the desk or `frames` (0: none) end it."""
         for frame in self.session.frames(self._rest):
             self.frame(frame)
+            self._change_scene()
             done = 0 < frames <= self.session.pace.frames
             if done or self._ends:
                 self.leave("frames" if done else self._ends)
@@ -145,9 +199,12 @@ class XrApp:
             views = [self.state.play_space.view(view) for view in frame.views]
             self._choose_quality(views)
             over = self._over(frame)
+            if self.shutter.due:
+                over = replace(over, panel=None, lines=(), cards=())
             self._hand_over(frame.views, over, self.draw(views, frame.views, over))
             self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
+            self._keep_pictures()
             if frame.seen_s - self._figured_s >= FIGURES_EVERY_S:
                 self._figured_s = frame.seen_s
                 self.state.figures = Figures.of(self.session.pace, self.stats)
@@ -165,6 +222,18 @@ class XrApp:
             session.layers.last if frame.drawn else (),
         )
         self.report.note(done, self.eyes.framebuffers)
+
+    def _keep_pictures(self) -> None:
+        """Of what the left eye has just seen, where somebody has asked for one."""
+        messages = self.state.editor.messages
+        if self.shutter.due:
+            self.shutter.expose(read(self.eyes.framebuffers[0]))
+        self.shelf.saw(lambda: read(self.eyes.framebuffers[0]))
+
+        def say_written(path: Path) -> None:
+            messages.say(said("{name} is written.", name=path.name), time.perf_counter())
+
+        self.shutter.poll(say_written, messages.fail)
 
     def _pass(self, seconds: float) -> list[Record]:
         """Lets time pass: what plays, edits that the world has to follow, then the world."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
-from shapeshift.app.headset.fit import Fit
+from shapeshift.app.headset.fitting import Fitting
 from shapeshift.app.headset.pacing import Pacing
-from shapeshift.app.headset.performance_section import Figures
+from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
@@ -89,10 +89,10 @@ class XrState:
     floor_shown: bool = True
     figures: Figures | None = None  # of the last second
     worn: KeptSettings = field(default_factory=KeptSettings)
-    fit: Fit = field(init=False)
+    fit: Fitting = field(init=False)
 
     def __post_init__(self) -> None:
-        self.fit = Fit(self.worn)
+        self.fit = Fitting(self.worn)
 
     @property
     def world(self) -> World:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.app.headset.fit import Fit
+from shapeshift.app.headset.fitting import Fitting
 from shapeshift.app.headset.panel_picture import PanelPicture
 from shapeshift.app.headset.worn_settings import FILE, KeptSettings, WornSettings, read_settings
 from shapeshift.scene.pose import Pose
@@ -102,7 +102,7 @@ def test_all_of_a_room_is_raised_as_one():
 
 def test_the_height_is_measured_at_recentre_and_kept():
     kept = KeptSettings(posture="seated")
-    fit = Fit(kept)
+    fit = Fitting(kept)
     first, _ = fit.worn(frame(head=SITS), 0.01)
     assert first.head.position[1] == pytest.approx(1.1)
     fit.measure(first.head)

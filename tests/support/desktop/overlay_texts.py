@@ -44,11 +44,11 @@ TABLES = {
     "sections.stops_panel": {"MODE_NAMES": VALUES},
 }  # fmt: skip
 HEADSET_TABLES = {
-    "comfort_section": {
+    "sections.comfort_section": {
         "POSTURE_NAMES": VALUES, "HAND_NAMES": VALUES, "PANEL_NAMES": VALUES, "WALK_NAMES": VALUES,
         "TURN_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL,
     },
-    "room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL},
+    "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL}, "wrist_menu": {"SURE": ALL},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
 KEY_TABLES = ("objects", "parts", "split", "touch")  # of app/editor/window: KEYS of the sheet

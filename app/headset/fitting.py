@@ -11,7 +11,7 @@ from shapeshift.vr.openxr.spaces import EYE_HEIGHT_M
 from shapeshift.vr.panel.carried import Palm
 
 
-class Fit:
+class Fitting:
     """Keeps by how much the room is raised: it is measured at Recentre, and stays until the next.
 
     `lift_m`: metres.

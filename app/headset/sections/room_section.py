@@ -12,8 +12,8 @@ from shapeshift.app.editor.panels.widgets.panel_rows import item_label
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.track import shown_words
 from shapeshift.app.editor.texts.table import said
-from shapeshift.app.headset.comfort_section import lit_button
 from shapeshift.app.headset.pacing import QUALITIES
+from shapeshift.app.headset.sections.comfort_section import lit_button
 from shapeshift.app.headset.xr_user import XrState
 
 Vec = imgui.ImVec2
