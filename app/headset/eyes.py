@@ -13,6 +13,7 @@ from shapeshift.vr.locomotion.height import raised
 from shapeshift.vr.openxr.layers import QuadPicture
 from shapeshift.vr.overlay import Overlay
 from shapeshift.vr.scene_depth import EyeDepth, SceneDepth
+from shapeshift.vr.see_through import SeeThrough
 
 DEPTH_SCALE = 0.5  # of an eye's width and height: edges of a hand behind a splat are soft anyway
 
@@ -22,6 +23,7 @@ class Eyes:
 
     def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
         self.floor, self.overlay, self.panel = Floor(ctx), Overlay(ctx), PanelPicture(ctx)
+        self.see_through = SeeThrough(ctx)
         self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
         self._depths = [SceneDepth(ctx) for _ in sizes]
 
@@ -55,6 +57,7 @@ class Eyes:
 
     def __exit__(self, *failure) -> None:
         self.floor.release()
+        self.see_through.release()
         self.overlay.release()
         self.panel.release()
         for depth in self._depths:

@@ -53,6 +53,9 @@ class Options(ReadingOptions):
     text_size: float | None = None
     """Size of the panel with its text, 0.75 to 2; 1: capitals a degree high at arm's length.
     Default: as set last, at first 1."""
+    passthrough: bool | None = None
+    """Show the room itself behind the scene, and of a scene of objects these alone, where the
+    runtime blends pictures by their alpha.  Default: as set last, at first not."""
     floor: bool = True
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
     hints: bool = True
@@ -180,6 +183,8 @@ def wear(options: Options) -> int:
             )  # fmt: skip
             if not (options.controllers or session.bare_hands.there):
                 say(f"{instance.runtime} sees no hands; controllers are taken.")
+            if options.passthrough and not session.sees_through:
+                say(f"{instance.runtime} shows no room behind pictures; the scene has its own.")
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
@@ -258,6 +263,7 @@ def describe(instance, session) -> dict:
         "pixels": session.pixels.name,
         "eyes": session.sizes,
         "depth": session.layers.depth,
+        "passthrough": session.sees_through,
         **session.pace.report(),
     }
 

@@ -38,6 +38,7 @@ class WornSettings:
     turning: str = "snap"
     vignette: float = 0.8  # 0: none, 1: black
     text_size: float = 1.0  # of the panel, with all that is on it
+    passthrough: bool = False  # the room itself is behind the scene, where the runtime shows it
 
     @property
     def one_hand(self) -> str:
@@ -86,4 +87,6 @@ def read_settings(folder: Path) -> WornSettings:
         value = found.get(name)
         if is_number(value) and low <= value <= high:
             good[name] = float(value)
+    if isinstance(found.get("passthrough"), bool):
+        good["passthrough"] = found["passthrough"]
     return WornSettings(**good)

@@ -28,7 +28,7 @@ from shapeshift.app.editor.state.track import ON_STOP, shown_words
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.scene_shelf import SceneShelf
-from shapeshift.app.headset.sections.comfort_section import draw_comfort
+from shapeshift.app.headset.sections.comfort_section import draw_comfort, draw_see_through
 from shapeshift.app.headset.sections.performance_section import draw_figures
 from shapeshift.app.headset.sections.room_section import (
     Foot,
@@ -111,7 +111,7 @@ class WristMenu:
             Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
             Section("Scenes", lambda scale: self._draw_scenes(scenes, scale)),
-            Section("Comfort", lambda scale: draw_comfort(state.worn.now, self._choose)),
+            Section("Comfort", self._draw_comfort),
             Section("Help", lambda scale: draw_help()),
         ]
 
@@ -211,6 +211,11 @@ class WristMenu:
 
     def _draw_gallery(self, scale: float) -> None:
         draw_gallery(self.gallery, self.styles, self.picture.textures, scale)
+
+    def _draw_comfort(self, _: float) -> None:
+        state = self._state
+        draw_comfort(state.worn.now, self._choose)
+        draw_see_through(state.through, state.sees_through, self._choose)
 
     def _draw_scenes(self, actions: SceneActions, scale: float) -> None:
         draw_scenes(self.shelf, actions, self.picture.textures, scale)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import moderngl
 
-from shapeshift.app.document import DARK, Document
+from shapeshift.app.document import BLACK, DARK, Document
 from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
@@ -32,6 +32,7 @@ from shapeshift.app.paths import WorkFolders
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.appearance import plain_color
+from shapeshift.scene.four_views import ALONE, FULL, has_objects
 from shapeshift.scene.pose import View
 from shapeshift.scene.world.record import Record
 from shapeshift.vr.area import area_edges
@@ -106,13 +107,23 @@ class XrApp:
         touch = TouchState(editor, True, keys=False)
         parts = PartsTool(editor, lambda: None)
         self._scene.enter_context(parts.finder)
-        self.state = XrState(editor, touch, pacing, user, parts, floor_shown=floor, worn=self._worn)
+        self.state = XrState(
+            editor,
+            touch,
+            pacing,
+            user,
+            parts,
+            floor_shown=floor,
+            worn=self._worn,
+            sees_through=self.session.sees_through,
+        )
         self._parts_hand = PartsHand(parts)
         actions = MenuActions(
             self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start
         )
         self.menu = WristMenu(self.state, actions, self.eyes.panel)
         self._outlines = Outlines()
+        self._was_through = False  # whether the room itself was behind the scene
         self._stood = False  # whether the person has been put before the scene
 
     def _change_scene(self) -> None:
@@ -177,6 +188,7 @@ class XrApp:
         seconds = self._time_passed(frame)
         self.pulses.clear()
         state = self.state
+        self._see_objects_alone(state.through)
         frame, moves = state.fit.worn(frame, seconds)
         state.user.rules = state.worn.now.rules(state.user.rules)
         if moves:
@@ -222,6 +234,15 @@ class XrApp:
             session.layers.last if frame.drawn else (),
         )
         self.report.note(done, self.eyes.framebuffers)
+
+    def _see_objects_alone(self, through: bool) -> None:
+        """Over the room a scene that has objects is seen without what was captured around them."""
+        shown, was = self.state.editor.shown_scene, self._was_through
+        self._was_through = through
+        if through and not was and shown.show == FULL and has_objects(self.state.editor.scene):
+            shown.show = ALONE
+        elif was and not through and shown.show == ALONE:
+            shown.show = FULL
 
     def _keep_pictures(self) -> None:
         """Of what the left eye has just seen, where somebody has asked for one."""
@@ -289,10 +310,11 @@ class XrApp:
         Returns how deep the splats are, where that was asked for.
         """
         look, deep = self.state.editor.settings, self._wearing.depth
-        self.background = look.background
+        through = self.state.through
+        self.background = BLACK if through else look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
         settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0)
-        self.renderer.settings = replace(settings, background=look.background)
+        self.renderer.settings = replace(settings, background=self.background)
         start = time.perf_counter()
         self.renderer.update(self.state.editor.shown(views[0]))
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
@@ -303,7 +325,9 @@ class XrApp:
         depths = self.eyes.depths(self.renderer, self.state.play_space.scale) if deep else None
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
-            if self.state.floor_shown:
+            if through:
+                self.eyes.see_through.draw(framebuffer, self.renderer.coverage(i))
+            elif self.state.floor_shown:
                 grid = Grid(self._level_m, self._clearness)
                 behind = plain_color(self.background)
                 hidden = self.renderer.coverage(i)
@@ -323,7 +347,7 @@ class XrApp:
                 eyes.write_depth(i, framebuffer, play_views[i], depths[i], over)
 
         quad = quad_of(over, self.state.fit.lift_m)
-        self.session.submit(eyes.textures, write if depths else None, quad)
+        self.session.submit(eyes.textures, write if depths else None, quad, self.state.through)
         eyes.fill_panel(play_views, over)
 
     def _choose_quality(self, views: list[View]) -> None:

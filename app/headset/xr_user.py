@@ -88,11 +88,17 @@ class XrState:
     play_space: PlaySpace = field(default_factory=PlaySpace)
     floor_shown: bool = True
     figures: Figures | None = None  # of the last second
+    sees_through: bool = False  # the runtime can show the room behind pictures
     worn: KeptSettings = field(default_factory=KeptSettings)
     fit: Fitting = field(init=False)
 
     def __post_init__(self) -> None:
         self.fit = Fitting(self.worn)
+
+    @property
+    def through(self) -> bool:
+        """Whether the room itself is behind the scene."""
+        return self.sees_through and self.worn.now.passthrough
 
     @property
     def world(self) -> World:

@@ -6,6 +6,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.worn_settings import SIZES, VIGNETTES, WornSettings
 
@@ -15,6 +16,7 @@ HAND_NAMES = {"both": "Both hands", "left": "Left alone", "right": "Right alone"
 PANEL_NAMES = {"left": "Panel: left", "right": "Panel: right"}
 WALK_NAMES = {"left": "Walk: left", "right": "Walk: right"}
 TURN_NAMES = {"snap": "Snap turns", "smooth": "Smooth", "none": "By body"}
+ROOM, NO_ROOM = "the room behind the scene", "The runtime shows no room behind pictures."
 EDGE, TEXT = "dark edge while moving", "size of this panel"
 
 
@@ -30,6 +32,18 @@ def draw_comfort(settings: WornSettings, choose: Callable[..., None]) -> None:
         imgui.text_disabled(said(title))
         labels = [f"{100 * value:.0f} %" for value in offered]
         _row(name, offered, labels, settings, choose)
+
+
+def draw_see_through(shown: bool, offered: bool, choose: Callable[..., None]) -> None:
+    """A box to check where the runtime shows the room; else that it does not."""
+    if not offered:
+        imgui.push_text_wrap_pos(0)
+        imgui.text_disabled(said(NO_ROOM))
+        imgui.pop_text_wrap_pos()
+        return
+    changed, wanted = imgui.checkbox(item_label(ROOM), shown)
+    if changed:
+        choose(passthrough=wanted)
 
 
 def _words(
