@@ -78,6 +78,7 @@ class XrApp:
         self.report, self._wearing = report, wearing
         self._worn, self.shelf = worn or KeptSettings(), shelf or SceneShelf()
         self.shutter = shutter or Shutter(WorkFolders.of().pictures)
+        self._obstacles = rules.obstacles  # the picture darkens in them
         self._closing = ExitStack()
         self._closing.callback(self.shutter.close)
         self._scene = ExitStack()  # what ends with the scene that is open
@@ -190,7 +191,8 @@ class XrApp:
         state = self.state
         self._see_objects_alone(state.through)
         frame, moves = state.fit.worn(frame, seconds)
-        state.user.rules = state.worn.now.rules(state.user.rules)
+        stops = self._obstacles and not state.through  # the room's own are seen
+        state.user.rules = replace(state.worn.now.rules(state.user.rules), obstacles=stops)
         if moves:
             self._stand(frame)
         elif not self._stood or frame.recentred:

@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.app.headset.eyes import quad_of
 from shapeshift.app.headset.fitting import Fitting
 from shapeshift.app.headset.panel_picture import PanelPicture
 from shapeshift.app.headset.worn_settings import FILE, KeptSettings, WornSettings, read_settings
 from shapeshift.scene.pose import Pose
+from shapeshift.vr.drawn import Drawn, PanelQuad
 from shapeshift.vr.frame import LOST, Area
+from shapeshift.vr.hints import hint_lines
 from shapeshift.vr.locomotion.height import HIGHEST_M, LOWEST_M, lift_of, lifted
 from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel, move
 from shapeshift.vr.locomotion.play_space import PlaySpace
@@ -69,6 +72,37 @@ def test_settings_are_pressed_on_the_panel(wearer):
     wearer.wait()
     assert wearer.menu.carried.home == "right" and wearer.menu.carried.pointer == "left"
     np.testing.assert_allclose(wearer.menu.carried.plane.size_m, 1.5 * np.array(before))
+
+
+def test_the_room_is_behind_the_scene_where_it_can_be(wearer):
+    wearer.unfold("Comfort")
+    wearer.scroll_to("Performance")
+    assert "the room behind the scene" not in wearer.labels(), "there is a sentence instead"
+    wearer.state.sees_through = True
+    wearer.menu.carried = replace(wearer.menu.carried, open=False, pinned=False)
+    wearer.wait()
+    wearer.menu.carried = replace(wearer.menu.carried, open=True, pinned=True)
+    wearer.wait()
+    wearer.scroll_to("the room behind the scene")
+    wearer.press("the room behind the scene")
+    assert wearer.state.through and wearer.state.worn.now.passthrough
+
+
+def test_the_compositor_has_the_panel_in_its_own_room():
+    quad = PanelQuad(None, at(0.1, 1.5, -0.4), (0.3, 0.4), 7, apart=True)
+    made = quad_of(Drawn(panel=quad), lift_m=0.5)
+    np.testing.assert_allclose(made.play_from_quad.position, (0.1, 1.0, -0.4))
+    assert quad_of(Drawn(panel=replace(quad, apart=False)), 0.5) is None
+
+
+def test_cards_name_what_one_hand_does():
+    rules = WornSettings(hands="right").rules(RULES)
+    index = "/interaction_profiles/valve/index_controller"
+    lines = hint_lines(index, "right", rules, "left")
+    assert "Stick: walk, turn sideways" in lines and "Stick, pressed: panel" in lines
+    assert lines[-1] == "Palm up: panel"
+    simple = hint_lines("/interaction_profiles/khr/simple_controller", "right", rules, "left")
+    assert not [line for line in simple if "Stick" in line]
 
 
 @pytest.mark.parametrize(
