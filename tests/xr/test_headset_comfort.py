@@ -16,6 +16,7 @@ def test_who_sits_and_has_one_hand_does_all_with_it(stand, start):
     settings = stand.folder / "config" / "shapeshift" / "headset.json"
     settings.parent.mkdir(parents=True)
     settings.write_text(json.dumps({"hands": "right", "turning": "smooth"}))
+    (settings.parent / "settings.json").write_text(json.dumps({"language": "de"}))
     asked = ("--quality", "best", "--posture", "seated")
     program = start(stand, *asked, **switched_on(stand.folder))
     with program.headset(stand.port) as remote:
@@ -35,7 +36,7 @@ def test_who_sits_and_has_one_hand_does_all_with_it(stand, start):
             pass
         line = person.frames(4)
         assert line["panel"]["open"] and line["panel"]["hand"] == "left"
-        person.point("right", np.array(line["panel"]["buttons"]["Recentre"]))
+        person.point("right", np.array(line["panel"]["buttons"]["Zentrieren"]))
         remote.right.trigger = 1.0
         person.until(lambda line: line["hands"]["right"]["trigger"] == 1.0, "a pull")
         remote.right.trigger = 0.0
