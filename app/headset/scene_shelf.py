@@ -77,6 +77,9 @@ class SceneShelf:
         except (BadFile, UsageError, OSError) as error:
             fail(str(error))
             return None
+        except MemoryError:
+            fail(said("{name} needs more memory than there is.", name=path.name))
+            return None
         self.shown, self._frames = path, 0
         self._remember()
         return opened

@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from shapeshift.app.editor.state.user.recent import RecentFiles
+from shapeshift.app.headset import scene_shelf
 from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import PICTURE_AFTER, SceneShelf
@@ -62,6 +63,18 @@ def test_a_scene_is_read_in_a_thread_and_comes_first_in_the_list(tmp_path, packa
     again = SceneShelf(tmp_path / "other", shown=package)
     assert again.rows == [("The demo", DEMO), ("Things to touch", TOUCH)]
     assert RecentFiles.read(tmp_path / "other").paths == (), "it keeps nothing unasked"
+
+
+def test_a_scene_that_memory_is_too_small_for_is_told(tmp_path, package, monkeypatch):
+    def read(path, options):
+        raise MemoryError
+
+    monkeypatch.setattr(scene_shelf, "open_xr", read)
+    said: list[str] = []
+    shelf = SceneShelf()
+    shelf.open(package)
+    assert polled(shelf, said.append) is None
+    assert said == ["three.shift needs more memory than there is."]
 
 
 def test_a_start_makes_a_scene_file_once_and_is_written_over_then(home, package):
