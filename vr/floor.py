@@ -40,6 +40,32 @@ def clearness(before: float, was: PlaySpace, now: PlaySpace, seconds: float) -> 
     return before + (goal - before) * part
 
 
+class CoverageTexture:
+    """How much splats hide of what is behind them, as a texture whose alpha says so."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._uploaded: moderngl.Texture | None = None  # a coverage that came as an array
+
+    def of(self, coverage: moderngl.Texture | np.ndarray) -> tuple[moderngl.Texture, bool]:
+        """The texture, and whether row 0 is on top: of an array (H, W) it is."""
+        if not isinstance(coverage, np.ndarray):
+            return coverage, False
+        size = (coverage.shape[1], coverage.shape[0])
+        if self._uploaded is None or self._uploaded.size != size:
+            self.release()
+            self._uploaded = self._ctx.texture(size, 1, dtype="f4")
+            self._uploaded.swizzle = "000R"  # where a splatter's texture has it
+            self._uploaded.repeat_x = self._uploaded.repeat_y = False
+        self._uploaded.write(np.ascontiguousarray(coverage, np.float32))
+        return self._uploaded, True
+
+    def release(self) -> None:
+        if self._uploaded is not None:
+            self._uploaded.release()
+            self._uploaded = None
+
+
 class Floor:
     """The program for it; use it in a `with`."""
 
@@ -47,7 +73,7 @@ class Floor:
         self._ctx = ctx
         self._program = compile_program(ctx, "full.vert", "floor.frag", SHADERS)
         self._triangle = ctx.vertex_array(self._program, [])
-        self._uploaded: moderngl.Texture | None = None  # a coverage that came as an array
+        self._coverage = CoverageTexture(ctx)
 
     def draw(
         self,
@@ -75,8 +101,7 @@ class Floor:
         program["level_m"].value, program["scale"].value = grid.level_m, play_space.scale
         program["spacing_m"].value, program["finer"].value = spacing, finer
         program["clearness"].value = grid.clearness
-        from_array = isinstance(coverage, np.ndarray)
-        texture = self._upload(coverage) if isinstance(coverage, np.ndarray) else coverage
+        texture, from_array = self._coverage.of(coverage)
         texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         texture.use(0)
         program["coverage"].value, program["top_first"].value = 0, from_array
@@ -93,21 +118,6 @@ class Floor:
             ctx.enable_only(moderngl.NOTHING)
             before.use()
 
-    def _upload(self, coverage: np.ndarray) -> moderngl.Texture:
-        size = (coverage.shape[1], coverage.shape[0])
-        if self._uploaded is None or self._uploaded.size != size:
-            self.release_upload()
-            self._uploaded = self._ctx.texture(size, 1, dtype="f4")
-            self._uploaded.swizzle = "000R"  # where a splatter's texture has it
-            self._uploaded.repeat_x = self._uploaded.repeat_y = False
-        self._uploaded.write(np.ascontiguousarray(coverage, np.float32))
-        return self._uploaded
-
-    def release_upload(self) -> None:
-        if self._uploaded is not None:
-            self._uploaded.release()
-            self._uploaded = None
-
     def __enter__(self) -> "Floor":
         return self
 
@@ -116,7 +126,7 @@ class Floor:
 
     def release(self) -> None:
         """Gives all of it back; the context stays."""
-        self.release_upload()
+        self._coverage.release()
         self._triangle.release()
         self._program.release()
 

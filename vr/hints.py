@@ -33,6 +33,9 @@ ONE_HAND = {
 }
 
 
+# Their sticks can be pressed.
+WITH_CLICK = ("valve/index_controller", "oculus/touch_controller", "microsoft/motion_controller")
+
 # Of a hand without a controller.
 BARE: tuple[str, ...] = (
     "Pinch: take, or act by ray",
@@ -52,14 +55,25 @@ def hint_lines(profile: str, side: str, rules: Rules, panel_hand: str) -> tuple[
     does = {
         "squeeze": "take, or hold the world",
         "trigger": "take or act" if simple else "act on what the ray meets",
-        "stick": "walk" if side == rules.walks else "turn, fly",
+        "stick": stick_text(side, rules),
         "primary": "jump: point, let go",
         "secondary": "true size",
         "menu": "panel",
     }
+    if rules.one_hand and "stick" in names and kind in WITH_CLICK:
+        names["press"] = f"{names['stick']}, pressed"
+        does["press"] = "panel"
     words = [(names[button].split(" "), text) for button, text in does.items() if button in names]
     lines = [f"{_of_hand(name, side)}: {text}" for name, text in words]
-    return (*lines, "Palm up: panel") if side == panel_hand else tuple(lines)
+    opens = side in (panel_hand, rules.one_hand)
+    return (*lines, "Palm up: panel") if opens else tuple(lines)
+
+
+def stick_text(side: str, rules: Rules) -> str:
+    """What a stick does."""
+    if rules.one_hand:
+        return "walk, turn sideways"
+    return "walk" if side == rules.walks else "turn, fly"
 
 
 def hints(
@@ -73,7 +87,8 @@ def hints(
         if grip is None:
             continue
         if frame.hands[side].joints is not None:
-            lines = (*BARE, "Palm up: panel") if side == panel_hand else BARE
+            opens = side in (panel_hand, rules.one_hand)
+            lines = (*BARE, "Palm up: panel") if opens else BARE
         else:
             lines = hint_lines(profiles.get(side, ""), side, rules, panel_hand)
         level = facing(grip.position, frame.head).matrix()

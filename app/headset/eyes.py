@@ -9,9 +9,11 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.pose import View
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
+from shapeshift.vr.locomotion.height import raised
 from shapeshift.vr.openxr.layers import QuadPicture
 from shapeshift.vr.overlay import Overlay
 from shapeshift.vr.scene_depth import EyeDepth, SceneDepth
+from shapeshift.vr.see_through import SeeThrough
 
 DEPTH_SCALE = 0.5  # of an eye's width and height: edges of a hand behind a splat are soft anyway
 
@@ -21,6 +23,7 @@ class Eyes:
 
     def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
         self.floor, self.overlay, self.panel = Floor(ctx), Overlay(ctx), PanelPicture(ctx)
+        self.see_through = SeeThrough(ctx)
         self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
         self._depths = [SceneDepth(ctx) for _ in sizes]
 
@@ -54,6 +57,7 @@ class Eyes:
 
     def __exit__(self, *failure) -> None:
         self.floor.release()
+        self.see_through.release()
         self.overlay.release()
         self.panel.release()
         for depth in self._depths:
@@ -63,9 +67,12 @@ class Eyes:
             texture.release()
 
 
-def quad_of(drawn: Drawn) -> QuadPicture | None:
-    """The panel as a layer of its own, where it is one."""
+def quad_of(drawn: Drawn, lift_m: float = 0.0) -> QuadPicture | None:
+    """The panel as a layer of its own, where it is one, in the runtime's room, which ours is
+    raised over.
+    """
     panel = drawn.panel
     if panel is None or not panel.apart:
         return None
-    return QuadPicture(panel.texture, panel.version, panel.play_from_panel, panel.size_m)
+    pose = raised(panel.play_from_panel, -lift_m)
+    return QuadPicture(panel.texture, panel.version, pose, panel.size_m)

@@ -3,16 +3,20 @@
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
+
+if TYPE_CHECKING:
+    from shapeshift.app.headset.scene_shelf import SceneShelf
+    from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
 
@@ -29,15 +33,29 @@ class Options(ReadingOptions):
     quality: Literal["auto", "best", "balanced", "fast"] = "auto"
     """auto: shortcuts only where the exact picture of both eyes takes longer than the headset's
     frames last, and fewer pixels while frames are late; best: exact, always."""
-    turning: Literal["snap", "smooth", "none"] = "snap"
+    posture: Literal["standing", "seated"] | None = None
+    """seated: the room is raised so that your eyes are 1.6 m over its floor; Recentre measures
+    anew.  Default: as the panel was set last, at first standing."""
+    hands: Literal["both", "left", "right"] | None = None
+    """left, right: everything with that controller alone.  Default: as set last, at first both."""
+    turning: Literal["snap", "smooth", "none"] | None = None
     """What the stick that does not walk does: turn by 30 degrees at a time, turn evenly, or
-    nothing, so that one turns with the body alone."""
-    walking_hand: Literal["left", "right"] = "left"
-    """The hand whose stick walks; the other turns and flies."""
-    panel_hand: Literal["left", "right"] = "left"
-    """The hand that carries the panel; the other points at it."""
-    vignette: float = 0.8
-    """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black."""
+    nothing, so that one turns with the body alone.  Default: as set last, at first snap."""
+    walking_hand: Literal["left", "right"] | None = None
+    """The hand whose stick walks; the other turns and flies.  Default: as set last, at first
+    left."""
+    panel_hand: Literal["left", "right"] | None = None
+    """The hand that carries the panel; the other points at it.  Default: as set last, at first
+    left."""
+    vignette: float | None = None
+    """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black.
+    Default: as set last, at first 0.8."""
+    text_size: float | None = None
+    """Size of the panel with its text, 0.75 to 2; 1: capitals a degree high at arm's length.
+    Default: as set last, at first 1."""
+    passthrough: bool | None = None
+    """Show the room itself behind the scene, and of a scene of objects these alone, where the
+    runtime blends pictures by their alpha.  Default: as set last, at first not."""
     floor: bool = True
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
     hints: bool = True
@@ -96,6 +114,7 @@ def run(options: Options) -> int:
 def check(options: Options) -> None:
     """UsageError, one sentence, for what makes no sense."""
     from shapeshift.app.errors import UsageError
+    from shapeshift.app.headset.worn_settings import LEAST_SIZE, MOST_SIZE
 
     if not 0.1 <= options.eye_part <= 2:
         raise UsageError(f"--eye-part is {options.eye_part:g}, expected 0.1 to 2.")
@@ -104,8 +123,11 @@ def check(options: Options) -> None:
             raise UsageError(f"{name} is {value}, expected a number above 0.")
         if value is not None and options.quality != "auto":
             raise UsageError(f"{name} is for --quality auto; leave one of the two out.")
-    if not 0 <= options.vignette <= 1:
+    if options.vignette is not None and not 0 <= options.vignette <= 1:
         raise UsageError(f"--vignette is {options.vignette:g}, expected 0 to 1.")
+    if options.text_size is not None and not LEAST_SIZE <= options.text_size <= MOST_SIZE:
+        size = f"{options.text_size:g}, expected {LEAST_SIZE:g} to {MOST_SIZE:g}"
+        raise UsageError(f"--text-size is {size}.")
     if options.frames < 0:
         raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
     if options.every < 1:
@@ -124,6 +146,8 @@ def wear(options: Options) -> int:
     from shapeshift.app.cli import has_display
     from shapeshift.app.document import DARK
     from shapeshift.app.drawing import make_folder
+    from shapeshift.app.editor.state.user.settings import ProgramSettings
+    from shapeshift.app.editor.window.shell import speak_first
     from shapeshift.app.headset.eyes import Eyes
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
@@ -131,12 +155,15 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
     from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.xr_app import XrApp
+    from shapeshift.app.paths import config_folder
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
     from shapeshift.vr.openxr.instance import Instance, Lost
 
     with Instance() as instance:
+        worn = worn_settings(options)
         document, editor = open_xr(options.scene or DEMO, options, options.x)
+        speak_first(ProgramSettings.read(config_folder()), editor.messages)
         pacing = Pacing(
             document.background_or(DARK), options.quality, options.floor_db or FLOOR_DB,
             options.target_ms, options.stereo_colors,
@@ -149,32 +176,48 @@ def wear(options: Options) -> int:
             open_session(instance, mirror.ctx, options) as session,
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
-            editor.bodies,
         ):
-            rules = Rules(
-                options.walking_hand, options.turning, vignette=options.vignette,
-                obstacles=options.obstacles,
-            )  # fmt: skip
+            rules = Rules(obstacles=options.obstacles)
             wearing = Wearing(
-                options.panel_hand, options.floor, options.hints, options.depth,
-                options.panel_layer, options.edges,
+                options.floor, options.hints, options.depth, options.panel_layer, options.edges,
             )  # fmt: skip
             if not (options.controllers or session.bare_hands.there):
                 say(f"{instance.runtime} sees no hands; controllers are taken.")
+            if options.passthrough and not session.sees_through:
+                say(f"{instance.runtime} shows no room behind pictures; the scene has its own.")
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
+                worn, shelf_of(options),
             )  # fmt: skip
             try:
-                with interrupting(xr_app), xr_app.state.parts.finder:
+                with interrupting(xr_app), closing(xr_app):
                     xr_app.loop(options.frames)
             except Lost:
                 report.ended = "runtime lost"
                 raise
             finally:
-                report.write(describe(instance, session) | pacing.report())
+                report.write(describe(instance, session) | xr_app.state.pacing.report())
     return 0
+
+
+def worn_settings(options: Options) -> "KeptSettings":
+    """What the panel kept, and what the options say instead for this session."""
+    from shapeshift.app.headset.worn_settings import KeptSettings, WornSettings
+    from shapeshift.app.paths import config_folder
+
+    said = {each.name: getattr(options, each.name) for each in fields(WornSettings)}
+    return KeptSettings(config_folder(), **said)
+
+
+def shelf_of(options: Options) -> "SceneShelf":
+    """Scenes for the panel; a run that is measured puts none into the list."""
+    from shapeshift.app.headset.scene_shelf import SceneShelf
+    from shapeshift.app.paths import config_folder
+
+    measured = bool(options.frames or options.report or options.lines)
+    return SceneShelf(config_folder(), options, options.scene or DEMO, keeps=not measured)
 
 
 def open_session(instance, ctx, options: Options):
@@ -220,6 +263,7 @@ def describe(instance, session) -> dict:
         "pixels": session.pixels.name,
         "eyes": session.sizes,
         "depth": session.layers.depth,
+        "passthrough": session.sees_through,
         **session.pace.report(),
     }
 

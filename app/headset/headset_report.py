@@ -97,6 +97,7 @@ def frame_row(done: DoneFrame) -> dict:
         "seen_s": rounded(frame.seen_s),
         "time_s": rounded(world.time_s),  # of the physics
         "state": done.life.state,
+        "scene": done.state.editor.edited.name,
         "drawn": frame.drawn,
         "focused": frame.focused,
         "recentred": frame.recentred,
@@ -107,6 +108,7 @@ def frame_row(done: DoneFrame) -> dict:
         ],
         "hands": {side: hand_row(side, hand) for side, hand in frame.hands.items()},
         "standing": {**pose_row(play_space.world_from_play), "scale": rounded(play_space.scale)},
+        "lift_m": rounded(done.state.fit.lift_m),
         "held": {side: world.held(side) for side in SIDES},
         "offers": [
             {"hand": offer.side, "object": offer.object, "by": offer.by}

@@ -63,6 +63,10 @@ class Pacing:
         self._times: deque[float] = deque(maxlen=LATE)  # ms of drawing, since that was chosen
         self._rest: deque[float] = deque(maxlen=LATE)  # ms of all else: world, hands, panel
 
+    def for_scene(self, background: Background) -> "Pacing":
+        """The same for another scene, of which nothing is measured yet."""
+        return Pacing(background, self.quality, self.floor_db, self._fixed_ms, self._stereo_colors)
+
     def settings(self) -> RenderSettings:
         """Of the next frame."""
         if self.quality != AUTO:

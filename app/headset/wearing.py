@@ -7,7 +7,6 @@ from dataclasses import dataclass
 class Wearing:
     """How a session looks; the panel changes some of it."""
 
-    panel_hand: str = "left"  # that carries the panel
     floor: bool = True  # a grid on it
     hints: bool = True  # names of buttons, notices
     depth: bool = True  # of the splats: hides hands behind them, and goes to the compositor

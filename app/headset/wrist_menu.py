@@ -1,7 +1,10 @@
 """The panel of a headset with its scene: the editor's own sections, pointed at with a ray."""
 
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 from imgui_bundle import imgui
 
@@ -17,13 +20,17 @@ from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.panels.slider import track_ends
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.arrange import steer_by_hand
+from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.editor.state.film.gallery import Gallery
 from shapeshift.app.editor.state.film.style_work import StyleWork
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.track import ON_STOP, shown_words
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
-from shapeshift.app.headset.performance_section import draw_figures
-from shapeshift.app.headset.room_section import (
+from shapeshift.app.headset.scene_shelf import SceneShelf
+from shapeshift.app.headset.sections.comfort_section import draw_comfort, draw_see_through
+from shapeshift.app.headset.sections.performance_section import draw_figures
+from shapeshift.app.headset.sections.room_section import (
     Foot,
     RoomActions,
     draw_head,
@@ -31,16 +38,18 @@ from shapeshift.app.headset.room_section import (
     draw_room,
     draw_scale,
 )
+from shapeshift.app.headset.sections.scenes_section import SceneActions, draw_scenes
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.stance import resized
-from shapeshift.vr.panel.carried import Carried, carry, left_over
-from shapeshift.vr.panel.plane import Place
+from shapeshift.vr.panel.carried import Carried, Palm, carry, left_over
+from shapeshift.vr.panel.plane import NOBODY, Place
 from shapeshift.vr.panel.stick import MIDDLE, scroll, slide
 
 TICK = (0.25, 0.012)  # strength and seconds of the buzz when something is pointed at
 CLICK = (0.6, 0.025)  # when it is pressed, and when the knob comes to a stop
+SURE = "Choose it again to lose what was changed here."
 SETTLE_FRAMES = 4  # after a change: what it changes in turn, and ImGui's own fading
 Vec = imgui.ImVec2
 
@@ -52,16 +61,18 @@ class MenuActions:
     recentre: Callable[[Frame], None]
     leave: Callable[[str], None]  # why
     pulse: Callable[[str, float, float], None]  # side, strength, seconds
+    shelf: SceneShelf = field(default_factory=SceneShelf)
+    picture: Callable[[], None] = lambda: None  # the next frame is one
+    start_here: Callable[[Frame], None] = lambda frame: None
 
 
 class WristMenu:
     """Keeps the panel between frames; `carried` is where it is, `picture` what is on it."""
 
-    def __init__(
-        self, state: XrState, actions: MenuActions, picture: PanelPicture, hand: str = "left"
-    ) -> None:
+    def __init__(self, state: XrState, actions: MenuActions, picture: PanelPicture) -> None:
         self._state, self._actions, self.picture = state, actions, picture
-        self.carried = Carried(PANEL, home=hand)
+        self.shelf = actions.shelf
+        self.carried = Carried(PANEL, home=state.worn.now.carries)
         self._frame: Frame | None = None  # that is under way
         self._seconds = 0.0
         self._held: dict[str, str | None] = {}
@@ -72,12 +83,14 @@ class WristMenu:
         self._sections = self._make_sections(room)
         self._key: tuple = ()  # what the picture was drawn of
         self._unsettled = 0
+        self._sure_of: Path | None = None  # chosen though work would be lost by it
         self._figures_seen = False  # the section of the figures is unfolded
 
     def _make_sections(self, room: RoomActions) -> list[Section]:
         """The headset's own, and those of the desktop's panel that need no keys and no window."""
         state, editor = self._state, self._state.editor
         objects = ObjectEdits(editor, None, lambda: None)
+        scenes = SceneActions(self._open, self._start_here, self._actions.picture)
 
         def draw_objects(scale: float) -> None:
             draw_object_list(objects, scale)
@@ -97,6 +110,8 @@ class WristMenu:
             Section("Look", lambda scale: draw_look(editor, scale)),
             Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
+            Section("Scenes", lambda scale: self._draw_scenes(scenes, scale)),
+            Section("Comfort", self._draw_comfort),
             Section("Help", lambda scale: draw_help()),
         ]
 
@@ -104,6 +119,7 @@ class WristMenu:
         """What hands do to the panel; the frame with what it leaves of them."""
         self._frame, self._seconds = frame, seconds
         self._follow_hands()
+        self._follow_settings()
         self.gallery.each_frame()
         self.styles.poll()
         carried = self.carried = carry(self.carried, frame, seconds)
@@ -168,7 +184,8 @@ class WristMenu:
             state.parts.on, state.parts.count, state.parts.factor,
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
             self._foot.sure_s > 0, editor.messages.note, self.gallery.shown, self.styles.progress,
-            state.figures if self._figures_seen else None,
+            state.figures if self._figures_seen else None, state.worn.now,
+            self.shelf.opening, self.shelf.shown,
         )  # fmt: skip
 
     def _fill(self) -> None:
@@ -195,6 +212,27 @@ class WristMenu:
     def _draw_gallery(self, scale: float) -> None:
         draw_gallery(self.gallery, self.styles, self.picture.textures, scale)
 
+    def _draw_comfort(self, _: float) -> None:
+        state = self._state
+        draw_comfort(state.worn.now, self._choose)
+        draw_see_through(state.through, state.sees_through, self._choose)
+
+    def _draw_scenes(self, actions: SceneActions, scale: float) -> None:
+        draw_scenes(self.shelf, actions, self.picture.textures, scale)
+
+    def _open(self, path: Path) -> None:
+        """Another scene; where work would be lost, once it has been chosen twice."""
+        messages = self._state.editor.messages
+        if unsaved(self._state.editor) and path != self._sure_of:
+            self._sure_of = path
+            messages.say(said(SURE), time.perf_counter())
+            return
+        self.shelf.open(path)
+
+    def _start_here(self) -> None:
+        if self._frame is not None:
+            self._actions.start_here(self._frame)
+
     def _draw_figures(self, _: float) -> None:
         self._figures_seen = True
         draw_figures(self._state.figures)
@@ -214,6 +252,25 @@ class WristMenu:
         x = editor.scene.objects[index].slider_x
         if any(abs(stop.x - x) <= ON_STOP for stop in editor.stops(index)):
             self._actions.pulse(side, *CLICK)
+
+    def _choose(self, **values: Any) -> None:
+        """A setting of the section Comfort, which stays."""
+        try:
+            self._state.worn.choose(**values)
+        except OSError as why:
+            self._state.editor.messages.fail(said("The settings cannot be kept: {why}.", why=why))
+
+    def _follow_settings(self) -> None:
+        """The panel is at the hand, and as large, as the settings have it."""
+        worn, carried = self._state.worn.now, self.carried
+        plane = replace(PANEL, metres_per_pixel=PANEL.metres_per_pixel * worn.text_size)
+        if plane != carried.plane:
+            self.carried = carried = replace(carried, plane=plane)
+        if worn.carries != carried.home:
+            self.carried = replace(
+                carried, home=worn.carries, pinned=carried.open, palm=Palm(), pointing=NOBODY,
+                play_from_panel=None, sticks={},
+            )  # fmt: skip
 
     def _follow_hands(self) -> None:
         """The slider of what a hand takes is the one that is shown."""
@@ -240,7 +297,7 @@ class WristMenu:
             return row
 
         def place(at: Place) -> list[float]:
-            return [round(float(number), 6) for number in PANEL.play_point(pose, at)]
+            return [round(float(number), 6) for number in carried.plane.play_point(pose, at)]
 
         boxes = dict(self.picture.boxes)
         row["object"] = obj.name if obj is not None else ""

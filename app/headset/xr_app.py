@@ -2,28 +2,37 @@
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
 import moderngl
 
-from shapeshift.app.document import DARK, Document
+from shapeshift.app.document import BLACK, DARK, Document
 from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
 from shapeshift.app.headset.parts_hand import PartsHand
-from shapeshift.app.headset.performance_section import Figures
+from shapeshift.app.headset.save_start import save_start
+from shapeshift.app.headset.scene_shelf import SceneShelf
+from shapeshift.app.headset.sections.performance_section import Figures
+from shapeshift.app.headset.shutter import Shutter
 from shapeshift.app.headset.wearing import WEARING, Wearing
+from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
+from shapeshift.app.paths import WorkFolders
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.appearance import plain_color
+from shapeshift.scene.four_views import ALONE, FULL, has_objects
 from shapeshift.scene.pose import View
 from shapeshift.scene.world.record import Record
 from shapeshift.vr.area import area_edges
@@ -33,9 +42,10 @@ from shapeshift.vr.floor import REST, Grid, clearness
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.glove import Capsule
 from shapeshift.vr.hints import hints
-from shapeshift.vr.locomotion.locomotion import RULES, Rules
+from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.openxr.session import Session
+from shapeshift.vr.openxr.swapchain import read
 from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.touching import strongest
@@ -60,36 +70,97 @@ class XrApp:
         report: Report,
         rules: Rules = RULES,
         wearing: Wearing = WEARING,
+        worn: KeptSettings | None = None,
+        shelf: SceneShelf | None = None,
+        shutter: Shutter | None = None,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.report, self._wearing = report, wearing
-        self.background = document.background_or(DARK)
-        eye = document.view(ANY_SIZE).world_from_eye
-        editor.settings = replace(editor.settings, background=self.background)
-        user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
-        touch = TouchState(editor, True, keys=False)
-        parts = PartsTool(editor, lambda: None)
-        self.state = XrState(editor, touch, pacing, user, parts, floor_shown=wearing.floor)
-        self._parts_hand = PartsHand(parts)
-        actions = MenuActions(self.recentre, self.leave, self.pulse)
-        self.menu = WristMenu(self.state, actions, eyes.panel, wearing.panel_hand)
+        self._worn, self.shelf = worn or KeptSettings(), shelf or SceneShelf()
+        self.shutter = shutter or Shutter(WorkFolders.of().pictures)
+        self._obstacles = rules.obstacles  # the picture darkens in them
+        self._closing = ExitStack()
+        self._closing.callback(self.shutter.close)
+        self._scene = ExitStack()  # what ends with the scene that is open
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
-        self._outlines, self._late = Outlines(), Late()
+        self._late = Late()
         self._worn_s = 0.0  # since the hands were there for the first time
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
         self._figured_s = 0.0  # when the panel's figures were made
         self._drawing_ms = 0.0  # of the splats of both eyes, last
-        self._stood = False  # whether the person has been put before the scene
         self.interrupted = False  # by Ctrl-C: no frame is left half done
         self._leaving = False
+        self._enter(document, editor, pacing, rules, wearing.floor)
+
+    def _enter(
+        self, document: Document, editor: EditorState, pacing: Pacing, rules: Rules, floor: bool
+    ) -> None:
+        """A scene that was opened, with a panel of its own."""
+        self._scene.close()
+        self._scene.enter_context(editor.bodies)
+        self.background = document.background_or(DARK)
+        eye = document.view(ANY_SIZE).world_from_eye
+        editor.settings = replace(editor.settings, background=self.background)
+        user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
+        touch = TouchState(editor, True, keys=False)
+        parts = PartsTool(editor, lambda: None)
+        self._scene.enter_context(parts.finder)
+        self.state = XrState(
+            editor,
+            touch,
+            pacing,
+            user,
+            parts,
+            floor_shown=floor,
+            worn=self._worn,
+            sees_through=self.session.sees_through,
+        )
+        self._parts_hand = PartsHand(parts)
+        actions = MenuActions(
+            self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start
+        )
+        self.menu = WristMenu(self.state, actions, self.eyes.panel)
+        self._outlines = Outlines()
+        self._was_through = False  # whether the room itself was behind the scene
+        self._stood = False  # whether the person has been put before the scene
+
+    def _change_scene(self) -> None:
+        """Once another one is read, the session goes on in it."""
+        messages = self.state.editor.messages
+        opened = self.shelf.poll(messages.fail)
+        if opened is None:
+            return
+        document, editor = opened
+        before, carried = self.state, self.menu.carried
+        pacing = before.pacing.for_scene(document.background_or(DARK))
+        rules = before.user.rules
+        self._enter(document, editor, pacing, rules, before.floor_shown)
+        self.state.fit = before.fit
+        self.state.user.travel = Travel(blink=1.0)  # it comes out of the dark
+        self.menu.carried = carried
+        self.session.pace.restart()
+
+    def _keep_start(self, frame: Frame) -> None:
+        """The scene begins here from now on: it is saved, as on a desk, and Recentre comes here."""
+        state = self.state
+        eye = state.play_space.pose(frame.head)
+        if save_start(state.editor, eye):
+            state.user.eye = eye
+            self.shelf.remember(state.editor.edited.path)
+
+    def close(self) -> None:
+        """Ends what is being made for the scene, and waits for pictures."""
+        self._scene.close()
+        self._closing.close()
 
     def loop(self, frames: int = 0) -> None:
         """Until the runtime, the person at the desk or `frames` (0: none) end it."""
         for frame in self.session.frames(self._rest):
             self.frame(frame)
+            self._change_scene()
             done = 0 < frames <= self.session.pace.frames
             if done or self._ends:
                 self.leave("frames" if done else self._ends)
@@ -117,7 +188,14 @@ class XrApp:
         """One frame: the person, the world, the pictures of both eyes."""
         seconds = self._time_passed(frame)
         self.pulses.clear()
-        if not self._stood or frame.recentred:
+        state = self.state
+        self._see_objects_alone(state.through)
+        frame, moves = state.fit.worn(frame, seconds)
+        stops = self._obstacles and not state.through  # the room's own are seen
+        state.user.rules = replace(state.worn.now.rules(state.user.rules), obstacles=stops)
+        if moves:
+            self._stand(frame)
+        elif not self._stood or frame.recentred:
             self.recentre(frame)
         self._stood |= frame.drawn  # before, nobody knows where the head is
         self._seen_s = frame.seen_s
@@ -135,9 +213,12 @@ class XrApp:
             views = [self.state.play_space.view(view) for view in frame.views]
             self._choose_quality(views)
             over = self._over(frame)
+            if self.shutter.due:
+                over = replace(over, panel=None, lines=(), cards=())
             self._hand_over(frame.views, over, self.draw(views, frame.views, over))
             self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
+            self._keep_pictures()
             if frame.seen_s - self._figured_s >= FIGURES_EVERY_S:
                 self._figured_s = frame.seen_s
                 self.state.figures = Figures.of(self.session.pace, self.stats)
@@ -155,6 +236,27 @@ class XrApp:
             session.layers.last if frame.drawn else (),
         )
         self.report.note(done, self.eyes.framebuffers)
+
+    def _see_objects_alone(self, through: bool) -> None:
+        """Over the room a scene that has objects is seen without what was captured around them."""
+        shown, was = self.state.editor.shown_scene, self._was_through
+        self._was_through = through
+        if through and not was and shown.show == FULL and has_objects(self.state.editor.scene):
+            shown.show = ALONE
+        elif was and not through and shown.show == ALONE:
+            shown.show = FULL
+
+    def _keep_pictures(self) -> None:
+        """Of what the left eye has just seen, where somebody has asked for one."""
+        messages = self.state.editor.messages
+        if self.shutter.due:
+            self.shutter.expose(read(self.eyes.framebuffers[0]))
+        self.shelf.saw(lambda: read(self.eyes.framebuffers[0]))
+
+        def say_written(path: Path) -> None:
+            messages.say(said("{name} is written.", name=path.name), time.perf_counter())
+
+        self.shutter.poll(say_written, messages.fail)
 
     def _pass(self, seconds: float) -> list[Record]:
         """Lets time pass: what plays, edits that the world has to follow, then the world."""
@@ -210,10 +312,11 @@ class XrApp:
         Returns how deep the splats are, where that was asked for.
         """
         look, deep = self.state.editor.settings, self._wearing.depth
-        self.background = look.background
+        through = self.state.through
+        self.background = BLACK if through else look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
         settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0)
-        self.renderer.settings = replace(settings, background=look.background)
+        self.renderer.settings = replace(settings, background=self.background)
         start = time.perf_counter()
         self.renderer.update(self.state.editor.shown(views[0]))
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
@@ -224,7 +327,9 @@ class XrApp:
         depths = self.eyes.depths(self.renderer, self.state.play_space.scale) if deep else None
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
-            if self.state.floor_shown:
+            if through:
+                self.eyes.see_through.draw(framebuffer, self.renderer.coverage(i))
+            elif self.state.floor_shown:
                 grid = Grid(self._level_m, self._clearness)
                 behind = plain_color(self.background)
                 hidden = self.renderer.coverage(i)
@@ -243,7 +348,8 @@ class XrApp:
             if depths is not None:
                 eyes.write_depth(i, framebuffer, play_views[i], depths[i], over)
 
-        self.session.submit(eyes.textures, write if depths else None, quad_of(over))
+        quad = quad_of(over, self.state.fit.lift_m)
+        self.session.submit(eyes.textures, write if depths else None, quad, self.state.through)
         eyes.fill_panel(play_views, over)
 
     def _choose_quality(self, views: list[View]) -> None:
@@ -260,7 +366,13 @@ class XrApp:
         pace.restart()
 
     def recentre(self, frame: Frame) -> None:
-        """Back to where the scene is looked at first, at the size it has now."""
+        """Back to where the scene is looked at first, at the size it has now; who sits is raised
+        anew.
+        """
+        self.state.fit.measure(frame.head)
+        self._stand(frame)
+
+    def _stand(self, frame: Frame) -> None:
         self.state.play_space = self.state.user.before_scene(frame, self.state.play_space.scale)
         self.state.user.jumped()
         floor_y, under = self.state.user.floor_y, self.state.play_space.point(underfoot(frame.head))

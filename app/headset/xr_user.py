@@ -6,8 +6,10 @@ from dataclasses import dataclass, field, replace
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
+from shapeshift.app.headset.fitting import Fitting
 from shapeshift.app.headset.pacing import Pacing
-from shapeshift.app.headset.performance_section import Figures
+from shapeshift.app.headset.sections.performance_section import Figures
+from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
@@ -86,6 +88,17 @@ class XrState:
     play_space: PlaySpace = field(default_factory=PlaySpace)
     floor_shown: bool = True
     figures: Figures | None = None  # of the last second
+    sees_through: bool = False  # the runtime can show the room behind pictures
+    worn: KeptSettings = field(default_factory=KeptSettings)
+    fit: Fitting = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.fit = Fitting(self.worn)
+
+    @property
+    def through(self) -> bool:
+        """Whether the room itself is behind the scene."""
+        return self.sees_through and self.worn.now.passthrough
 
     @property
     def world(self) -> World:

@@ -16,6 +16,7 @@ from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import heading, moved, pinned, resized, turned, underfoot, yaw
 from shapeshift.vr.locomotion.teleport import Arc, Ground, level_ground, throw_arc
 from shapeshift.vr.locomotion.world_grip import Grips, drawn_along, held_points
+from shapeshift.vr.one_hand import shared_stick
 
 TURNINGS = ("snap", "smooth", "none")
 LONGEST_S = 0.1  # of a frame: after a hitch nobody is thrown far
@@ -39,9 +40,10 @@ class Rules:
     dead: float = 0.15  # of a stick that drifts
     vignette: float = 0.8  # at full speed; 0: none
     obstacles: bool = True  # the head in one of them sees nothing
+    one_hand: str = ""  # the side of the only one, which walks; "": both are there
 
     def __post_init__(self) -> None:
-        if self.walks not in SIDES:
+        if self.walks not in SIDES or self.one_hand not in ("", self.walks):
             raise ValueError(f"the hand that walks is '{self.walks}'; {' or '.join(SIDES)}.")
         if self.turning not in TURNINGS:
             raise ValueError(f"turning is '{self.turning}'; {', '.join(TURNINGS)} are there.")
@@ -85,6 +87,7 @@ def move(
 ) -> tuple[PlaySpace, Travel, Comfort]:
     """The room a frame later; without a ground one jumps along the level that one stands on."""
     seconds = min(seconds, LONGEST_S) if seconds > 0 else 0.0
+    frame = shared_stick(frame, rules.one_hand) if rules.one_hand else frame
     travel = replace(travel, blink=max(travel.blink - seconds / BLINK_S, 0.0))
     play_space, travel = hold_world(play_space, travel, frame)
     if travel.grips:

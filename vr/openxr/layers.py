@@ -101,7 +101,7 @@ class FrameLayers:
         views: the runtime's, of this frame.  see_through: alpha of the eyes is for what lies behind
         them, the panel or the room itself.
         """
-        xr, self.last = self._xr, []
+        xr, self.last = self._xr, ["room"] if see_through else []
         layers: list[Any] = []
         if quad is not None:
             layers.append(self._quad_layer(quad, space))

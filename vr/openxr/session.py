@@ -97,7 +97,9 @@ class Session:
         xr, instance = self._xr, self._instance
         stereo = xr.ViewConfigurationType.PRIMARY_STEREO
         system = (instance.handle, instance.system, stereo)
-        self._blend = choose_blend(xr, xr.enumerate_environment_blend_modes(*system))
+        blends = xr.enumerate_environment_blend_modes(*system)
+        self._blend, self._alpha = choose_blend(xr, blends), xr.EnvironmentBlendMode.ALPHA_BLEND
+        self.sees_through = int(self._alpha) in map(int, blends)  # the room, where pictures let
         views = xr.enumerate_view_configuration_views(*system)
         offered = [int(each) for each in xr.enumerate_swapchain_formats(self._handle)]
         try:
@@ -136,16 +138,18 @@ class Session:
         textures: Sequence[moderngl.Texture],
         write_depth: WriteDepth | None = None,
         quad: QuadPicture | None = None,
+        see_through: bool = False,
     ) -> None:
         """Shows one display-encoded RGBA8 picture an eye, of `sizes`, row 0 at the bottom.
 
         write_depth: draws how deep an eye's picture is.  quad: lies behind the eyes' pictures,
-        where their alpha is below 1.
+        where their alpha is below 1.  see_through: there the room itself is seen.
         """
+        through = see_through and self.sees_through
         made = self.layers.hand_over(
-            textures, self._views, self.play.handle, write_depth, quad, False
+            textures, self._views, self.play.handle, write_depth, quad, through
         )
-        self._end([ctypes.byref(layer) for layer in made])
+        self._end([ctypes.byref(layer) for layer in made], through)
 
     def leave(self) -> None:
         """Asks the runtime to end the session; frames() goes on until it has."""
@@ -243,13 +247,14 @@ class Session:
         self.recentrings += moved
         return moved
 
-    def _end(self, layers: list) -> None:
+    def _end(self, layers: list, see_through: bool = False) -> None:
         xr, state = self._xr, self._open
         assert state is not None  # a frame is under way
         self._open = None
         self._finish()
         self._drain()
-        info = xr.FrameEndInfo(state.predicted_display_time, self._blend, layers=layers)
+        blend = self._alpha if see_through else self._blend
+        info = xr.FrameEndInfo(state.predicted_display_time, blend, layers=layers)
         self.pace.end(time.perf_counter() - self._began)
         with self._instance.asked("take a frame"):
             xr.end_frame(self._handle, info)

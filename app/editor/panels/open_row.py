@@ -73,7 +73,8 @@ class OpenRow:
         for row, path in enumerate(recent.paths):
             present = self._present.get(path, True)
             imgui.begin_disabled(not present)
-            self._picture(row, pictures.of(path) if pictures else None, ui_scale)
+            picture = pictures.of(path) if pictures else None
+            draw_recent_picture(self._textures, row, picture, ui_scale)
             label = f"{path.name or path}##{row}"
             width = imgui.calc_text_size(path.name or str(path)).x
             size = Vec(max(width, WIDTH * ui_scale), TALL * ui_scale)
@@ -88,14 +89,17 @@ class OpenRow:
         imgui.end_popup()
         return chosen
 
-    def _picture(self, row: int, picture: np.ndarray | None, ui_scale: float) -> None:
-        """How a file looked, or a gray field, with the cursor at its right."""
-        corner, high = imgui.get_cursor_screen_pos(), TALL * ui_scale
-        end = Vec(corner.x + high * 16 / 9, corner.y + high)
-        draw = imgui.get_window_draw_list()
-        if picture is None:
-            draw.add_rect_filled(corner, end, theme.color(theme.RAISED))
-        else:
-            draw.add_image(self._textures.number(f"recent {row}", picture), corner, end)
-        imgui.dummy(Vec(end.x - corner.x, high))
-        imgui.same_line()
+
+def draw_recent_picture(
+    textures: Textures, row: int, picture: np.ndarray | None, ui_scale: float
+) -> None:
+    """How a file looked, or a gray field, with the cursor at its right."""
+    corner, high = imgui.get_cursor_screen_pos(), TALL * ui_scale
+    end = Vec(corner.x + high * 16 / 9, corner.y + high)
+    draw = imgui.get_window_draw_list()
+    if picture is None:
+        draw.add_rect_filled(corner, end, theme.color(theme.RAISED))
+    else:
+        draw.add_image(textures.number(f"recent {row}", picture), corner, end)
+    imgui.dummy(Vec(end.x - corner.x, high))
+    imgui.same_line()

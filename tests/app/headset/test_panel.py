@@ -10,7 +10,7 @@ from shapeshift.app.editor.state.film.style_work import put_in_place
 from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.pacing import QUALITIES
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
-from shapeshift.app.headset.room_section import HOW, SURE_S
+from shapeshift.app.headset.sections.room_section import HOW, SURE_S
 from shapeshift.app.headset.wrist_menu import CLICK, SETTLE_FRAMES, TICK
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.renderer.settings import DEBUG_VIEWS
@@ -228,7 +228,9 @@ def test_sections_of_the_desktop_do_here_what_they_do_there(wearer):
     wearer.press("leg")
     assert wearer.shown == "leg"
     wearer.scroll(1.0)
+    wearer.scroll_to("Objects")
     wearer.press("Objects")
+    wearer.scroll(1.0)
     wearer.unfold("Look")
     wearer.press("debug")
     left, top, right, _ = wearer.menu.picture.boxes["debug"]

@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.app.editor.state.touch_state import HOW
 from shapeshift.app.headset.panel_picture import PanelPicture
-from shapeshift.app.headset.performance_section import Figures
+from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.wrist_menu import SETTLE_FRAMES
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.vr.pace import FramePace

@@ -11,6 +11,7 @@ from shapeshift.app.headset.headset import DEMO, Options
 from shapeshift.app.headset.headset_report import Report
 from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.pacing import Pacing
+from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.app.headset.xr_app import LONGEST_STEP_S, XrApp
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.scene.pose import Pose, View
@@ -37,7 +38,8 @@ class Played:
         self.life, self.pace, self.play = Life(), FramePace(display_s=PERIOD), None
         self.asked: list[str] = []
         self.queue, self.closing, self.left = frames, False, 0
-        self.settings = RenderSettings()
+        self.settings, self.sees_through = RenderSettings(), False
+        self.see_through = SimpleNamespace(draw=lambda *given: self.asked.append("see through"))
         self.overlay = SimpleNamespace(draw=lambda *given: self.asked.append("overlay"))
         self.floor = SimpleNamespace(draw=self.draw_floor)
         self.panel = SimpleNamespace(texture=None, boxes={})
@@ -64,7 +66,8 @@ class Played:
     def fill_panel(self, views, drawn) -> None:
         self.asked.append("panel")
 
-    def submit(self, textures, write_depth, quad) -> None:
+    def submit(self, textures, write_depth, quad, see_through) -> None:
+        assert see_through == self.sees_through
         assert textures == ["left", "right"] and quad is None
         if write_depth is not None:
             write_depth(1, "framebuffer")
@@ -228,3 +231,18 @@ def test_the_window_can_be_closed_while_the_headset_rests(wear):
     played.closing = True
     xr_app._rest()  # what the session calls while no frame is wanted: the double has no such wait
     assert played.left and xr_app.report.ended == "closed at the desk"
+
+
+def test_over_the_room_there_is_no_floor_and_no_background(scene):
+    played = Played([frame_at(0.0), frame_at(PERIOD)])
+    played.sees_through = True
+    document, _ = scene
+    parts = (played, played, played, played, *scene, Pacing(DARK, "best"), Report())
+    xr_app = XrApp(*parts, worn=KeptSettings(passthrough=True))
+    xr_app.loop()
+    eyes = [name for side in SIDES for name in (f"present {side}", "see through", "overlay")]
+    assert played.asked == ["draw", *eyes, "submit", "panel", "mirror"] * 2
+    assert played.settings.background == (0.0, 0.0, 0.0)
+    played.sees_through, xr_app.state.sees_through = False, False
+    xr_app.frame(frame_at(2 * PERIOD))
+    assert played.settings.background == document.background_or(DARK)

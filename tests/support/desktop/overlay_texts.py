@@ -9,7 +9,7 @@ from pathlib import Path
 from shapeshift.renderer.debug.debug import REASON_TEXTS
 
 ROOT = Path(__file__).resolve().parents[3]
-EDITOR = ROOT / "app" / "editor"
+EDITOR, HEADSET = ROOT / "app" / "editor", ROOT / "app" / "headset"
 PANELS = "shapeshift.app.editor.panels"
 # function: which of its positional arguments are texts (None: all)
 SAYING: dict[str, tuple[int, ...] | None] = {
@@ -43,6 +43,13 @@ TABLES = {
     "sections.quality_panel": {"GROUPS": KEYS, "ORDER_NAMES": VALUES},
     "sections.regions_panel": {"DIRECTIONS": KEYS, "HALVES": ALL, "PAINTED": ALL, "KIND_TIPS": ALL},
     "sections.stops_panel": {"MODE_NAMES": VALUES},
+}  # fmt: skip
+HEADSET_TABLES = {
+    "sections.comfort_section": {
+        "POSTURE_NAMES": VALUES, "HAND_NAMES": VALUES, "PANEL_NAMES": VALUES, "WALK_NAMES": VALUES,
+        "TURN_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL, "ROOM": ALL, "NO_ROOM": ALL,
+    },
+    "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL}, "wrist_menu": {"SURE": ALL},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
 # of app/editor/window: KEYS of the sheet
@@ -116,11 +123,15 @@ def texts_of(value: object, what: str = ALL) -> Iterator[str]:
 def overlay_texts() -> set[str]:
     """All of them, in English."""
     found: set[str] = set()
-    for folder in ("panels", "state", "window"):
-        for path in (EDITOR / folder).rglob("*.py"):
+    for folder in (EDITOR / "panels", EDITOR / "state", EDITOR / "window", HEADSET):
+        for path in folder.rglob("*.py"):
             found |= said_in(path)
     for name, tables in TABLES.items():
         module = importlib.import_module(f"{PANELS}.{name}")
+        for table, what in tables.items():
+            found |= set(texts_of(getattr(module, table), what))
+    for name, tables in HEADSET_TABLES.items():
+        module = importlib.import_module(f"shapeshift.app.headset.{name}")
         for table, what in tables.items():
             found |= set(texts_of(getattr(module, table), what))
     for name, texts in STATES.items():
@@ -141,7 +152,7 @@ UNSAID = ("button", "checkbox", "color_edit3", "menu_item", "radio_button", "tex
 def unsaid_texts() -> list[str]:
     """Texts that go to ImGui as they stand in the code, and so in English alone."""
     found = []
-    for path in (EDITOR / "panels").rglob("*.py"):
+    for path in (*(EDITOR / "panels").rglob("*.py"), *HEADSET.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
                 continue

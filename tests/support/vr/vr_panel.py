@@ -121,6 +121,7 @@ class Wearer:
             if part in self.labels():
                 self.press(name)
         for name in sections:
+            self.scroll_to(name)
             self.press(name)
 
     def scroll(self, push: float = -1.0) -> list[Frame]:
@@ -129,6 +130,15 @@ class Wearer:
         frames = [self.point(middle, stick=(0.0, push)) for _ in range(144)]
         self.wait()
         return frames
+
+    def scroll_to(self, label: str) -> None:
+        """Holds the pointing hand's stick back until an item is in sight."""
+        middle = (PANEL.size[0] / 2, PANEL.size[1] * 0.7)
+        for _ in range(300):
+            if label in self.labels():
+                break
+            self.point(middle, stick=(0.0, -1.0))
+        self.wait()
 
     def x(self, name: str) -> float:
         return next(t.slider_x for t in self.editor.scene.objects if t.name == name)

@@ -59,8 +59,10 @@ def listed(function):
         done = function(label, *arguments, **named)
         if _listed and imgui.is_item_visible():
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-            name = label.split("##")[0] or label.strip("#")
-            _listed[-1].setdefault(name, (low.x, low.y, high.x, high.y))
+            middle = imgui.ImVec2((low.x + high.x) / 2, (low.y + high.y) / 2)
+            if imgui.is_rect_visible(middle, middle):
+                name = label.split("##")[0] or label.strip("#")
+                _listed[-1].setdefault(name, (low.x, low.y, high.x, high.y))
         return done
 
     return call
@@ -68,7 +70,7 @@ def listed(function):
 
 @contextmanager
 def listing_items() -> Iterator[dict[str, Box]]:
-    """Within it: what can be hit and is in sight, by its label; of one label the first."""
+    """Within it: what can be hit and whose middle is in sight, by its label; of one the first."""
     _listed.append({})
     try:
         yield _listed[-1]

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets.panel_rows import rows
 from shapeshift.app.editor.state.messages import number
+from shapeshift.app.editor.texts.table import said
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.vr.pace import FramePace
 
@@ -49,6 +50,6 @@ class Figures:
 def draw_figures(figures: Figures | None) -> None:
     """A row a figure; nothing is known before the first second is over."""
     if figures is None:
-        imgui.text_disabled("after a second")
+        imgui.text_disabled(said("after a second"))
     else:
         rows(figures.rows())

@@ -8,14 +8,18 @@ from imgui_bundle import imgui
 from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
 from shapeshift.app.editor.panels.slider import draw_slider
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.track import shown_words
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.pacing import QUALITIES
+from shapeshift.app.headset.sections.comfort_section import lit_button
 from shapeshift.app.headset.xr_user import XrState
 
 Vec = imgui.ImVec2
 SIZES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
 SURE_S = 4.0  # Exit asks once more for so long
+QUALITY_NAMES = {"auto": "Auto", "best": "Best", "balanced": "Balanced", "fast": "Fast"}
 SCALE_TALL = 124.0  # units of the overlay, of the scale of a thermal stop
 SCALE_WIDE = 100.0
 HOW = (
@@ -37,7 +41,7 @@ def draw_head(state: EditorState, ui_scale: float) -> None:
     """Whose slider it is, which stop is shown, and the slider; what could not be done."""
     if not state.sliders:
         imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), "Shapeshift")
-        imgui.text_disabled("nothing here changes its shape")
+        imgui.text_disabled(said("nothing here changes its shape"))
     for index in state.sliders:
         imgui.push_id(index)
         obj = state.scene.objects[index]
@@ -89,32 +93,22 @@ def draw_room(state: XrState, actions: RoomActions) -> None:
         imgui.set_cursor_pos_x(left + (number + 1) * (width + gap))
         if lit_button(label, label == "1 : 1" and abs(scale - 1) < 1e-3, width):
             actions.resize(wanted)
-    names = [name.capitalize() for name in QUALITIES]
-    texts = [imgui.calc_text_size(name).x for name in names]
+    names = [item_label(QUALITY_NAMES[name]) for name in QUALITIES]
+    texts = [imgui.calc_text_size(said(QUALITY_NAMES[name])).x for name in QUALITIES]
     spare = (room - 3 * gap - sum(texts)) / len(texts)
     for number, name in enumerate(QUALITIES):
         if number:
             imgui.same_line()
         if lit_button(names[number], state.pacing.quality == name, texts[number] + spare):
             state.pacing.quality = name
-    _, state.floor_shown = imgui.checkbox("grid on the floor", state.floor_shown)
+    _, state.floor_shown = imgui.checkbox(item_label("grid on the floor"), state.floor_shown)
 
 
 def draw_help() -> None:
     """How the panel opens, and what the sticks do while it is there."""
     imgui.push_text_wrap_pos(0)
-    imgui.text_unformatted(HOW)
+    imgui.text_unformatted(said(HOW))
     imgui.pop_text_wrap_pos()
-
-
-def lit_button(label: str, lit: bool, width: float) -> bool:
-    """A button, in the accent's colour where it is what holds now."""
-    if lit:
-        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
-    clicked = imgui.button(label, Vec(width, 0))
-    if lit:
-        imgui.pop_style_color()
-    return clicked
 
 
 def draw_scale(state: EditorState, ui_scale: float) -> None:
@@ -135,14 +129,15 @@ class Foot:
     def draw(self, seconds: float) -> None:
         self.sure_s = max(self.sure_s - seconds, 0.0)
         width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
-        if imgui.button("Recentre", Vec(width, 0)):
+        if imgui.button(item_label("Recentre"), Vec(width, 0)):
             self.sure_s = 0.0
             self._actions.recentre()
         imgui.same_line()
         asks = self.sure_s > 0
         if asks:
             imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*theme.WARNING, 1))
-        if imgui.button("Really exit?###exit" if asks else "Exit###exit", Vec(width, 0)):
+        label = said("Really exit?") if asks else said("Exit")
+        if imgui.button(f"{label}###exit", Vec(width, 0)):
             self.sure_s = 0.0 if asks else SURE_S
             if asks:
                 self._actions.leave()

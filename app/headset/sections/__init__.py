@@ -1,0 +1,1 @@
+"""Sections of the panel that a headset alone has."""

@@ -1,0 +1,46 @@
+"""Pictures of what the headset sees, by a button: the next frame without the panel, as a PNG."""
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.app.editor.texts.table import said
+from shapeshift.app.editor.window.pictures import write_numbered_png
+from shapeshift.app.errors import UsageError
+
+
+class Shutter:
+    """`due`: the next frame is to be kept.  Files are written aside; the end waits for them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.due = False
+        self._folder = folder
+        self._threads = ThreadPoolExecutor(1, "pictures")
+        self._written: Future[Path] | None = None
+
+    def press(self) -> None:
+        self.due = self._written is None  # one after the other
+
+    def expose(self, picture: np.ndarray) -> None:
+        """Of (H, W, 3) display sRGB 0..1."""
+        self.due = False
+        pixels = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)
+        self._written = self._threads.submit(write_numbered_png, pixels, self._folder)
+
+    def poll(self, written: Callable[[Path], None], failed: Callable[[str], None]) -> None:
+        """Says once what became of it."""
+        if self._written is None or not self._written.done():
+            return
+        done, self._written = self._written, None
+        try:
+            written(done.result())
+        except UsageError as error:
+            failed(str(error))
+        except OSError as error:
+            why = error.strerror or error
+            failed(said("The picture cannot be written: {why}.", why=why))
+
+    def close(self) -> None:
+        self._threads.shutdown()
