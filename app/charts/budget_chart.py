@@ -63,8 +63,11 @@ def steady(rows: Sequence[BudgetRow]) -> list[BudgetRow]:
 
 
 def applied(choice: Choice, settings: RenderSettings) -> RenderSettings:
-    """The chosen setting over the background, and in the debug view, that `settings` has."""
-    return replace(choice.settings, background=settings.background, debug=settings.debug)
+    """The chosen setting; background, debug view and ends of the heat's scale of `settings`."""
+    return replace(
+        choice.settings,
+        background=settings.background, debug=settings.debug, heat_ends=settings.heat_ends,
+    )  # fmt: skip
 
 
 def budget_rows(renderer: Renderer, ctx, drawn: ChartSubject) -> list[BudgetRow]:
@@ -167,6 +170,7 @@ def _row(each: dict) -> BudgetRow:
         name: math.inf if v is None else v for name, v in each["settings"].items()
     }
     values["background"] = tuple(values["background"])
+    values.pop("heat_ends", None)  # JSON makes a list of it; charts measure with the default
     ms, db = float(each["ms"]), float(each["db"])
     if not (0 < ms < math.inf and math.isfinite(db)):
         raise ValueError("no times")
