@@ -73,6 +73,13 @@ def person(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
 
 
 @pytest.fixture
+def quick_person(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
+    """Without depth for the compositor, which on a processor takes as long as the picture again."""
+    with dressed(stand, start, "--no-depth") as made:
+        yield made
+
+
+@pytest.fixture
 def served_person(served: Stand, start: Callable[..., Program]) -> Iterator[Person]:
     """The same, with a runtime that can be told things."""
     with dressed(served, start) as made:

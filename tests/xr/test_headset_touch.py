@@ -33,7 +33,8 @@ def test_reach_squeeze_carry_and_let_go(person):
 
 
 @pytest.mark.slow
-def test_a_throw_flies_as_the_hand_did_and_what_it_strikes_changes_x(person):
+def test_a_throw_flies_as_the_hand_did_and_what_it_strikes_changes_x(quick_person):
+    person = quick_person
     swing, flight = person.throw("right", "cube", CUBE_TOP_M, STEP)
     hand = STEP / np.mean(np.diff([line["seen_s"] for line in swing]))
     flight = flight[4:]  # until then it is drawn ever less ahead, as what a hand holds is
