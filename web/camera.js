@@ -132,7 +132,7 @@ export class Camera {
 
 /**
  * The point that a ray means: the nearest of those close to it. @param {{position: number[], along: number[]}} ray
- * @param {import("./renderer.js").SceneObject[]} objects @returns {number[] | null} world
+ * @param {import("./renderer/renderer.js").SceneObject[]} objects @returns {number[] | null} world
  */
 export function pointUnder({ position, along }, objects) {
     let best = null, bestScore = Infinity;

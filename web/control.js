@@ -2,8 +2,8 @@
 // scene/control.py has them.
 import { LEG_S, REST_S, SHIFT_S, SNAP } from "./conventions.js";
 
-/** @typedef {import("./stops.js").Control} Control */
-/** @typedef {import("./stops.js").StopBlend} StopBlend */
+/** @typedef {import("./renderer/stops.js").Control} Control */
+/** @typedef {import("./renderer/stops.js").StopBlend} StopBlend */
 
 /** Smooth start and stop. @param {number} t */
 const ease = (t) => t * t * (3 - 2 * t);

@@ -2,14 +2,14 @@
 // each other apart along the axis of least overlap; what turns stops when it lands.
 import { about, add, chain, dot, inverse, length, moved, product, turn } from "./poses.js";
 
-/** @typedef {import("./renderer.js").SceneObject} SceneObject */
+/** @typedef {import("./renderer/renderer.js").SceneObject} SceneObject */
 /** @typedef {import("./poses.js").Pose} Pose */
 /** @typedef {{position: number[], along: number[]}} Ray  along: unit */
 
 const STEP_S = 1 / 120, TRACK_S = 0.1, SLEEP = 0.02, FRICTION = 0.95, MOST_SPEED = 12;  // seconds; of the speed that a step keeps; m/s
 
 export class Grab {
-    /** @param {import("./renderer.js").Renderer} renderer */
+    /** @param {import("./renderer/renderer.js").Renderer} renderer */
     constructor(renderer) {
         this.renderer = renderer;
         const { scene, objects } = renderer;

@@ -1,8 +1,8 @@
 // link: the camera and every x in the address, so that a link shows what its sender saw.
-import { numbers } from "./container.js";
+import { numbers } from "./renderer/container.js";
 
 /** @typedef {import("./camera.js").Camera} Camera */
-/** @typedef {import("./renderer.js").Renderer} Renderer */
+/** @typedef {import("./renderer/renderer.js").Renderer} Renderer */
 
 const short = (/** @type {number} */ value) => String(+value.toPrecision(6));
 

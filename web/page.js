@@ -1,13 +1,13 @@
 // page: opens the scene, draws it when something has changed, and joins the picture to its tools.
 import { Camera, pointUnder } from "./camera.js";
-import { readBeside, readContainer, readInline } from "./container.js";
+import { readBeside, readContainer, readInline } from "./renderer/container.js";
 import { Grab, depthAlong, handOnRay } from "./grab.js";
 import { followParent, keepLink } from "./embedded.js";
-import { offerHeadsets } from "./headset.js";
+import { offerHeadsets } from "./headset/headset.js";
 import { followLink, linkOf } from "./link.js";
 import { Panel, byId } from "./panel.js";
 import { perspective } from "./poses.js";
-import { Renderer } from "./renderer.js";
+import { Renderer } from "./renderer/renderer.js";
 import { followServer } from "./served.js";
 
 const NEAR_PART = 0.01;  // of the scene's radius

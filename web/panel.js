@@ -1,9 +1,9 @@
 // panel: slider, stops with their pictures, play, legend and the choice of an object.
 import { Shift, Sweep, snap } from "./control.js";
 
-/** @typedef {import("./renderer.js").Renderer} Renderer */
-/** @typedef {import("./renderer.js").SceneObject} SceneObject */
-/** @typedef {import("./stops.js").Control} Control */
+/** @typedef {import("./renderer/renderer.js").Renderer} Renderer */
+/** @typedef {import("./renderer/renderer.js").SceneObject} SceneObject */
+/** @typedef {import("./renderer/stops.js").Control} Control */
 
 const NEAR = 0.005;  // of the slider: at a stop
 

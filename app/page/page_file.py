@@ -13,12 +13,14 @@ from shapeshift.runtime_models.web.limits import LARGEST_FILE
 
 WEB = Path(__file__).resolve().parents[2] / "web"
 # Each after what it imports; a test compares with the imports.
-MODULES = ("conventions", "poses", "gl", "container", "stops", "false_colors", "arena", "networks",
-           "pack", "shade", "decode", "models", "project", "regions",
-           "resolve", "sort", "splat", "renderer",
-           "camera", "control", "grab", "link", "panel", "sharpness", "overlay", "room_panel",
-           "hands", "headset", "served", "embedded", "page")  # fmt: skip
-IMPORT = re.compile(r"^import \{[^}]*\} from \"\./\w+\.js\";\n", re.M)
+MODULES = ("conventions", "poses", "renderer/gl", "renderer/container", "renderer/stops",
+           "renderer/false_colors", "renderer/arena", "renderer/networks", "renderer/pack",
+           "renderer/shade", "renderer/decode", "renderer/models", "renderer/project",
+           "renderer/regions", "renderer/resolve", "renderer/sort", "renderer/splat",
+           "renderer/renderer", "camera", "control", "grab", "link", "panel", "headset/sharpness",
+           "headset/overlay", "headset/room_panel", "headset/hands", "headset/headset", "served",
+           "embedded", "page")  # fmt: skip
+IMPORT = re.compile(r"^import \{[^}]*\} from \"\.{1,2}/[\w/]+\.js\";\n", re.M)
 SCRIPT = '<script type="module" src="page.js"></script>'
 PACKED = "application/octet-stream"
 # The script lies deflated in the page: a quarter of its size.

@@ -45,12 +45,14 @@ def test_constants_are_those_of_python():
 
 
 def test_each_module_comes_after_what_it_imports():
-    assert {path.stem for path in WEB.glob("*.js")} == set(MODULES)
+    assert {path.relative_to(WEB).as_posix()[:-3] for path in WEB.rglob("*.js")} == set(MODULES)
     for i, name in enumerate(MODULES):
         text = (WEB / f"{name}.js").read_text()
-        for other in re.findall(r'^import .* from "\./(\w+)\.js";$', text, re.M):
-            assert other in MODULES[:i], f"{name}.js imports {other}.js, which comes later"
-        assert not re.findall(r"^import (?!\{.*\} from \"\./\w+\.js\";$).*", text, re.M), name
+        for other in re.findall(r'^import .* from "(\.{1,2}/[\w/]+)\.js";$', text, re.M):
+            path = ((WEB / name).parent / other).resolve().relative_to(WEB).as_posix()
+            assert path in MODULES[:i], f"{name}.js imports {path}.js, which comes later"
+        odd = r"^import (?!\{.*\} from \"\.{1,2}/[\w/]+\.js\";$).*"
+        assert not re.findall(odd, text, re.M), name
 
 
 def test_names_at_the_top_of_modules_are_unique():
@@ -58,7 +60,7 @@ def test_names_at_the_top_of_modules_are_unique():
     top = re.compile(
         r"^(?:export )?(?:async )?(?:const|let|class|function\*?) (?!vec2|int)(\w+)", re.M
     )
-    names = [name for path in WEB.glob("*.js") for name in top.findall(path.read_text())]
+    names = [name for path in WEB.rglob("*.js") for name in top.findall(path.read_text())]
     assert len(names) == len(set(names)), sorted({n for n in names if names.count(n) > 1})
 
 
@@ -71,7 +73,7 @@ def test_the_code_is_small_and_asks_for_nothing_elsewhere():
 
 
 def test_files_and_functions_stay_readable():
-    for path in WEB.glob("*.js"):
+    for path in WEB.rglob("*.js"):
         text = path.read_text()
         assert len(text.splitlines()) <= 400 and text.startswith("// " + path.stem + ":"), path
 

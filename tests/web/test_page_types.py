@@ -23,7 +23,7 @@ def test_types_fit(tmp_path):
     if not tsc:
         pytest.skip("there is no tsc; npm install -g typescript")
     config = tmp_path / "tsconfig.json"
-    config.write_text(json.dumps({"compilerOptions": OPTIONS, "include": [f"{ROOT}/web/*.js"]}))
+    config.write_text(json.dumps({"compilerOptions": OPTIONS, "include": [f"{ROOT}/web/**/*.js"]}))
     done = subprocess.run([tsc, "-p", str(config)], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout[:3000]
 

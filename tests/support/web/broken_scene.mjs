@@ -1,7 +1,7 @@
 // Reads mutated scenes as a page does: each ends in numbers or in one sentence, and soon.
 //     node broken_scene.mjs scene.bin COUNT SEED < nothing
 import { readFileSync } from "node:fs";
-import { checkScene, inflate, readContainer } from "../../../web/container.js";
+import { checkScene, inflate, readContainer } from "../../../web/renderer/container.js";
 
 const [path, count, start] = process.argv.slice(2), whole = readFileSync(path);
 let seed = Number(start);

@@ -15,8 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.app.page.page_file import MODULES
+
 PAGES = Path(__file__).resolve().parent
-WEB = PAGES.parents[2] / "web"
+ROOT = PAGES.parents[2]
 NPM_PACKAGES = (
     "three@0.180.0", "@mkkellogg/gaussian-splats-3d@0.4.7", "@sparkjsdev/spark@2.2.0",
     "playcanvas@2.23.3",
@@ -77,8 +79,8 @@ class Listener(SimpleHTTPRequestHandler):
 
     def translate_path(self, path: str) -> str:
         plain = path.split("?", 1)[0].lstrip("/")
-        if plain.startswith("web/") and "/" not in plain[4:] and plain.endswith(".js"):
-            return str(WEB / plain[4:])
+        if plain in {f"web/{module}.js" for module in MODULES}:
+            return str(ROOT / plain)
         ours = PAGES / plain
         return str(ours) if ours.is_file() else super().translate_path(path)
 

@@ -1,7 +1,7 @@
 // Ours in a browser: the modules of web/ as an exported page has them, without its panel.
-import { readContainer } from "/web/container.js";
+import { readContainer } from "/web/renderer/container.js";
 import { MIN_ALPHA } from "/web/conventions.js";
-import { Renderer } from "/web/renderer.js";
+import { Renderer } from "/web/renderer/renderer.js";
 import { height, job, measure, width } from "/frames.js";
 
 const canvas = document.createElement("canvas");

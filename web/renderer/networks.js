@@ -2,7 +2,7 @@
 // in registers while it walks over its inputs, so each weight is fetched once an anchor.  (A fragment
 // for each four outputs needs 1.5 times as long on software GL; all layers of a network unrolled into
 // one shader run 1.4 times as fast there, but take its compiler more than a minute.)
-import { BLOCK_VEC4S } from "./conventions.js";
+import { BLOCK_VEC4S } from "../conventions.js";
 
 /** @typedef {{ins: number, outs: number, weights: Float32Array, bias: Float32Array}} Layer  counts of vec4s */
 /** @typedef {{first: number, outs: number, weights: WebGLBuffer, bias: WebGLBuffer, ofStops: WebGLBuffer | null}} Part  of a layer */

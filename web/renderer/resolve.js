@@ -1,7 +1,7 @@
 // resolve: a premultiplied picture over a background, as renderer/shaders/resolve.frag.  A palette
 // makes its colours of the picture's luminance, or adds those of its heat.  A palette colours what
 // is there and not the background: values are divided by alpha first.
-import { LUMINANCE } from "./conventions.js";
+import { LUMINANCE } from "../conventions.js";
 import { PALETTE_COLOR } from "./shade.js";
 
 const RESOLVE = `

@@ -1,6 +1,6 @@
 // gl: the few WebGL2 calls that every pass needs.  A "list" stands for renderer/'s storage buffers,
 // which WebGL2 has not: a texture of WIDTH texels a row, element i at (i % WIDTH, i / WIDTH).
-import { WIDTH } from "./conventions.js";
+import { WIDTH } from "../conventions.js";
 
 const HEADER = `#version 300 es
 precision highp float;

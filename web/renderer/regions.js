@@ -1,9 +1,9 @@
 // regions: parts of an object with an x of their own, as scene/selectors/selector.py and
 // scene/control.py have them.  Each anchor gets weights of the stops; a border shows what a shift
 // from outside to inside shows on its way.
-import { WIDTH } from "./conventions.js";
+import { WIDTH } from "../conventions.js";
 import { rowsOf } from "./gl.js";
-import { add, conjugate, dot, length, moved, turn } from "./poses.js";
+import { add, conjugate, dot, length, moved, turn } from "../poses.js";
 
 /** @typedef {{kind: string, x: import("./stops.js").Control, border: number, space: string, centre?: number[], half?: number[],
  *   wxyz?: number[], radius?: number, point?: number[], normal?: number[], weight?: ArrayLike<number>}} Region */

@@ -1,9 +1,9 @@
 // room_panel: the page's panel as a thing in the room, one quad with a picture of it: slider, stops,
 // legend, what sharpness costs, recentre and leave.  A headset shows nothing of the page itself.
-import { add, inverse, length, lookAt, moved, turn } from "./poses.js";
+import { add, inverse, length, lookAt, moved, turn } from "../poses.js";
 
-/** @typedef {import("./panel.js").Panel} Panel */
-/** @typedef {import("./poses.js").Pose} Pose */
+/** @typedef {import("../panel.js").Panel} Panel */
+/** @typedef {import("../poses.js").Pose} Pose */
 /** @typedef {{left: number, top: number, width: number, height: number, text: string, on: boolean, act: () => void}} Button */
 
 const WIDTH_PX = 800, HEIGHT_PX = 480, PIXEL_M = 0.0007;  // 0.56 x 0.34 m, 0.9 m away: a letter is a degree high
@@ -39,7 +39,7 @@ export class RoomPanel {
         if (!this.pose || length(add(this.pose.position, head.position, -1)) > FAR_M) this.place(head);
     }
 
-    /** Where a ray meets it, in its pixels, and how far away. @param {import("./grab.js").Ray} ray */
+    /** Where a ray meets it, in its pixels, and how far away. @param {import("../grab.js").Ray} ray */
     hit(ray) {
         if (!this.pose || !this.shown) return null;
         const back = inverse(this.pose), from = moved(back, ray.position), along = turn(back.wxyz, ray.along), depth = -from[2] / along[2];
@@ -71,7 +71,7 @@ export class RoomPanel {
 
     /**
      * Its picture as it is now, drawn anew only where it has changed.
-     * @param {import("./gl.js").Gpu} gpu @param {Panel} panel @param {string} sharpness @param {boolean} automatic @param {string[]} prices
+     * @param {import("../renderer/gl.js").Gpu} gpu @param {Panel} panel @param {string} sharpness @param {boolean} automatic @param {string[]} prices
      */
     picture(gpu, panel, sharpness, automatic, prices) {
         const { gl } = gpu, { shown, renderer, chosen, stops } = panel, { blend } = shown.model, x = blend.sliderX(shown.x);

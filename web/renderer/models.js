@@ -1,5 +1,5 @@
 // models: what a scene's models are on the GPU, once, however many objects have one.
-import { WIDTH } from "./conventions.js";
+import { WIDTH } from "../conventions.js";
 import { rowsOf } from "./gl.js";
 import { StopBlend } from "./stops.js";
 

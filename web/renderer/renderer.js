@@ -1,20 +1,20 @@
 // renderer: the passes of a frame in their order; the file to read first.  decode, project, sort,
 // splat, resolve, as renderer/renderer.py has them.  Nothing of the page is in here.
-import { LUMINANCE, RESORT_DEGREES, RESORT_PART, WIDTH } from "./conventions.js";
+import { LUMINANCE, RESORT_DEGREES, RESORT_PART, WIDTH } from "../conventions.js";
 import { Arena } from "./arena.js";
 import { checkScene } from "./container.js";
 import { Decoder } from "./decode.js";
 import { shadeOf, wayOf } from "./false_colors.js";
 import { Gpu, rowsOf } from "./gl.js";
 import { loadModel } from "./models.js";
-import { add, chain, dot, inverse, length, rows } from "./poses.js";
+import { add, chain, dot, inverse, length, rows } from "../poses.js";
 import { Regions } from "./regions.js";
 import { Projector } from "./project.js";
 import { Resolver } from "./resolve.js";
 import { Sorter } from "./sort.js";
 import { Splatter } from "./splat.js";
 
-/** @typedef {import("./poses.js").Pose} Pose */
+/** @typedef {import("../poses.js").Pose} Pose */
 /** @typedef {import("./project.js").View} View */
 /** @typedef {import("./stops.js").Control} Control */
 
@@ -147,7 +147,7 @@ export class Renderer {
         return !(dot(a, b) >= length(a) * length(b) * Math.cos((this.recolorDegrees * Math.PI) / 180));
     }
 
-    /** What may be left out from now on. @param {import("./sharpness.js").Levers} levers */
+    /** What may be left out from now on. @param {import("../headset/sharpness.js").Levers} levers */
     leaveOut({ minAlpha, direct, resortDegrees, recolorDegrees }) {
         Object.assign(this, { direct, resortDegrees, recolorDegrees });
         this.arena.minAlpha = minAlpha;

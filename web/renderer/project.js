@@ -1,9 +1,9 @@
 // project: splats of one posed object -> screen ellipses, as renderer/shaders/project.comp.  The only
 // culling gate.  Sigma' = J W Sigma W^T J^T + low_pass I (EWA splatting; 3DGS, eq. 5).  Eye space has
 // y up and looks along -z; pixels count from lower left.
-import { JACOBIAN_MARGIN, LOW_PASS } from "./conventions.js";
+import { JACOBIAN_MARGIN, LOW_PASS } from "../conventions.js";
 
-/** @typedef {{worldFromEye: import("./poses.js").Pose, tangents: number[], near: number, viewport: number[], scale?: number}} View */
+/** @typedef {{worldFromEye: import("../poses.js").Pose, tangents: number[], near: number, viewport: number[], scale?: number}} View */
 
 const PROJECT = `
 uniform sampler2D mean_opacity, covariance0, covariance1;

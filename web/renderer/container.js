@@ -1,7 +1,7 @@
 // container: reads what runtime_models/web/write_container.py wrote: 8 bytes "SHIFTWEB", length of
 // the JSON (uint32), the JSON, then arrays at multiples of 4.  The file is a stranger's: nothing in
 // it runs, and every count and length is checked here, before anything is allocated for it.
-import { MOST_ANCHORS, MOST_SPLATS, MOST_BYTES, MOST_WEIGHTS } from "./conventions.js";
+import { MOST_ANCHORS, MOST_SPLATS, MOST_BYTES, MOST_WEIGHTS } from "../conventions.js";
 
 /** @typedef {[string, number, number]} Section  type, byte offset, count of numbers */
 /** @typedef {{codes: Section, ends: Section, width: number}} Table  codes between the ends of each column */

@@ -2,7 +2,7 @@
 // Splats are pulled by gl_VertexID: an instance a splat, the usual way of the web, costs software GL
 // 2.4 to 7 times as much.  A quad of two triangles covers 23 % fewer pixels than one triangle, and
 // by indices its four corners are made once and not six times.
-import { MAX_ALPHA } from "./conventions.js";
+import { MAX_ALPHA } from "../conventions.js";
 
 const vertexShader = (/** @type {boolean} */ heat) => `
 uniform highp usampler2D order;          // far to near

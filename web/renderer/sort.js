@@ -1,6 +1,6 @@
 // sort: far to near, in a worker, which keeps means and opacities as the GPU made them.  Absent
 // splats (opacity below the least alpha) and those behind the eye are left out before the sort.
-import { MIN_ALPHA, WIDTH } from "./conventions.js";
+import { MIN_ALPHA, WIDTH } from "../conventions.js";
 
 /** @typedef {[number, number[]]} Frame  first splat of an object, the row of eye_from_object that gives z */
 

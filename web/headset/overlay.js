@@ -1,7 +1,7 @@
 // overlay: what lies over the splats in a headset, whatever is nearer: the panel, rays, a jump's arc.
-import { add, inverse, length, moved } from "./poses.js";
+import { add, inverse, length, moved } from "../poses.js";
 
-/** @typedef {import("./project.js").View} View */
+/** @typedef {import("../renderer/project.js").View} View */
 
 const CORNERS = `
 uniform vec4 corners[4];  // clip space: lower left, lower right, upper left, upper right
@@ -24,7 +24,7 @@ void main() {
 }`;
 
 export class Overlay {
-    /** @param {import("./gl.js").Gpu} gpu */
+    /** @param {import("../renderer/gl.js").Gpu} gpu */
     constructor(gpu) {
         this.gpu = gpu;
         this.program = gpu.program(CORNERS, FLAT);

@@ -1,7 +1,7 @@
 // sharpness: what pictures in a headset leave out to be in time, and what each of it costs.  The
 // limit there is pixels, not splats: an eye 1 m from the demo blends 58 million fragments.  Prices
 // are the least PSNR of docs/bench/chart/workshop/rows.csv, of "direct" that of docs/web.md.
-import { MIN_ALPHA, RESORT_DEGREES } from "./conventions.js";
+import { MIN_ALPHA, RESORT_DEGREES } from "../conventions.js";
 
 /** @typedef {{minAlpha: number, direct: boolean, resortDegrees: number, recolorDegrees: number, foveation: number, rate: number}} Levers */
 

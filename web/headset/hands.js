@@ -1,8 +1,8 @@
 // hands: controllers and bare hands of a headset: sticks, buttons, what is held, what is pointed at.
-import { add, product, turn } from "./poses.js";
+import { add, product, turn } from "../poses.js";
 
-/** @typedef {import("./poses.js").Pose} Pose */
-/** @typedef {import("./grab.js").Ray} Ray */
+/** @typedef {import("../poses.js").Pose} Pose */
+/** @typedef {import("../grab.js").Ray} Ray */
 /**
  * @typedef {object} Hand  what is remembered of an input source
  * @property {Ray | null} ray  world; null: not tracked

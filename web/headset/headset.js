@@ -2,12 +2,12 @@
 // the scene's floor, at true scale, where the page looked from.
 import { Hands, turnedAbout, yawOf } from "./hands.js";
 import { Overlay } from "./overlay.js";
-import { byId, element } from "./panel.js";
-import { about, add, chain, moved, turn } from "./poses.js";
+import { byId, element } from "../panel.js";
+import { about, add, chain, moved, turn } from "../poses.js";
 import { RoomPanel } from "./room_panel.js";
 import { EXACT, Sharpness, leversOf, priced } from "./sharpness.js";
 
-/** @typedef {import("./poses.js").Pose} Pose */
+/** @typedef {import("../poses.js").Pose} Pose */
 
 const WAYS_IN = { "immersive-vr": "Enter VR", "immersive-ar": "Enter AR" };
 const NEAR_M = 0.05, EYE_HEIGHT_M = 1.6;  // of who has no floor

@@ -1,7 +1,7 @@
 // decode: the networks of one object -> means, opacities, covariances (pack) and colours (shade) in
 // the arena.  The shape runs on a change of x alone, colours on a change of the eye too.  Anchors go
 // through in batches, so that what lies between the passes stays small.
-import { BATCH_ROWS, WIDTH } from "./conventions.js";
+import { BATCH_ROWS, WIDTH } from "../conventions.js";
 import { rowsOf } from "./gl.js";
 import { MOST_OUTPUTS, foldedBias, headNumber, layerShader, partSize, weightBlock } from "./networks.js";
 import { PACK } from "./pack.js";

@@ -1,6 +1,6 @@
 // arena: what all objects' splats are as decoded, and what each view makes of them; as
 // renderer/gl/buffers.py.  The splats of an object begin with a row of the lists.
-import { MIN_ALPHA, MOST_UNIT, WIDTH } from "./conventions.js";
+import { MIN_ALPHA, MOST_UNIT, WIDTH } from "../conventions.js";
 
 /** @typedef {{ellipses: WebGLTexture, rests: WebGLTexture, framebuffer: WebGLFramebuffer}} Records */
 /** @typedef {{image: WebGLTexture, heat: WebGLTexture | null, framebuffer: WebGLFramebuffer, size: number[], kind: string}} Image */
