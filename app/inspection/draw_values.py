@@ -114,12 +114,12 @@ def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> Valu
     """
     renderer.update(thermal.scene)
     renderer.draw([view])
-    behind = thermal.behind
+    behind, away = thermal.behind, None
     if thermal.colors:
         rgba = renderer.image(0).astype(np.float64)
         alpha = rgba[..., 3]
         colors = rgba[..., :3] / np.maximum(alpha, 1e-6)[..., None]
-        share, _ = value_of_colors(colors, thermal.colors)
+        share, away = value_of_colors(colors, thermal.colors)
     elif renderer.drawing.draws_heat:  # beside objects that have no such stop
         heat = renderer.drawing.heat(0).astype(np.float64)
         alpha = heat[..., 1]
@@ -139,6 +139,7 @@ def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> Valu
         np.where(known, depth, np.nan),
         thermal.stop.unit,
         (low, high),
+        float(np.percentile(away[known], 95)) if away is not None and known.any() else None,
     )
 
 

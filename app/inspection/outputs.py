@@ -72,6 +72,11 @@ def summary_lines(inspected: InspectedView) -> list[str]:
         lines.append(f"hottest: {text} at pixel {column:g},{row:g}")
     else:
         lines.append("nothing is covered by a half in this view")
+    if values.off_palette is not None:
+        lines.append(
+            f"looked up in a palette: 95 of 100 pixels are {values.off_palette:.3f} or less (sRGB, "
+            "0 to 1.7) away from its colours"
+        )
     return lines
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from shapeshift.app.inspection.inspect_view import COLUMNS, InspectedView, reading_row
 from shapeshift.app.inspection.outputs import summary_lines, three_pictures
 from shapeshift.app.inspection.pictures import ColorScale, scale_ticks
-from shapeshift.app.program import program
+from shapeshift.app.program import is_installed
 from shapeshift.runtime_models.files.plain_text import json_text, one_line
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.cameras.camera_list import CameraList, moved
@@ -85,7 +85,7 @@ class InspectionReport:
     views: list[ReportView]
     settings: list[tuple[str, str]]
     error: str
-    scene: str  # as the command was given it
+    scene: str  # name of its file; a report goes to others, whose folders are their own
     stop: str
     cameras: str  # JSON, our own form, in the world of the scene's file
 
@@ -95,12 +95,13 @@ class InspectionReport:
         who = [("Client", self.head.client), ("Inspector", self.head.inspector)]
         day = self.head.date or date.today().isoformat()
         said = [f"Date: {day}", *(f"{name}: {text}" for name, text in who if text)]
-        return [one_line(text) for text in (*said, f"Scene: {Path(self.scene).name}")]
+        return [one_line(text) for text in (*said, f"Scene: {self.scene}")]
 
     def command(self, cameras_name: str) -> str:
-        """What opens the scene where the first view is."""
+        """What opens the scene where the first view is, in the folder where both files lie."""
+        program = "shapeshift" if is_installed() else "python3 launch.py"
         scene, stop, cameras = map(shlex.quote, (self.scene, self.stop, cameras_name))
-        return f"{program()} view {scene} --x {stop} --camera {cameras}"
+        return f"{program} view {scene} --x {stop} --camera {cameras}"
 
 
 def report_of(
@@ -134,7 +135,7 @@ def report_of(
     names = tuple(view.title for view in views)
     cameras = json_text(own_rows(CameraList(tuple(seen), names, "report"))) + "\n"
     settings = settings_rows(stop, scale, shown, origin)
-    return InspectionReport(head, views, settings, error, str(scene), stop.name, cameras)
+    return InspectionReport(head, views, settings, error, scene.name, stop.name, cameras)
 
 
 def settings_rows(
@@ -186,7 +187,7 @@ def html_of(report: InspectionReport, cameras_name: str) -> str:
     link = f'<a download="{text_of(cameras_name)}" href="data:application/json;base64,{data}">'
     parts += [
         "</table><h2>Open it there</h2>",
-        f"<p>With {link}{text_of(cameras_name)}</a> beside this page:</p>",
+        f"<p>With {link}{text_of(cameras_name)}</a>, from the folder of the scene:</p>",
         f"<p><code>{text_of(report.command(cameras_name))}</code></p></body></html>\n",
     ]
     return "\n".join(parts)

@@ -192,5 +192,5 @@ def write_end(report: InspectionReport, cameras_name: str, pages: ReportPages) -
         pages.line(f"{name}: {value}")
     pages.gap()
     pages.line("Open it there", 11, "bold")
-    pages.line(f"With {cameras_name} beside this file:")
+    pages.line(f"With {cameras_name}, from the folder of the scene:")
     pages.line(report.command(cameras_name))

@@ -182,6 +182,13 @@ def check_outputs(options: Options) -> None:
         raise UsageError(f"--span is {options.span:g}, expected a number above 0.")
     if options.auto and (options.level is not None or options.span is not None):
         raise UsageError("--auto chooses level and span; leave it or those two out.")
+    looks = {"--level": options.level, "--span": options.span, "--auto": options.auto or None,
+             "--palette": options.palette or None}  # fmt: skip
+    if options.palette:
+        refuse_unknown_palette(options.palette)
+    chosen = [name for name, value in looks.items() if value is not None]
+    if chosen and options.out is None and not options.report:
+        raise UsageError(f"{chosen[0]} is of pictures; add --out FILE.png or --report FILE.")
     if not 1 <= len(options.view) <= MOST_VIEWS:
         raise UsageError(f"--view names {len(options.view)} cameras, expected 1 to {MOST_VIEWS}.")
 
@@ -301,11 +308,9 @@ def choose_scale(
 
     from shapeshift.app.errors import UsageError
     from shapeshift.app.inspection.pictures import ColorScale, auto_ends
-    from shapeshift.renderer.colors.palette import PALETTES
 
     palette = options.palette or thermal.colors or thermal.stop.palette
-    if palette not in PALETTES:
-        raise UsageError(f"there is no palette '{palette}'; known are {', '.join(PALETTES)}.")
+    refuse_unknown_palette(palette)
     assert thermal.stop.value_range is not None  # thermal_scene has seen to it
     low, high = thermal.stop.value_range
     if options.auto:
@@ -318,6 +323,15 @@ def choose_scale(
     if not -1e6 <= level <= 1e6:
         raise UsageError(f"--level is {level:g}, expected a value up to 1e6 either way.")
     return ColorScale(level - span / 2, level + span / 2, palette)
+
+
+def refuse_unknown_palette(name: str) -> None:
+    """Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.renderer.colors.palette import PALETTES
+
+    if name not in PALETTES:
+        raise UsageError(f"there is no palette '{name}'; known are {', '.join(PALETTES)}.")
 
 
 def write_reports(

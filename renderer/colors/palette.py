@@ -13,7 +13,7 @@ from shapeshift.scene.scene import Scene
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, used on display values
 STEPS = 256
 ALL_VALUES = (0.0, 1.0)  # shares of a stop's range that the ends of its palette stand for
-LEAST_SHARE = 1 / 1000  # between the two ends
+LEAST_SHARE = 0.002  # between the two ends
 ROWS = 32  # of a picture at a time: they stay in the cache
 
 # (place in 0..1, display sRGB): what a thermal camera shows, cold to hot; luminance only grows

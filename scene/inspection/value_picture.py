@@ -25,6 +25,9 @@ class ValuePicture:
     depth_m: np.ndarray  # (H, W) float64 metres along the view
     unit: str = ""
     value_range: tuple[float, float] = (0.0, 1.0)  # what the photos could show
+    # How far 95 of 100 pixels are from the colours in which values were looked up, at most, as a
+    # distance in sRGB; None: the scene has values.
+    off_palette: float | None = None
 
     @property
     def known(self) -> np.ndarray:

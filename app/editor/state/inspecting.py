@@ -14,7 +14,7 @@ from shapeshift.app.inspection.draw_values import ThermalScene, thermal_scene
 from shapeshift.app.inspection.mark_texts import free_name
 from shapeshift.app.inspection.pictures import ColorScale, auto_ends
 from shapeshift.app.paths import is_bundled
-from shapeshift.renderer.colors.palette import ALL_VALUES
+from shapeshift.renderer.colors.palette import ALL_VALUES, LEAST_SHARE
 from shapeshift.runtime_models.files.plain_text import name_line
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.marks import (
@@ -40,7 +40,6 @@ from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.scene import Scene
 
 MOST_STEPS = 100  # that can be taken back
-LEAST_SHARE = 0.002  # of the stop's range, between the ends of the palette
 
 
 class Inspecting:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -118,6 +119,18 @@ def test_colours_of_a_known_palette_are_looked_up():
     assert away[0] > 0.3  # green is none of its colours
 
 
+def test_what_looking_up_colours_costs_is_said(wall, cameras, capsys):
+    words = ("--stop", "Thermal", "--spot", "48,36", "--camera", cameras)
+    assert thermal(wall, *words) == 0
+    assert "looked up" not in capsys.readouterr().out  # values are values
+    far = {}
+    for palette in ("gray", "ironbow"):  # the wall's values are grays
+        assert thermal(wall, *words, "--colors", palette) == 0
+        said = capsys.readouterr().out
+        far[palette] = float(re.search(r"pixels are ([\d.]+) or less", said)[1])
+    assert far["gray"] < 0.01 < 0.1 < far["ironbow"]
+
+
 def test_command_prints_writes_and_keeps(wall, cameras, tmp_path, capsys):
     out, table, marks = tmp_path / "a.png", tmp_path / "a.csv", tmp_path / "kept.marks.json"
     words = (
@@ -175,6 +188,8 @@ def test_names_are_no_formulas_in_tables(wall, cameras, tmp_path):
         (("--colors", "none"), "no palette 'none'"),
         (("--span", "0"), "--span is 0"),
         (("--auto", "--level", "5"), "--auto"),
+        (("--level", "5"), "--level is of pictures"),
+        (("--palette", "gray"), "--palette is of pictures"),
         (("--view", "2"), "cameras 0 to 1"),
         (("--out", "a.jpg"), ".png"),
         (("--csv", "a.txt"), ".csv"),
