@@ -44,7 +44,7 @@ class InputActions:
         self._window, self._state, self._viewpoint = window, state, viewpoint
         self._hooks, self._open_soon = hooks, open_soon
         self._pivot: np.ndarray | None = None  # (3,) metres, that a drag turns about
-        self.pad_push: Callable[[], Push] = Push  # what sticks ask for
+        self.pushes: list[Callable[[], Push]] = []  # what sticks and caps ask for
 
     def handle_event(self, event: Event) -> None:
         """Lets one input event act."""
@@ -130,7 +130,7 @@ class InputActions:
 
     @property
     def push(self) -> Push:
-        """The movement keys that are held now, else a stick."""
+        """The movement keys that are held now, else a stick, else a cap."""
         held = self._window.held
         slow = held(glfw.KEY_LEFT_CONTROL) or held(glfw.KEY_RIGHT_CONTROL)
         keys = Push(
@@ -139,7 +139,8 @@ class InputActions:
             forward=held(glfw.KEY_W) - held(glfw.KEY_S),
             pace=FAST if self.shift else SLOW if slow else 1.0,
         )
-        return keys if keys.any else self.pad_push()
+        asked = [keys, *(push() for push in self.pushes)]
+        return next((push for push in asked if push.any), keys)
 
     @property
     def shift(self) -> bool:

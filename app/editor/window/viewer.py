@@ -31,7 +31,7 @@ from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.adding import Adding
-from shapeshift.app.editor.window.devices.gamepads import attach_pads
+from shapeshift.app.editor.window.devices.input_devices import InputDevices
 from shapeshift.app.editor.window.files import Files, OpenActions
 from shapeshift.app.editor.window.film.films import attach_films
 from shapeshift.app.editor.window.gizmo import Gizmo
@@ -88,7 +88,7 @@ class Viewer:
         wanted = (options.target_ms or options.floor_db) is not None
         self.dial = QualityController(target_ms, floor_db, wanted=wanted)
         self.hands = InputActions(window, state, self.viewpoint, self.hooks, self.open_soon)
-        self.pads = attach_pads(window, state, self.viewpoint, self.hands, self.hooks)
+        self.devices = InputDevices(window, state, self.viewpoint, self.hands, self.hooks)
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
@@ -181,7 +181,7 @@ class Viewer:
         last = time.perf_counter()
         while not (self.window.closing and self.may_close()):
             busy = self.busy()
-            watched = self.polling or self.pads.connected
+            watched = self.polling or self.devices.connected
             redraw = self.window.wait(0.0 if busy else POLL_S if watched else SLEEP_S)
             now = time.perf_counter()
             if self.window.hidden:  # no time passes either
@@ -190,7 +190,7 @@ class Viewer:
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
             due = self.state.messages.ended(now) or self.idle_work_due(now)
-            if busy or redraw or self.polling or due or self.pads.poll():
+            if busy or redraw or self.polling or due or self.devices.poll():
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
@@ -280,7 +280,7 @@ class Viewer:
 
     @property
     def _moving(self) -> bool:
-        by_hand = self.viewpoint.moving or self.hands.push.any or self.pads.input.moving
+        by_hand = self.viewpoint.moving or self.hands.push.any or self.devices.moving
         state = self.state
         living = state.world is not None and state.running and not state.world.resting
         return by_hand or state.playing or living

@@ -53,7 +53,10 @@ HEADSET_TABLES = {
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
 # of app/editor/window: KEYS of the sheet
-KEY_TABLES = ("inspection.mouse_marks", "objects", "parts", "split", "touch")
+KEY_TABLES = (
+    "devices.gamepads", "devices.space_mice", "inspection.mouse_marks", "objects", "parts", "split",
+    "touch", "wipe",
+)  # fmt: skip
 STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
 LETTERS = re.compile(r"[A-Za-z]{2}")
 KEY = r"(Ctrl|Shift|Alt|Esc|Enter|Space|Tab|[A-Z]|F\d+|\d|[+\u2013])"
@@ -85,6 +88,7 @@ def said_in(path: Path) -> set[str]:
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.FunctionDef):
             found |= rows_in(node)
+        found |= set(key_groups(node))
         name = getattr(getattr(node, "func", None), "id", "")
         if not isinstance(node, ast.Call) or name not in SAYING:
             continue
@@ -93,6 +97,13 @@ def said_in(path: Path) -> set[str]:
             if which is None or place in which:
                 found |= set(literals(argument))
     return found
+
+
+def key_groups(node: ast.AST) -> Iterator[str]:
+    """Headings that are given to the sheet of keys: hooks.keys["..."] = rows."""
+    for target in node.targets if isinstance(node, ast.Assign) else ():
+        if isinstance(target, ast.Subscript) and getattr(target.value, "attr", "") == "keys":
+            yield from literals(target.slice)
 
 
 def rows_in(function: ast.FunctionDef) -> set[str]:

@@ -92,7 +92,7 @@ def attach_pads(
 ) -> Gamepads:
     """Adds the gamepads to a viewer."""
     pads = Gamepads(state, viewpoint, hands.handle_event, lambda: read_glfw(window))
-    hands.pad_push = lambda: pads.input.push
+    hands.pushes.append(lambda: pads.input.push)
     hooks.each_frame.append(pads.act)
     hooks.keys["Gamepad"] = list(KEYS)
     return pads

@@ -22,7 +22,8 @@ class Rounds:
         self.viewer, self.asked, self.rounds = viewer, [], 0
         wait, sleep = viewer.window.wait, glfw.wait_events_timeout
         viewer.hooks.closing.clear()
-        viewer.pads.read = lambda: None  # one that is plugged in here is looked at more often
+        for device in (viewer.devices.pads, viewer.devices.mice):
+            device.read = lambda: None  # one that is plugged in here is looked at more often
 
         def short(seconds: float) -> None:
             self.asked.append(seconds)

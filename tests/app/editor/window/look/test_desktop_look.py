@@ -178,7 +178,7 @@ def test_named_views_are_added_gone_to_and_taken_out(viewer, hands, widgets):
 
 
 def test_a_gamepad_moves_turns_and_presses(viewer, hands):
-    state, pads, camera = viewer.state, viewer.pads, viewer.viewpoint.camera
+    state, pads, camera = viewer.state, viewer.devices.pads, viewer.viewpoint.camera
     now = [None]
     pads.read = lambda: now[0]
     assert not pads.poll() and not pads.connected
