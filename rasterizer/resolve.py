@@ -1,4 +1,4 @@
-"""resolve: a drawn image -> bytes for a window: background, palette, 8 bits, bottom row first."""
+"""resolve: a drawn image -> bytes for GL or a window: background, palette, 8 bits."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,8 +35,11 @@ def resolve(
     background: tuple[float, float, float] | Behind,
     palette: np.ndarray | None = None,
     heat: np.ndarray | None = None,
+    *,
+    as_window: bool = False,
 ) -> np.ndarray:
-    """(H, W, 4) uint8, opaque, row 0 at the bottom as GL wants it, of image (H, W, 4) float32.
+    """(H, W, 4) uint8, opaque, of image (H, W, 4) float32: red first and row 0 at the bottom, as GL
+    wants it, or as a window has it in memory: blue first and row 0 on top.
 
     image, and its heat (H, W, 2): as rasterize_rgba gives them.  palette (256, 3): makes
     colours of the heat, where there is any, else of the image.  Read only; on a CPU it is the
@@ -53,7 +56,7 @@ def resolve(
     device.launch(
         device.program(KERNEL)["resolve"], height, 1,
         width, height, *(float(c) for c in plain), int(mixed),
-        device.shared(image), device.constants(table), pixels, beside, sky,
+        device.shared(image), device.constants(table), pixels, beside, sky, int(as_window),
     )  # fmt: skip
     return device.view(pixels)
 

@@ -119,10 +119,12 @@ class Drawing(ABC):
         ellipsoid, weighed by alpha times transmittance.
         """
 
-    def presentable_rgba8(
-        self, i: int, background: Background, view: View, palette: np.ndarray | None = None
-    ) -> np.ndarray:
-        """(H, W, 4) uint8 of view i as a window shows it, opaque, row 0 at the bottom.
+    def presentable_bytes(
+        self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
+        as_window: bool = False,
+    ) -> np.ndarray:  # fmt: skip
+        """(H, W, 4) uint8 of view i as a window shows it, opaque: red first and row 0 at the
+        bottom, or as a window has it in memory, blue first and row 0 on top.
 
         view: whose directions a sky is seen in.  palette: of the heat, where the frame has any,
         else of the picture.  Only where presentable() is an array.

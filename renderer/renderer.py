@@ -337,8 +337,9 @@ class Renderer:
         as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
             if as_array and self._resolve.takes_bytes(framebuffer, image.shape[1::-1]):
-                pixels = self.drawing.presentable_rgba8(i, background, view, palette)
-                self._resolve.copy(pixels, framebuffer)
+                as_window = self._resolve.is_window(framebuffer)
+                looks = (background, view, palette, as_window)
+                self._resolve.copy(self.drawing.presentable_bytes(i, *looks), framebuffer)
             else:
                 unit = 1.0 if self._debug else self.drawing.unit_of(i)
                 self._resolve.draw(image, framebuffer, background, palette, heat, unit, view)

@@ -323,21 +323,21 @@ class TilesDrawing(Drawing):
         return {"drawn": self.splats - sum(culled.values()), **culled}
 
     def presentable(self, i: int) -> np.ndarray:
-        """What resolve takes: the image, row 0 on top."""
         return self._images[i]
 
     def unit_of(self, i: int) -> float:
-        """The display value that 1 in presentable(i) stands for: floats hold any."""
-        return 1.0
+        return 1.0  # floats hold any display value
 
     def presentable_heat(self, i: int) -> np.ndarray:
         return self._heat_images[i]
 
-    def presentable_rgba8(
-        self, i: int, background: Background, view: View, palette: np.ndarray | None = None
-    ) -> np.ndarray:
-        heat = self._heat_images[i] if self.draws_heat else None
-        return resolve(self.device, self._images[i], behind(background, view), palette, heat)
+    def presentable_bytes(
+        self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
+        as_window: bool = False,
+    ) -> np.ndarray:  # fmt: skip
+        image, heat = self._images[i], self._heat_images[i] if self.draws_heat else None
+        seen = behind(background, view)
+        return resolve(self.device, image, seen, palette, heat, as_window=as_window)
 
     def presentable_depth(self, i: int) -> np.ndarray:
         return self._depths[i]

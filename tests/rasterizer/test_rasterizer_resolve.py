@@ -37,6 +37,8 @@ def test_it_equals_the_picture_that_numpy_resolves(size, name, beside):
     assert got.dtype == np.uint8 and got.shape == (*size, 4)
     assert np.abs(got[..., :3] - want).max() < 0.501  # the nearest step but for float rounding
     assert (got[..., 3] == 255).all()
+    window = resolve(device(), image(*size), background, palette, heat, as_window=True)
+    np.testing.assert_array_equal(window[::-1, :, [2, 1, 0, 3]], got)
 
 
 def test_heat_without_weight_is_none():

@@ -1,17 +1,14 @@
 """Framebuffers around depth textures of the runtime: the few calls of GL that moderngl lacks."""
 
 import ctypes
-import sys
-from collections.abc import Callable
-from ctypes import CFUNCTYPE, c_char_p, c_int, c_uint, c_void_p
+from ctypes import c_int, c_uint, c_void_p
 
 import moderngl
 
+from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
+
 GL_FRAMEBUFFER, GL_TEXTURE_2D, GL_DEPTH_ATTACHMENT = 0x8D40, 0x0DE1, 0x8D00
 GL_NONE, GL_FRAMEBUFFER_COMPLETE = 0, 0x8CD5
-LOADERS = (("libEGL.so.1", "eglGetProcAddress", "eglGetCurrentContext"),
-           ("libGLX.so.0", "glXGetProcAddressARB", "glXGetCurrentContext"),
-           ("libGL.so.1", "glXGetProcAddressARB", "glXGetCurrentContext"))  # fmt: skip
 
 
 class NoDepth(RuntimeError):
@@ -22,7 +19,11 @@ class DepthFramebuffers:
     """Framebuffers of depth alone, on the context that is current; release them at the end."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
-        self._ctx, self._address = ctx, find_loader()
+        self._ctx = ctx
+        try:
+            self._functions = GlFunctions()
+        except NoFunction as error:
+            raise NoDepth(str(error)) from error
         self._made: list[int] = []
 
     def around(self, texture: int) -> moderngl.Framebuffer:
@@ -45,10 +46,10 @@ class DepthFramebuffers:
         return self._ctx.detect_framebuffer(number.value)
 
     def _call(self, name: str, result, kinds: tuple, *arguments):
-        found = self._address(name)
-        if not found:
-            raise NoDepth(f"the driver has no {name}.")
-        return CFUNCTYPE(result, *kinds)(found)(*arguments)
+        try:
+            return self._functions.call(name, result, kinds, *arguments)
+        except NoFunction as error:
+            raise NoDepth(str(error)) from error
 
     def release(self) -> None:
         for number in self._made:
@@ -56,37 +57,3 @@ class DepthFramebuffers:
                 "glDeleteFramebuffers", None, (c_int, c_void_p), 1, ctypes.byref(c_uint(number))
             )
         self._made.clear()
-
-
-def find_loader() -> Callable[[str], int | None]:
-    """What tells where a function of GL is, for the context that is current.  Raises NoDepth."""
-    if sys.platform == "win32":
-        return _windows_loader()
-    for library, function, current in LOADERS:
-        try:
-            loaded = ctypes.CDLL(library)
-        except OSError:
-            continue
-        asks = getattr(loaded, current)
-        asks.restype = c_void_p
-        if not asks():
-            continue
-        find = getattr(loaded, function)
-        find.restype, find.argtypes = c_void_p, [c_char_p]
-        return lambda name: find(name.encode())
-    raise NoDepth("no OpenGL context of EGL or GLX is current.")
-
-
-def _windows_loader() -> Callable[[str], int | None]:
-    """wglGetProcAddress knows what came after OpenGL 1.1, the library itself what was there."""
-    opengl = getattr(ctypes, "WinDLL")("opengl32")  # noqa: B009  only there
-    opengl.wglGetProcAddress.restype = c_void_p
-    opengl.wglGetProcAddress.argtypes = [c_char_p]
-
-    def address(name: str) -> int | None:
-        found = opengl.wglGetProcAddress(name.encode())
-        if found and found > 3:  # some drivers say 1, 2, 3 or -1 for none
-            return found
-        return ctypes.cast(getattr(opengl, name), c_void_p).value
-
-    return address

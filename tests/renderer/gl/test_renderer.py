@@ -8,6 +8,7 @@ import pytest
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.renderer.colors.palette import thermal_blend
 from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
@@ -328,14 +329,16 @@ def test_eight_bits_show_what_resolved_says(opened, ctx, drawing):
         ctx.simple_framebuffer((100, 60)),
         ctx.framebuffer([ctx.texture((83, 50), 4, dtype="f4")]),
     )
+    gpu = Gpu(ctx)
+    resolve = Resolve(gpu)
     for x in (0.0, 0.5):
         renderer.update(alone(model, x=x))
         for shown in (same, larger, floats):
             shown.clear(1.0, 1.0, 1.0)
             shown.viewport = (0, 0, 83, 50)
             renderer.draw([view], shown)
-            assert Resolve.takes_bytes(shown, (83, 50)) == (shown is not floats)
-            assert not Resolve.takes_bytes(shown, (83, 49))
+            assert resolve.takes_bytes(shown, (83, 50)) == (shown is not floats)
+            assert not resolve.takes_bytes(shown, (83, 49))
             width, height = shown.size
             whole = (0, 0, width, height)
             raw = np.frombuffer(shown.read(viewport=whole, components=4), np.uint8)
@@ -344,5 +347,5 @@ def test_eight_bits_show_what_resolved_says(opened, ctx, drawing):
             assert np.abs(got[:50, :83, :3] - want).max() < 0.51
             beyond = (got[50:, :, :3], got[:, 83:, :3])  # the viewport
             assert all((part == 255).all() for part in beyond)
-    for shown in (same, larger, floats):
-        shown.release()
+    for each in (same, larger, floats, resolve, gpu):
+        each.release()
