@@ -8,7 +8,7 @@ from shapeshift.runtime_models.model import STOP_KINDS
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View, look_at
-from shapeshift.training.synthetic import balls, workshop
+from shapeshift.training.synthetic import balls, one_shape, workshop
 from shapeshift.training.synthetic.openness import FAR, Clearance
 from shapeshift.training.synthetic.placing import elbow, frame, inside, noise, run_of_pipe, turned
 from shapeshift.training.synthetic.solids import Ball, Cuboid, Cylinder, Disc, Ring, unit
@@ -270,6 +270,29 @@ def test_workshop_opens_what_it_says():
     assert (np.ptp(pictures["Thermal"], axis=2) == 0).all()
     assert 0.6 < pictures["Thermal"].max()
     assert {s.kind for s in workshop.STOPS} <= set(STOP_KINDS)
+
+
+def test_depth_and_normals_are_those_of_one_shape():
+    """Against each other: normals are those of the surface that neighbouring depths span."""
+    view = workshop.dome(4, 0.1, (96, 72))[1]
+    depth, mask = photograph(view, one_shape.radiance("Depth"), samples=1)
+    normals, _ = photograph(view, one_shape.radiance("Normals"), samples=1)
+    rgb, _ = photograph(view, one_shape.radiance("RGB"), samples=1)
+    assert np.ptp(depth, axis=2).max() == 0
+    for picture in (depth, normals, rgb):
+        np.testing.assert_allclose(picture[mask == 0], workshop.GREY, atol=1e-6)
+    metres = one_shape.FAR_M - depth[..., 0] * (one_shape.FAR_M - one_shape.NEAR_M)
+    rows, columns = (g.ravel() + 0.5 for g in np.mgrid[:72, :96])
+    rays = pixel_rays(view, columns, rows).reshape(72, 96, 3)
+    points = view.world_from_eye.position + metres[..., None] * rays
+    right, down = points[1:-1, 2:] - points[1:-1, :-2], points[2:, 1:-1] - points[:-2, 1:-1]
+    spanned = unit(np.cross(down, right))  # towards the eye
+    there = (mask[1:-1, 1:-1] == 1) & (np.linalg.norm(right, axis=2) < 0.1)
+    there &= np.linalg.norm(down, axis=2) < 0.1
+    told = 2 * normals[1:-1, 1:-1] - 1
+    alike = (spanned * told).sum(axis=2)[there]
+    assert there.sum() > 500 and np.median(alike) > 0.999  # the rest lies at edges
+    assert np.abs(np.linalg.norm(told[there], axis=1) - 1).max() < 1e-5
 
 
 def test_workshop_points_and_views():

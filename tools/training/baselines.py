@@ -3,11 +3,11 @@
     python3 tools/training/baselines.py CAPTURE [CAPTURE ...] --seconds 60 240 900 \
         --sizes 0.1 0.3 1 --out WORK --csv docs/bench/baselines.csv [--methods joint] [--vgg FILE]
 
-CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  Each
-budget of `--seconds` is a `launch.py table` of all methods at full size; then, with the last
-budget, the shape-shifting model and plain splats once more at each of `--sizes`: that share of the
-splats to start with and of both caps.  Tables lie in WORK/CAPTURE/...; what is
-there is not run again, so an interrupted run goes on where it was.
+CAPTURE is a folder of posed photos, or `balls`, `workshop` or `one_shape`, which are made on the
+spot.  Each budget of `--seconds` is a `launch.py table` of all methods at full size; then, with the
+last budget, the shape-shifting model and plain splats once more at each of `--sizes`: that share of
+the splats to start with and of both caps.  Tables lie in WORK/CAPTURE/...; what is there is not run
+again, so an interrupted run goes on where it was.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from shapeshift.app.training.table_rows import TableRow, VggRow  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
 
-KNOWN = ("balls", "workshop")
+KNOWN = ("balls", "workshop", "one_shape")
 METHODS = ("joint", "separate", "splats", "spz")
 
 
@@ -93,6 +93,10 @@ def made(name: str, work: Path) -> Path:
             from shapeshift.training.synthetic.balls import make_balls
 
             make_balls(folder)
+        elif name == "one_shape":
+            from shapeshift.training.synthetic.one_shape import make_one_shape
+
+            make_one_shape(folder)
         else:
             from shapeshift.training.synthetic.workshop import make_workshop
 

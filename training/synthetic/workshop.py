@@ -67,6 +67,7 @@ CLOSE = 0.95  # metres
 FRONT = np.deg2rad(70)  # close cameras stay within this of straight ahead
 ELEVATIONS = (8.0, 66.0)  # degrees
 GOLDEN = (5**0.5 + 1) / 2
+Radiance = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def things(opened: bool) -> list[tuple[str, list[Solid]]]:
@@ -96,7 +97,7 @@ def place(opened: bool) -> tuple[Place, Clearance]:
     return here, Clearance.of(here, (-0.75, -0.2, -0.48), (0.75, 0.5, 0.48))
 
 
-def radiance(stop: str):
+def radiance(stop: str) -> Radiance:
     """What a ray of that stop's camera brings home: colour (n, 3) and solid (n,)."""
     here, clearance = place(stop == "Opened")
 
@@ -143,10 +144,10 @@ def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
     return out
 
 
-def write_photo(job: tuple[View, str, Path, Path]) -> None:
+def write_photo(job: tuple[View, Callable[[str], Radiance], str, Path, Path]) -> None:
     """One photo and its mask, written to their files."""
-    view, stop, path, mask_path = job
-    image, mask = photograph(view, radiance(stop))
+    view, radiance_of, stop, path, mask_path = job
+    image, mask = photograph(view, radiance_of(stop))
     save_png(path, image)
     save_png(mask_path, mask)
 
@@ -179,9 +180,27 @@ def make_workshop(
 
     `progress` hears how many photos are done, out of how many.
     """
-    folder = Path(folder)
+    counts = (views, test_views)
+    states = (False, True)
+    return photograph_bench(folder, STOPS, states, radiance, size, counts, processes, progress)
+
+
+def photograph_bench(
+    folder: Path,
+    stops: tuple[Stop, ...],
+    states: tuple[bool, ...],
+    radiance_of: Callable[[str], Radiance],
+    size: tuple[int, int],
+    counts: tuple[int, int],
+    processes: int,
+    progress: Callable[[int, int], None],
+) -> Capture:
+    """The capture of any stops: `radiance_of` their names, a function of a module; `states`, opened
+    or not, that points lie on; `counts` of the photos a stop to train with and to test.
+    """
+    folder, (views, test_views) = Path(folder), counts
     photos, jobs = [], []
-    for number, stop in enumerate(STOPS):
+    for number, stop in enumerate(stops):
         name = stop.name.lower()
         make_folders(folder, name)
         make_folders(folder, f"masks/{name}")
@@ -190,14 +209,14 @@ def make_workshop(
         for i, (split, view) in enumerate(shots):
             path = folder / name / f"{split}_{i:03}.png"
             mask_path = folder / "masks" / name / path.name
-            jobs.append((view, stop.name, path, mask_path))
+            jobs.append((view, radiance_of, stop.name, path, mask_path))
             photos.append(Photo(view, path, stop.name, None, split))
     for done in write_photos(jobs, processes):
         progress(done, len(jobs))
-    points, colors = colored_points(size)
+    points, colors = colored_points(size, states=states)
     capture = Capture(
         folder,
-        STOPS,
+        stops,
         tuple(photos),
         points,
         colors,
@@ -211,12 +230,17 @@ def make_workshop(
     return capture
 
 
-def colored_points(size: tuple[int, int], count: int = 40000) -> tuple[np.ndarray, np.ndarray]:
-    """Points on the closed and on the opened bench, half each, with the colours of the paint."""
+def colored_points(
+    size: tuple[int, int], count: int = 40000, states: tuple[bool, ...] = (False, True)
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points on the closed and on the opened bench, as many each, with the colours of the paint;
+    `states`: whether it is opened.
+    """
     points, colors = [], []
-    for opened in (False, True):
+    for opened in states:
         here, _ = place(opened)
-        xyz, solids = surface_points(here, dome(24, 0.4, size), count // 2, 0.0015, int(opened))
+        each = count // len(states)
+        xyz, solids = surface_points(here, dome(24, 0.4, size), each, 0.0015, int(opened))
         for i in np.unique(solids):
             solid, mine = here.solids[i], xyz[solids == i]
             color = solid.surface.color
