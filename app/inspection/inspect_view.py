@@ -11,6 +11,7 @@ import numpy as np
 
 from shapeshift.app.document import Document
 from shapeshift.app.inspection.draw_values import ThermalScene, draw_values
+from shapeshift.scene.inspection.emissivity import Emission
 from shapeshift.scene.inspection.marks import Isotherm, Mark, MarkReading, read_mark
 from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.inspection.value_picture import ValuePicture, value_text
@@ -51,9 +52,14 @@ def inspect_view(
     thermal: ThermalScene,
     photo_stop: str,
     view: View,
+    emission: Emission | None = None,
 ) -> InspectedView:
-    """The values of a view, and its photo where photo_stop names a stop; nothing is marked yet."""
+    """The values of a view, and its photo where photo_stop names a stop; nothing is marked yet.
+    emission: what corrects values, which are temperatures then.
+    """
     values = draw_values(renderer, thermal, view)
+    if emission is not None:
+        values = values.corrected(emission)
     photo = None
     if photo_stop:
         renderer.update(document.placed(photo_stop, "the photo's stop").scene)
@@ -125,7 +131,7 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
         "y_m",
         "z_m",
     )
-    rows.writerow((*head, "note"))
+    rows.writerow((*head, "note", "emissivity"))
     for number, each in enumerate(inspected):
         for reading in each.readings:
             mark = reading.mark
@@ -141,6 +147,7 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
                     number_cell(reading.depth_m),
                     *map(number_cell, mark.place + origin),
                     cell(mark.note),
+                    number_cell(used_emissivity(mark, each.values)),
                 )
             )
         for a, b, value in each.differences:
@@ -154,12 +161,19 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
                     cell(each.values.unit),
                     "",
                     number_cell(value),
-                    *gone[:-1],
+                    *gone,
                     "",
                     "",
                 )
             )
     return held.getvalue()
+
+
+def used_emissivity(mark: Mark, values: ValuePicture) -> float:
+    """By which a mark is read; NaN: its values are as photographed."""
+    if mark.emissivity is not None:
+        return mark.emissivity
+    return math.nan if values.emission is None else values.emission.surface.emissivity
 
 
 def profile_csv(reading: MarkReading, unit: str) -> str:

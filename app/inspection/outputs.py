@@ -23,8 +23,9 @@ from shapeshift.app.inspection.pictures import (
 from shapeshift.app.paths import file_name, full
 from shapeshift.app.terminal import open_console, say
 from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.scene.inspection.emissivity import Emission
 from shapeshift.scene.inspection.marks_file import MarksFile
-from shapeshift.scene.inspection.value_picture import value_text
+from shapeshift.scene.inspection.value_picture import ValuePicture, value_text
 
 BETWEEN_PX = 8  # of pictures side by side
 
@@ -56,6 +57,16 @@ def print_readings(
         say("The error of these values is not known; --capture CAPTURE measures it.")
 
 
+def correction_line(values: ValuePicture, emission: Emission) -> str:
+    """By what values were corrected, and what that makes of an error of the photos."""
+    line = f"temperatures of surfaces: {emission.words(values.unit)}"
+    before = values.photographed
+    if before is None or not values.known.any():
+        return line
+    grown = emission.growth(float(np.mean(before[values.known])), values.unit)
+    return f"{line}; an error of the photos counts {grown:.2f} times at their mean"
+
+
 def summary_lines(inspected: InspectedView) -> list[str]:
     """Differences, isotherms and the hottest place of a view."""
     values = inspected.values
@@ -72,6 +83,8 @@ def summary_lines(inspected: InspectedView) -> list[str]:
         lines.append(f"hottest: {text} at pixel {column:g},{row:g}")
     else:
         lines.append("nothing is covered by a half in this view")
+    if values.emission is not None:
+        lines.append(correction_line(values, values.emission))
     if values.off_palette is not None:
         lines.append(
             f"looked up in a palette: 95 of 100 pixels are {values.off_palette:.3f} or less (sRGB, "

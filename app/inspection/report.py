@@ -23,9 +23,11 @@ from shapeshift.scene.cameras.write_own_cameras import own_rows
 from shapeshift.scene.inspection.marks_file import MarksFile
 
 CAMERAS_ENDING = ".camera.json"
+AS_PHOTOGRAPHED = "Values are apparent temperatures as the photos gave them"
+CORRECTED = "Values are temperatures of surfaces, corrected as the settings say"
 VALUES_WORDS = (
-    "Values are apparent temperatures as the photos gave them, read before the palette; -- where "
-    "less than half of a pixel is covered; < and > at the ends of the range."
+    ", read before the palette; -- where less than half of a pixel is covered; < and > at the ends "
+    "of the range."
 )
 NO_ERROR = "The error of these values was not measured; --capture CAPTURE measures it."
 JUMP = 8.0  # times the usual step along a line: it goes from one surface to another
@@ -126,11 +128,16 @@ def report_of(
         ]
         title = f"View {number + 1}" if len(shown) > 1 else "View"
         notes = [f"{mark.name}: {mark.note}" for mark in marks if mark.note]
+        own = [mark for mark in marks if mark.emissivity is not None]
+        notes += [f"{mark.name}: emissivity {mark.emissivity:g}" for mark in own]
         pictures = three_pictures(each, scale)
         views.append(ReportView(title, pictures, rows, notes, summary_lines(each), profiles))
     error = NO_ERROR
+    corrected = any(each.values.emission is not None for each in shown)
     if file.held_out is not None:
-        error = f"Error of the values {file.held_out.words(unit)}."
+        of = "photographed values" if corrected else "values"
+        error = f"Error of the {of} {file.held_out.words(unit)}."
+    error += f" {CORRECTED if corrected else AS_PHOTOGRAPHED}{VALUES_WORDS}"
     seen = moved([each.values.view for each in shown], origin.tolist())
     names = tuple(view.title for view in views)
     cameras = json_text(own_rows(CameraList(tuple(seen), names, "report"))) + "\n"
@@ -149,8 +156,11 @@ def settings_rows(
         ("stop", stop.name),
         ("range of the photos", f"{low:g} to {high:g} {unit}".rstrip()),
         ("palette", scale.palette),
-        ("level, span", f"{scale.level:g}, {scale.span:g} {unit}".rstrip()),
+        ("level, span", f"{round(scale.level, 1):g}, {round(scale.span, 1):g} {unit}".rstrip()),
     ]
+    emission = shown[0].values.emission
+    if emission is not None:
+        rows.append(("corrected for", emission.words(unit)))
     for number, each in enumerate(shown):
         view = each.values.view
         eye = ", ".join(
@@ -180,7 +190,7 @@ def html_of(report: InspectionReport, cameras_name: str) -> str:
     for view in report.views:
         parts += html_of_view(view)
     parts.append("<h2>How right it is</h2>")
-    parts.append(f"<p>{text_of(report.error)} {text_of(VALUES_WORDS)}</p>")
+    parts.append(f"<p>{text_of(report.error)}</p>")
     parts.append("<h2>Settings</h2><table>")
     parts += [f"<tr><th>{text_of(a)}</th><td>{text_of(b)}</td></tr>" for a, b in report.settings]
     data = base64.b64encode(report.cameras.encode()).decode()

@@ -9,7 +9,6 @@ import numpy as np
 from shapeshift.app.inspection.inspect_view import COLUMNS
 from shapeshift.app.inspection.report import (
     CAMERAS_ENDING,
-    VALUES_WORDS,
     InspectionReport,
     ReportView,
     html_of,
@@ -185,7 +184,7 @@ def write_end(report: InspectionReport, cameras_name: str, pages: ReportPages) -
     """How right it is, the settings, the way back into the scene."""
     pages.room(LINE * (len(report.settings) + 10))
     pages.line("How right it is", 11, "bold")
-    pages.line(f"{report.error} {VALUES_WORDS}")
+    pages.line(report.error)
     pages.gap()
     pages.line("Settings", 11, "bold")
     for name, value in report.settings:

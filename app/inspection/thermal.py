@@ -52,6 +52,14 @@ class Options(ReadingOptions):
     """An isotherm: all that is colder.  Default: none."""
     between: tuple[float, float] | None = None
     """An isotherm: all from one value to another.  Default: none."""
+    emissivity: Annotated[tuple[str, ...], Opt(metavar="[MARK=]NUMBER")] = ()
+    """Of what is seen, 0.1 to 1, or of one mark's surface, as Sp1=0.3: values become temperatures
+    of surfaces.  Default: what the file of marks has, else values are as photographed."""
+    reflected: float | None = None
+    """The temperature of what surfaces mirror.  Default: that of the file of marks, else 20."""
+    taken_with: tuple[float, float] | None = None
+    """Emissivity and reflected temperature that the camera was set to, in whose values these are
+    already.  Default: those of the file of marks, else 1, with which nothing was corrected."""
     level: float | None = None
     """The value in the middle of the palette.  Default: that of the stop's range."""
     span: float | None = None
@@ -122,6 +130,7 @@ def run(options: Options) -> int:
     from shapeshift.app.document import open_document
     from shapeshift.app.drawing import open_renderer, parse_size
     from shapeshift.app.inspection.draw_values import ThermalChoice, thermal_scene
+    from shapeshift.app.inspection.emission_options import choose_emission, with_emissivities
     from shapeshift.app.inspection.held_out import held_out_error
     from shapeshift.app.inspection.inspect_view import inspect_view, with_readings
     from shapeshift.app.inspection.outputs import print_readings, write_picture, write_tables
@@ -137,16 +146,18 @@ def run(options: Options) -> int:
     document = open_document(options.scene, options)
     choice = ThermalChoice(options.stop, options.range, options.unit, options.colors)
     thermal = thermal_scene(document, choice)
+    emission, own = choose_emission(options, file, thermal.stop.unit)
+    file = replace(file, emission=emission)
     capture = open_capture(options.capture, options.memory) if options.capture else None
     views = choose_views(options, document, cameras, size)
     photo = photo_stop(options, document, thermal)
     with open_renderer(options.context, options.drawing) as (renderer, _):
         renderer.settings = replace(renderer.settings, background=document.background)
         shown = [
-            inspect_view(renderer, document, thermal, photo, view)
+            inspect_view(renderer, document, thermal, photo, view, emission)
             for view in tracked(views, "measuring")
         ]
-        file = with_new_marks(options, file, shown[0], document)
+        file = with_emissivities(with_new_marks(options, file, shown[0], document), own)
         if capture is not None:
             error = held_out_error(renderer, thermal, document, capture)
             file = replace(file, held_out=error)
@@ -311,8 +322,7 @@ def choose_scale(
 
     palette = options.palette or thermal.colors or thermal.stop.palette
     refuse_unknown_palette(palette)
-    assert thermal.stop.value_range is not None  # thermal_scene has seen to it
-    low, high = thermal.stop.value_range
+    low, high = shown[0].values.value_range
     if options.auto:
         try:
             low, high = auto_ends(np.concatenate([each.values.values.ravel() for each in shown]))

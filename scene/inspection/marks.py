@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from shapeshift.scene.inspection.emissivity import LEAST_EMISSIVITY, Emission
 from shapeshift.scene.inspection.value_picture import ValuePicture, world_points
 
 PREFIX = {"spot": "Sp", "line": "Li", "circle": "Ci", "box": "Ar"}  # as thermographers number them
@@ -35,6 +36,7 @@ class Mark:
     points: np.ndarray
     radius_m: float = 0.0  # of a circle
     note: str = ""
+    emissivity: float | None = None  # of its surface; None: as the picture has it
 
     def __post_init__(self) -> None:
         """Refuses what is none: ValueError, one sentence."""
@@ -55,6 +57,11 @@ class Mark:
             raise ValueError(
                 f"the circle '{self.name}' has the radius {self.radius_m:.3g}; metres above 0 "
                 "are wanted."
+            )
+        if self.emissivity is not None and not LEAST_EMISSIVITY <= self.emissivity <= 1:
+            raise ValueError(
+                f"the {self.kind} '{self.name}' has the emissivity {self.emissivity:.3g}; "
+                f"{LEAST_EMISSIVITY:g} to 1 is wanted."
             )
         if self.kind == "box" and not _is_convex(points):
             raise ValueError(f"the box '{self.name}' has eight corners that are none of a box.")
@@ -127,8 +134,13 @@ def read_mark(mark: Mark, picture: ValuePicture) -> MarkReading:
     """What a view reads at a mark.
 
     A spot is read between the nearest pixels.  A circle or box has all pixels whose surface lies in
-    it: what stands before or behind it does not count.
+    it: what stands before or behind it does not count.  A mark with an emissivity of its own is
+    read at that; nothing is, where the values are no temperatures.
     """
+    if mark.emissivity is not None:
+        if not picture.is_temperature:
+            return MarkReading(mark)
+        picture = picture.corrected(picture.emission or Emission(), mark.emissivity)
     depth = float(picture.pixel_of(mark.place[None])[1][0])
     if mark.kind == "spot":
         value = float(picture.values_at(mark.points)[0])

@@ -10,6 +10,13 @@ from shapeshift.runtime_models.files.json_fields import Fields, is_number, read_
 from shapeshift.runtime_models.files.plain_text import LONGEST_NAME, json_text, name_line
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.inspection.emissivity import (
+    LEAST_C,
+    LEAST_EMISSIVITY,
+    MOST_C,
+    Emission,
+    SurfaceRadiation,
+)
 from shapeshift.scene.inspection.marks import (
     FARTHEST,
     KINDS,
@@ -58,6 +65,7 @@ class MarksFile:
     isotherms: tuple[Isotherm, ...] = ()
     metres_per_unit: float = 1.0  # what a length of the scene is multiplied by
     held_out: HeldOutError | None = None  # as it was measured last
+    emission: Emission | None = None  # by which values are corrected; None: as photographed
 
     def named(self, name: str) -> Mark:
         """The mark of that name.  KeyError: there is none."""
@@ -95,8 +103,10 @@ def read_marks_file(path: Path) -> MarksFile:
     isotherms = tuple(_isotherm(row) for row in fields.rows("isotherms", MOST_MARKS, "isotherm"))
     error = fields.optional_object("held_out")
     held_out = None if error is None else _held_out(error)
+    emission = fields.optional_object("emission")
+    corrected = None if emission is None else _emission(emission)
     fields.refuse_unknown_keys()
-    return MarksFile(marks, pairs, isotherms, scale, held_out)
+    return MarksFile(marks, pairs, isotherms, scale, held_out, corrected)
 
 
 def _mark(row: Fields) -> Mark:
@@ -115,9 +125,11 @@ def _mark(row: Fields) -> Mark:
         raise row.error("points", f"a list of [x, y, z] in metres, at most {MOST_POINTS:,},")
     radius = row.number("radius", 0.0, "metres above 0", 0.0, FARTHEST) if kind == "circle" else 0.0
     note = row.line("note", "")
+    wanted = f"a number from {LEAST_EMISSIVITY:g} to 1"
+    share = row.number("emissivity", None, wanted, LEAST_EMISSIVITY, 1)
     row.refuse_unknown_keys()
     try:
-        return Mark(name, kind, np.array(points, np.float64), radius, note)
+        return Mark(name, kind, np.array(points, np.float64), radius, note, share)
     except ValueError as error:
         raise BadFile(f"{row.where}: {error}") from None
 
@@ -153,6 +165,27 @@ def _held_out(row: Fields) -> HeldOutError:
     return HeldOutError(mean, high, photos)
 
 
+def _emission(row: Fields) -> Emission:
+    taken = row.optional_object("taken")
+    surface = _surface(row)
+    row.refuse_unknown_keys()
+    if taken is None:
+        return Emission(surface)
+    camera = _surface(taken)
+    taken.refuse_unknown_keys()
+    return Emission(surface, camera)
+
+
+def _surface(row: Fields) -> SurfaceRadiation:
+    share = row.number(
+        "emissivity", 1.0, f"a number from {LEAST_EMISSIVITY:g} to 1", LEAST_EMISSIVITY, 1
+    )
+    mirrored = row.number(
+        "reflected", 20.0, f"a value from {LEAST_C:g} to {MOST_C:g}", LEAST_C, MOST_C
+    )
+    return SurfaceRadiation(share, mirrored)
+
+
 def moved_marks(file: MarksFile, by: np.ndarray) -> MarksFile:
     """The same with every mark moved by (3,) metres: into another world's zero."""
     marks = tuple(replace(mark, points=mark.points + by) for mark in file.marks)
@@ -166,7 +199,8 @@ def marks_rows(file: MarksFile) -> dict:
         row: dict = {"name": mark.name, "kind": mark.kind}
         row["points"] = (np.round(mark.points, DECIMALS) + 0.0).tolist()
         row |= {"radius": round(float(mark.radius_m), 7)} if mark.kind == "circle" else {}
-        marks.append(row | ({"note": mark.note} if mark.note else {}))
+        row |= {"note": mark.note} if mark.note else {}
+        marks.append(row | ({} if mark.emissivity is None else {"emissivity": mark.emissivity}))
     rows: dict = {MARK: VERSION, "marks": marks}
     rows["differences"] = [{"of": a, "less": b} for a, b in file.differences]
     rows["isotherms"] = [
@@ -177,6 +211,8 @@ def marks_rows(file: MarksFile) -> dict:
         rows["metres_per_unit"] = float(file.metres_per_unit)
     if file.held_out is not None:
         rows["held_out"] = vars(file.held_out)
+    if file.emission is not None:
+        rows["emission"] = vars(file.emission.surface) | {"taken": vars(file.emission.taken)}
     return rows
 
 

@@ -1,10 +1,11 @@
 """What a thermal stop measures in a view: value and depth of each pixel, before any palette."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from shapeshift.scene.inspection.emissivity import KELVINS, Emission
 from shapeshift.scene.inspection.lengths import Point
 from shapeshift.scene.pose import View
 
@@ -28,6 +29,14 @@ class ValuePicture:
     # How far 95 of 100 pixels are from the colours in which values were looked up, at most, as a
     # distance in sRGB; None: the scene has values.
     off_palette: float | None = None
+    emission: Emission | None = None  # by which values were corrected; None: as photographed
+    photographed: np.ndarray | None = None  # (H, W) float64: values before that
+    photographed_range: tuple[float, float] | None = None
+
+    @property
+    def is_temperature(self) -> bool:
+        """Whether its unit is one of temperature, so that it can be corrected."""
+        return self.unit in KELVINS
 
     @property
     def known(self) -> np.ndarray:
@@ -119,6 +128,32 @@ class ValuePicture:
         ray = self.pick(pixel) - self.view.world_from_eye.position
         ray = ray / np.linalg.norm(ray)
         return across**2 * np.eye(3) + (along**2 - across**2) * np.outer(ray, ray)
+
+    def corrected(self, emission: Emission, emissivity: float | None = None) -> "ValuePicture":
+        """The same with the temperatures of surfaces; `emissivity`: of a surface of its own.
+
+        The range is what the photos' range stands for.  ValueError: values are no temperatures.
+        """
+        before = self.values if self.photographed is None else self.photographed
+        values = emission.corrected(before, self.unit, emissivity)
+        known = values[np.isfinite(values)]
+        kept = self.photographed_range or self.value_range
+        low, high = emission.corrected(np.array(kept), self.unit, emissivity)
+        low = low if np.isfinite(low) else known.min(initial=high)  # colder than what is mirrored
+        return replace(
+            self, values=values, value_range=(float(low), float(high)), emission=emission,
+            photographed=before, photographed_range=kept,
+        )  # fmt: skip
+
+    def as_photographed(self) -> "ValuePicture":
+        """The same without a correction."""
+        if self.photographed is None:
+            return self
+        kept = self.photographed_range or self.value_range
+        return replace(
+            self, values=self.photographed, value_range=kept, emission=None, photographed=None,
+            photographed_range=None,
+        )  # fmt: skip
 
     def hottest(self) -> tuple[tuple[float, float], float]:
         """The pixel (column, row) with the largest value, and that; ValueError: none is known."""

@@ -19,6 +19,7 @@ from shapeshift.app.inspection.draw_values import (
 from shapeshift.app.inspection.facing import value_facing
 from shapeshift.app.paths import plain
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.lengths import Measurement, Point, Scale
 from shapeshift.scene.inspection.lengths import measure as measured
 from shapeshift.scene.inspection.marks import Mark, MarkReading, read_mark
@@ -47,32 +48,40 @@ class InspectedScene(OpenedScene):
         value_range: tuple[float, float] | None = None,
         unit: str = "",
         colors: str = "",
+        emissivity: float | None = None,
+        reflected: float | None = None,
     ) -> ValuePicture:
         """A view of the thermal stop as numbers: `values` (H, W) in `unit` and `depth_m` (H, W),
         NaN where less than half of a pixel is covered, and `points` (H, W, 3) metres in the world.
 
         stop: which one; "": the first thermal one.  value_range, unit: what its black and white
         stand for, where the scene does not say.  colors: the palette of a stop that holds its
-        colours and no values.  Raises UsageError.
+        colours and no values.  emissivity, reflected: of the surfaces that are seen, whose
+        temperatures the values become; None: 1, and 20 in their unit; neither: they are as
+        photographed.  Raises UsageError.
 
             seen = scene.values("front", (640, 480))
             (column, row), celsius = seen.hottest()
         """
         thermal = thermal_scene(self.subject, ThermalChoice(stop, value_range, unit, colors))
-        return _drawn(thermal, choose_views(self, camera, 1, size)[0])
+        picture = _drawn(thermal, choose_views(self, camera, 1, size)[0])
+        return _corrected(picture, emissivity, reflected)
 
     def temperature(
         self,
         place: Place,
         camera: Camera | None = None,
         size: Size | None = None,
+        emissivity: float | None = None,
+        reflected: float | None = None,
         **choice: "str | tuple[float, float]",
     ) -> float:
         """The value of the thermal stop, in its unit, at (x, y, z) metres in the world or at
         (column, row) of a view; NaN where nothing is seen.
 
         camera None: a place in the world is read in the view, of 32 around it, that its surface
-        faces most; a pixel in the front view.  choice: as of `values`.  Raises UsageError.
+        faces most; a pixel in the front view.  emissivity and all that follows: as of `values`.
+        Raises UsageError.
 
             celsius = scene.temperature((0.31, 0.22, 0.05))
         """
@@ -81,8 +90,13 @@ class InspectedScene(OpenedScene):
         thermal = thermal_scene(self.subject, chosen)
         if len(spot) == 3 and camera is None:
             radius = self.bounds[1]
-            return value_facing(lambda view: _drawn(thermal, view), spot, radius)
+
+            def seen(view: View) -> ValuePicture:
+                return _corrected(_drawn(thermal, view), emissivity, reflected)
+
+            return value_facing(seen, spot, radius)
         picture = _drawn(thermal, choose_views(self, camera or "front", 1, size)[0])
+        picture = _corrected(picture, emissivity, reflected)
         if len(spot) == 3:
             return float(picture.values_at(spot[None])[0])
         return float(picture.at(picture.values, spot[None])[0])
@@ -109,12 +123,16 @@ class InspectedScene(OpenedScene):
 
             for reading in scene.read_marks(): print(reading.mark.name, reading.mean)
         """
+        emission: Emission | None = None
         if marks is None and self.path is None:
             raise UsageError("this scene lies in no file, so no marks lie beside it; give them.")
         if marks is None or not isinstance(marks, Iterable) or isinstance(marks, str):
             path = marks_path(self.path) if marks is None and self.path else plain(str(marks))
-            marks = moved_marks(read_marks_file(path), -self.origin).marks
+            file = moved_marks(read_marks_file(path), -self.origin)
+            marks, emission = file.marks, file.emission
         picture = self.values(camera, size, **choice)  # type: ignore[arg-type]  # as above
+        if emission is not None and picture.emission is None and picture.is_temperature:
+            picture = picture.corrected(emission)
         return tuple(read_mark(mark, picture) for mark in marks)
 
     def measure(
@@ -153,6 +171,20 @@ class InspectedScene(OpenedScene):
 def _drawn(thermal: ThermalScene, view: View) -> ValuePicture:
     with shared_renderer("auto", "auto", RenderSettings(), BLACK) as renderer:
         return renderer.inspect(lambda frames: draw_values(frames, thermal, view))
+
+
+def _corrected(
+    picture: ValuePicture, emissivity: float | None, reflected: float | None
+) -> ValuePicture:
+    """Raises UsageError."""
+    if emissivity is None and reflected is None:
+        return picture
+    given = {"emissivity": emissivity, "reflected": reflected}
+    try:
+        surface = SurfaceRadiation(**{k: float(v) for k, v in given.items() if v is not None})
+        return picture.corrected(Emission(surface))
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def _numbers(place: Place) -> np.ndarray:

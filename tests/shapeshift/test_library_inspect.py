@@ -17,6 +17,12 @@ def scene(tmp_path_factory):
     return ss.load(write_wall(tmp_path_factory.mktemp("wall") / "wall"))
 
 
+def of_half_a_mirror(celsius: float) -> float:
+    """°C of what sends half its radiation beside half that of 20 °C, where both look like this."""
+    photons = [math.expm1(14387.77 / 9.8 / (c + 273.15)) ** -1 for c in (celsius, 20.0)]
+    return 14387.77 / 9.8 / math.log1p(1 / (2 * photons[0] - photons[1])) - 273.15
+
+
 def test_degrees_and_metres_at_pixels_and_places(scene):
     view = wall_view()
     seen = scene.values(view)
@@ -24,6 +30,10 @@ def test_degrees_and_metres_at_pixels_and_places(scene):
     assert scene.temperature((48, 36), view) == pytest.approx(celsius_at(0), abs=PIXEL_C)
     assert scene.temperature((0.2, 0.1, 0.0), view) == pytest.approx(60, abs=PIXEL_C)
     assert scene.temperature((0.2, 0.1, 0.0)) == pytest.approx(60, abs=0.3)  # small pixels
+    bare = scene.temperature((0.2, 0.1, 0.0), emissivity=0.5)
+    assert bare == pytest.approx(of_half_a_mirror(60.0), abs=0.6)
+    with pytest.raises(ss.UsageError, match="the emissivity is 7"):
+        scene.values(view, emissivity=7)
     assert scene.depth((48, 36), view) == pytest.approx(1.5, abs=0.003)
     for nothing in ((0.5, 0.5), (500, 20), (0.2, 0.1, -0.5)):
         assert math.isnan(scene.temperature(nothing, view))

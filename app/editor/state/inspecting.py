@@ -17,6 +17,7 @@ from shapeshift.app.paths import is_bundled
 from shapeshift.renderer.colors.palette import ALL_VALUES, LEAST_SHARE
 from shapeshift.runtime_models.files.plain_text import name_line
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks import (
     MOST_MARKS,
     Bound,
@@ -201,15 +202,36 @@ class Inspecting:
         else:
             self.edit(file)
 
+    def radiate(self, surface: SurfaceRadiation | None) -> None:
+        """Values become temperatures of such surfaces; None: they are as photographed."""
+        taken = self.file.emission.taken if self.file.emission else SurfaceRadiation()
+        file = replace(self.file, emission=Emission(surface, taken) if surface else None)
+        before, now = self._before[-1] if self._before else None, self.file
+        same = before and before.marks is now.marks and before.isotherms is now.isotherms
+        if same and surface and now.emission:
+            self.file = file  # the number is being dragged: one step
+            self.read()
+        else:
+            self.edit(file)
+
     # ---- what is read
 
     def saw(self, picture: ValuePicture) -> None:
         """What the view has, measured just now."""
-        self.picture, self.is_current = picture, True
+        self.picture, self.is_current = self._corrected(picture), True
         self.read()
+
+    def _corrected(self, picture: ValuePicture) -> ValuePicture:
+        """As the file of marks has the emissivity; values that are no temperatures stay."""
+        emission = self.file.emission
+        if emission is not None and picture.is_temperature:
+            return picture.corrected(emission)
+        return picture.as_photographed()
 
     def read(self) -> None:
         """All marks anew in the picture that is there."""
+        if self.picture is not None and self.picture.emission != self.file.emission:
+            self.picture = self._corrected(self.picture)
         picture = self.picture
         marks: tuple[Mark, ...] = self.file.marks if picture is not None else ()
         self.readings = {mark.name: read_mark(mark, picture) for mark in marks if picture}
@@ -249,7 +271,7 @@ class Inspecting:
         if self.picture is None:
             return
         try:
-            self.ends = auto_ends(self.picture.values)
+            self.ends = auto_ends(self.picture.as_photographed().values)  # as it is drawn
         except ValueError as error:
             self._state.say(str(error))
 

@@ -33,6 +33,7 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
 from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks import Isotherm, Mark, read_mark, spot_at
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.models import make_random_model
@@ -129,6 +130,49 @@ def test_what_looking_up_colours_costs_is_said(wall, cameras, capsys):
         said = capsys.readouterr().out
         far[palette] = float(re.search(r"pixels are ([\d.]+) or less", said)[1])
     assert far["gray"] < 0.01 < 0.1 < far["ironbow"]
+
+
+def test_emissivity_is_of_all_or_of_one_mark_and_is_kept(wall, cameras, tmp_path, capsys):
+    marks = tmp_path / "kept.marks.json"
+    words = ("--camera", cameras, "--marks", marks)
+    assert thermal(wall, "--spot", "a=48,36", "--spot", "b=48,36", *words, "--save") == 0
+    plain = read_of(capsys.readouterr().out, "a")
+    given = ("--emissivity", "0.8", "b=0.5", "--reflected", "10")
+    assert thermal(wall, *words, *given, "--save", "--csv", tmp_path / "a.csv") == 0
+    said = capsys.readouterr().out
+    assert "temperatures of surfaces: emissivity 0.8, 10 °C reflected; an error" in said
+    emission = Emission(SurfaceRadiation(0.8, 10.0))
+    for name, share in (("a", 0.8), ("b", 0.5)):
+        want = emission.corrected(np.array(plain), "°C", share)
+        assert read_of(said, name) == pytest.approx(float(want), abs=0.2)  # printed tenths
+    rows = {row["mark"]: row["emissivity"] for row in csv.DictReader((tmp_path / "a.csv").open())}
+    assert rows == {"a": "0.8000", "b": "0.5000"}
+    assert thermal(wall, *words) == 0  # kept
+    again = capsys.readouterr().out
+    assert [read_of(again, n) for n in "ab"] == [read_of(said, n) for n in "ab"]
+
+
+def read_of(said: str, name: str) -> float:
+    """The mean that the printed table has for a mark."""
+    row = next(line for line in said.splitlines() if re.match(rf"\W*{name}\s", line))
+    return float(re.findall(r"([-\d.]+) °C", row)[1])
+
+
+@pytest.mark.parametrize(
+    "words,said",
+    [
+        (("0.05",), "the emissivity is 0.05; a number from 0.1 to 1"),
+        (("b=x",), "a number from 0.1 to 1 is wanted, or NAME=NUMBER"),
+        (("Q=0.5",), "no mark is called 'Q'; there are none"),
+        (("0.5", "0.6"), "has 0.5 and 0.6 for all; one is wanted"),
+        (("0.5", "--unit", "bar"), "'bar'; emissivity is of temperatures in °C, °F or K"),
+        (("0.5", "--reflected", "5000"), "the reflected temperature is 5000"),
+        (("0.5", "--taken-with", "0", "20"), "the emissivity is 0;"),
+    ],
+)
+def test_wrong_emissivities_are_one_sentence(wall, cameras, words, said, capsys):
+    assert thermal(wall, "--camera", cameras, "--emissivity", *words) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_command_prints_writes_and_keeps(wall, cameras, tmp_path, capsys):

@@ -33,7 +33,9 @@ TABLES = {
     "sections.export_panel": {"DEGREES": ALL, "FORMAT_TIPS": VALUES},
     "sections.film_panel": {"AROUND": ALL, "PAST": ALL},
     "sections.histogram_panel": {"EXPLAINED": ALL},
-    "sections.inspect_panel": {"COLUMNS": ALL, "BOUND_TIPS": ALL, "MEASURES": ALL},
+    "sections.inspect_panel": {
+        "COLUMNS": ALL, "BOUND_TIPS": ALL, "MEASURES": ALL, "EMISSIVITY": ALL,
+    },
     "sections.look_panel": {"TWO_STOPS": ALL, "PALETTE_TIP": ALL, "DEBUG_NAMES": VALUES},
     "sections.objects_panel": {"MODES": VALUES, "FOUR_VIEW_NAMES": VALUES, "DEEDS": ALL},
     "sections.parts_panel": {

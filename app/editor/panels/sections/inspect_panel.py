@@ -10,6 +10,11 @@ from shapeshift.app.editor.panels.scale_bar import in_unit
 from shapeshift.app.editor.panels.widgets.panel_rows import button_row, item_label, tip
 from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.texts.table import said
+from shapeshift.scene.inspection.emissivity import (
+    KELVINS,
+    LEAST_EMISSIVITY,
+    SurfaceRadiation,
+)
 from shapeshift.scene.inspection.marks import Bound
 
 Vec = imgui.ImVec2
@@ -18,6 +23,10 @@ BOUND_TIPS: dict[Bound, str] = {
     "above": "All that is hotter is red, over every stop.",
     "below": "All that is colder is blue, over every stop.",
 }
+USUAL_EMISSIVITY = 0.95  # of most paints, and of brick, wood, rubber
+EMISSIVITY = (
+    "Readings become temperatures of surfaces; colours and their scale stay as photographed."
+)
 MEASURES = "Click a spot, drag a box, Shift+drag a line; right drag orbits. Key Y."
 
 
@@ -47,6 +56,8 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
         _chosen(tool, ui_scale)
     for kind, words in BOUND_TIPS.items():
         _bound(tool, kind, words, wanted, ui_scale)
+    if thermal.stop.unit in KELVINS:
+        _emissivity(tool, wanted, ui_scale)
     low, high = in_unit(thermal.stop.unit, *tool.ends, wanted)[1:]
     level, span = (low + high) / 2, high - low
     imgui.text_disabled(said("level {level:.1f}, span {span:.1f}", level=level, span=span))
@@ -115,6 +126,39 @@ def _chosen(tool: Inspecting, ui_scale: float) -> None:
     if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:
         tool.delete(name)
     tip("Delete the mark; Ctrl+Z brings it back while the tool is on.", ui_scale)
+
+
+def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:
+    """Whether readings are of surfaces that mirror, and how much."""
+    thermal, emission = tool.thermal, tool.file.emission
+    assert thermal is not None  # draw_inspect has seen to it
+    changed, on = imgui.checkbox(item_label("emissivity"), emission is not None)
+    tip(EMISSIVITY, ui_scale)
+    if changed:
+        tool.radiate(SurfaceRadiation(USUAL_EMISSIVITY) if on else None)
+        emission = tool.file.emission
+    if emission is None:
+        return
+    surface, own = emission.surface, thermal.stop.unit
+    width = imgui.get_window_size().x
+    imgui.same_line(0.4 * width)
+    imgui.set_next_item_width(0.22 * width)
+    done, share = imgui.drag_float(
+        "##emissivity", surface.emissivity, 0.005, LEAST_EMISSIVITY, 1.0, "%.2f"
+    )
+    tip("Of what is seen: 0.95 paint, brick, skin; 0.8 rusty steel; 0.2 bare metal.", ui_scale)
+    imgui.same_line()
+    imgui.set_next_item_width(-1)
+    unit, shown, _ = in_unit(own, surface.reflected, surface.reflected, wanted)
+    style = f"%.1f {unit.replace('%', '%%')}".rstrip()
+    moved, mirrored = imgui.drag_float("##reflected", shown, 0.2, 0, 0, style)
+    tip("Of what it mirrors: the room's walls, or the sky's.", ui_scale)
+    back = in_unit(unit, mirrored, mirrored, own)[1] if unit != own else mirrored
+    if done or moved:
+        try:
+            tool.radiate(SurfaceRadiation(share, back if moved else surface.reflected))
+        except ValueError:  # typed and out of bounds: what was there stays
+            return
 
 
 def _bound(tool: Inspecting, kind: Bound, words: str, wanted: str, ui_scale: float) -> None:

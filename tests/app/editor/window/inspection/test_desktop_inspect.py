@@ -18,6 +18,7 @@ from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from tests.support.desktop.desktop_stand import run_frames
 from tests.support.desktop.objects_stand import place_of
@@ -187,6 +188,36 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
     tool.keep()
     assert "somebody else" in state.problem and tool.unsaved
     assert not tool.may_close() and tool.may_close()  # told once
+
+
+def test_emissivity_by_hand(viewer, hands, monkeypatch):
+    """A box is ticked, a number typed; readings are those of the formula; undone step by step."""
+    tool, widgets = viewer.inspecting, Widgets(monkeypatch)
+    hands.key("y")
+    settle(viewer)
+    hands.click(*on_wall(viewer, 0.2))
+    seen = tool.readings["Sp1"].mean
+    hands.click(*widgets.middle("emissivity"))
+    run_frames(viewer, 2)
+    surface = SurfaceRadiation(0.95, 20.0)
+    assert tool.file.emission == Emission(surface)
+    want = float(Emission(surface).corrected(np.array(seen), "°C"))
+    assert tool.readings["Sp1"].mean == pytest.approx(want, abs=0.01) and want > seen + 1
+    hands.hold_key("Control_L", True)
+    hands.click(*widgets.middle("##emissivity"))
+    hands.hold_key("Control_L", False)
+    hands.type("0.5")
+    hands.key("Return")
+    assert tool.file.emission == Emission(SurfaceRadiation(0.5, 20.0))
+    want = float(Emission(SurfaceRadiation(0.5, 20.0)).corrected(np.array(seen), "°C"))
+    assert tool.readings["Sp1"].mean == pytest.approx(want, abs=0.02)
+    settle(viewer)
+    hands.move(*on_wall(viewer, 0.2))
+    run_frames(viewer, 2)
+    assert tool.pointed[0] == pytest.approx(want, abs=3 * NEAR_C)  # twice the slope of what is seen
+    hands.move(*on_wall(viewer, 0.0, 0.25))
+    hands.key("z", "Control_L")
+    assert tool.file.emission is None and tool.readings["Sp1"].mean == pytest.approx(seen, abs=0.01)
 
 
 def test_the_handles_of_the_scale_are_level_and_span(viewer, hands, monkeypatch):

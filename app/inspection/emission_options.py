@@ -1,0 +1,78 @@
+"""Emissivity as `thermal` is told of it: of all that is seen, and of single marks."""
+
+from dataclasses import replace
+from typing import Protocol
+
+from shapeshift.app.errors import UsageError
+from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation, scale_of
+from shapeshift.scene.inspection.marks_file import MarksFile
+
+
+class EmissionOptions(Protocol):
+    """Those of a command's options that are read here."""
+
+    @property
+    def emissivity(self) -> tuple[str, ...]: ...
+    @property
+    def reflected(self) -> float | None: ...
+    @property
+    def taken_with(self) -> tuple[float, float] | None: ...
+
+
+def choose_emission(
+    options: EmissionOptions, file: MarksFile, unit: str
+) -> tuple[Emission | None, dict[str, float]]:
+    """What corrects values of this unit, None: nothing does; and emissivities by mark.
+
+    Raises UsageError, one sentence.
+    """
+    own = {}
+    of_all: float | None = None
+    for text in options.emissivity:
+        name, equals, number = text.rpartition("=")
+        try:
+            share = SurfaceRadiation(float(number)).emissivity
+        except ValueError as error:
+            raise UsageError(f"--emissivity is '{text}': {_why(number, error)}") from None
+        if equals:
+            own[name.strip()] = share
+        elif of_all is not None:
+            raise UsageError(f"--emissivity has {of_all:g} and {share:g} for all; one is wanted.")
+        else:
+            of_all = share
+    marked = own or any(mark.emissivity is not None for mark in file.marks)
+    before = file.emission
+    chosen = before or of_all is not None or options.reflected is not None or options.taken_with
+    if not (chosen or marked):
+        return None, own
+    try:
+        scale_of(unit)
+        known = before or Emission()
+        surface = SurfaceRadiation(
+            known.surface.emissivity if of_all is None else of_all,
+            known.surface.reflected if options.reflected is None else options.reflected,
+        )
+        taken = SurfaceRadiation(*options.taken_with) if options.taken_with else known.taken
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    return Emission(surface, taken), own
+
+
+def with_emissivities(file: MarksFile, own: dict[str, float]) -> MarksFile:
+    """The file with these marks' own emissivities.  Raises UsageError: there is no such mark."""
+    names = [mark.name for mark in file.marks]
+    for name in own:
+        if name not in names:
+            known = ", ".join(names) or "none"
+            raise UsageError(f"--emissivity: no mark is called '{name}'; there are {known}.")
+    marks = (replace(m, emissivity=own.get(m.name, m.emissivity)) for m in file.marks)
+    return replace(file, marks=tuple(marks))
+
+
+def _why(number: str, error: ValueError) -> str:
+    """The sentence of a number that is none, or too small or large."""
+    try:
+        float(number)
+    except ValueError:
+        return "a number from 0.1 to 1 is wanted, or NAME=NUMBER for one mark."
+    return str(error)
