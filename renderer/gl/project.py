@@ -1,5 +1,6 @@
 """project: splats -> screen ellipses and keys to sort by; the only culling gate."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -40,6 +41,7 @@ class Projector:
         sort_from_world: np.ndarray | None = None,
         keep_outside: bool = False,
         first_view: int = 0,
+        sets: Sequence[int] = (),
     ) -> None:
         """Projects all objects with their poses, under the limits of the settings.
 
@@ -47,7 +49,8 @@ class Projector:
         settings.order) in the frame sort_from_world (4, 4), by default the first view's eye.
         keep_outside: the order is to outlive this frame, or did outlive another: every splat that
         is not absent has a key, and every record is written; those of culled ones have no area.
-        first_view: number of the first of the views in its frame, where each has its own colours.
+        first_view: number of the first of the views in its frame, where each has its own colours;
+        sets: whose colours the views have instead.
         """
         if not 1 <= len(views) <= layout.MOST_VIEWS:
             raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
@@ -68,6 +71,8 @@ class Projector:
             records=arena.records, keys=arena.keys, counts=arena.counts,
         )  # fmt: skip
         mine = arena.colors[first_view:] if len(arena.colors) > 1 else arena.colors
+        if sets:
+            mine = [arena.colors[which] for which in dict.fromkeys(sets)]
         bind(color=mine[0])
         if own_colors := len(views) > 1 < len(mine):
             bind(second_color=mine[1])
