@@ -47,12 +47,18 @@ class Options(ReadingOptions):
     panel_hand: Literal["left", "right"] | None = None
     """The hand that carries the panel; the other points at it.  Default: as set last, at first
     left."""
+    hand_model: Literal["gloves", "controllers"] | None = None
+    """How hands that hold controllers are drawn; for the first ten seconds, while their buttons are
+    named, as controllers in any case.  Default: as set last, at first gloves."""
     vignette: float | None = None
     """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black.
     Default: as set last, at first 0.8."""
     text_size: float | None = None
     """Size of the panel with its text, 0.75 to 2; 1: capitals a degree high at arm's length.
     Default: as set last, at first 1."""
+    glass: Annotated[str, Opt(metavar="STOP")] = ""
+    """Hold a round glass through which this stop is seen, in the hand that carries the panel.
+    Default: none; the panel has one, too."""
     passthrough: bool | None = None
     """Show the room itself behind the scene, and of a scene of objects these alone, where the
     runtime blends pictures by their alpha.  Default: as set last, at first not."""
@@ -152,6 +158,7 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
     from shapeshift.app.headset.open_xr import open_xr
+    from shapeshift.app.headset.over.glass_state import stop_named
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
     from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.xr_app import XrApp
@@ -163,6 +170,7 @@ def wear(options: Options) -> int:
     with Instance() as instance:
         worn = worn_settings(options)
         document, editor = open_xr(options.scene or DEMO, options, options.x)
+        glass = stop_named(editor, options.glass)
         speak_first(ProgramSettings.read(config_folder()), editor.messages)
         pacing = Pacing(
             document.background_or(DARK), options.quality, options.floor_db or FLOOR_DB,
@@ -180,6 +188,7 @@ def wear(options: Options) -> int:
             rules = Rules(obstacles=options.obstacles)
             wearing = Wearing(
                 options.floor, options.hints, options.depth, options.panel_layer, options.edges,
+                glass,
             )  # fmt: skip
             if not (options.controllers or session.bare_hands.there):
                 say(f"{instance.runtime} sees no hands; controllers are taken.")

@@ -29,6 +29,7 @@ from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.app.headset.sections.comfort_section import draw_comfort, draw_see_through
+from shapeshift.app.headset.sections.glass_section import draw_glass
 from shapeshift.app.headset.sections.performance_section import draw_figures
 from shapeshift.app.headset.sections.room_section import (
     Foot,
@@ -106,6 +107,7 @@ class WristMenu:
             ),
             Section("Touch", lambda scale: draw_touch(state.touch, scale, False), open_first=True),
             Section("Stops", lambda scale: draw_stops(editor, scale)),
+            Section("Glass", lambda scale: draw_glass(state), shown=lambda: bool(editor.movable)),
             Section("Gallery", self._draw_gallery, shown=lambda: bool(editor.scene.objects)),
             Section("Look", lambda scale: draw_look(editor, scale)),
             Section("Objects", draw_objects),
@@ -185,7 +187,7 @@ class WristMenu:
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
             self._foot.sure_s > 0, editor.messages.note, self.gallery.shown, self.styles.progress,
             state.figures if self._figures_seen else None, state.worn.now,
-            self.shelf.opening, self.shelf.shown,
+            self.shelf.opening, self.shelf.shown, state.glass.stop,
         )  # fmt: skip
 
     def _fill(self) -> None:
