@@ -358,7 +358,7 @@ class Renderer:
         Of the worst view; inf where no pixel differs.  The order in use and its age stay as they
         are; image(i) is the picture in that order afterwards.
         """
-        self._decode_colors(views)
+        sets = self._decode_colors(views)
         self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
         settings = replace(self._settings_of_frame(), debug="")
         views = [scaled(view, settings.render_scale) for view in views]
@@ -366,7 +366,7 @@ class Renderer:
         for frames in (1, 0):  # sorted now, then the order that is kept
             once = replace(settings, resort_frames=frames, resort_degrees=0.0)
             with self._framebuffer_kept(), self.drawing.order_set_aside():
-                self.drawing.draw(views, once, PassTimer(self._ctx))
+                self.drawing.draw(views, once, PassTimer(self._ctx), sets=sets)
                 pictures.append([self.image(i)[..., :3].copy() for i in range(len(views))])
         return min(psnr(kept, exact) for exact, kept in zip(*pictures, strict=True))
 

@@ -118,9 +118,7 @@ class HandGlass:
             return looking
         try:
             other = self._other_renderer()
-            other.settings = replace(
-                self._renderer.settings, depth_scale=0.0, stereo_colors="shared", debug=""
-            )
+            other.settings = replace(self._renderer.settings, depth_scale=0.0, debug="")
             other.update(looking.scene)
             other.draw(looking.views)
         except BadFile as error:
