@@ -15,7 +15,9 @@ from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
+    from shapeshift.app.editor.state.editor_state import EditorState
     from shapeshift.app.headset.scene_shelf import SceneShelf
+    from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
@@ -158,9 +160,7 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
     from shapeshift.app.headset.open_xr import open_xr
-    from shapeshift.app.headset.over.glass_state import stop_named
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
-    from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.xr_app import XrApp
     from shapeshift.app.paths import config_folder
     from shapeshift.renderer.renderer import Renderer
@@ -170,7 +170,7 @@ def wear(options: Options) -> int:
     with Instance() as instance:
         worn = worn_settings(options)
         document, editor = open_xr(options.scene or DEMO, options, options.x)
-        glass = stop_named(editor, options.glass)
+        wearing = wearing_of(options, editor)
         speak_first(ProgramSettings.read(config_folder()), editor.messages)
         pacing = Pacing(
             document.background_or(DARK), options.quality, options.floor_db or FLOOR_DB,
@@ -186,10 +186,6 @@ def wear(options: Options) -> int:
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
             rules = Rules(obstacles=options.obstacles)
-            wearing = Wearing(
-                options.floor, options.hints, options.depth, options.panel_layer, options.edges,
-                glass,
-            )  # fmt: skip
             if not (options.controllers or session.bare_hands.there):
                 say(f"{instance.runtime} sees no hands; controllers are taken.")
             if options.passthrough and not session.sees_through:
@@ -209,6 +205,17 @@ def wear(options: Options) -> int:
             finally:
                 report.write(describe(instance, session) | xr_app.state.pacing.report())
     return 0
+
+
+def wearing_of(options: Options, editor: "EditorState") -> "Wearing":
+    """What was chosen at the door.  Raises UsageError for a stop that nothing has."""
+    from shapeshift.app.headset.over.glass_state import stop_named
+    from shapeshift.app.headset.wearing import Wearing
+
+    return Wearing(
+        options.floor, options.hints, options.depth, options.panel_layer, options.edges,
+        stop_named(editor, options.glass),
+    )  # fmt: skip
 
 
 def worn_settings(options: Options) -> "KeptSettings":

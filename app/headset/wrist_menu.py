@@ -97,6 +97,10 @@ class WristMenu:
             draw_object_list(objects, scale)
             draw_parts(state.parts, scale)
 
+        def draw_looks(scale: float) -> None:
+            draw_look(editor, scale)
+            draw_glass(state)
+
         return [
             Section("Room", lambda scale: draw_room(state, room), open_first=True),
             Section(
@@ -107,9 +111,8 @@ class WristMenu:
             ),
             Section("Touch", lambda scale: draw_touch(state.touch, scale, False), open_first=True),
             Section("Stops", lambda scale: draw_stops(editor, scale)),
-            Section("Glass", lambda scale: draw_glass(state), shown=lambda: bool(editor.movable)),
             Section("Gallery", self._draw_gallery, shown=lambda: bool(editor.scene.objects)),
-            Section("Look", lambda scale: draw_look(editor, scale)),
+            Section("Look", draw_looks),
             Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
             Section("Scenes", lambda scale: self._draw_scenes(scenes, scale)),

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
+import moderngl
 import numpy as np
-from moderngl import ComputeShader
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
@@ -26,7 +26,7 @@ class Projector:
     def _variant(
         self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False,
         own_colors: bool = False,
-    ) -> ComputeShader:  # fmt: skip
+    ) -> moderngl.ComputeShader:  # fmt: skip
         return self._gpu.compute(
             "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
             KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
@@ -49,8 +49,7 @@ class Projector:
         settings.order) in the frame sort_from_world (4, 4), by default the first view's eye.
         keep_outside: the order is to outlive this frame, or did outlive another: every splat that
         is not absent has a key, and every record is written; those of culled ones have no area.
-        first_view: number of the first of the views in its frame, where each has its own colours;
-        sets: whose colours the views have instead.
+        first_view, sets: as colors_of takes them.
         """
         if not 1 <= len(views) <= layout.MOST_VIEWS:
             raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
@@ -70,9 +69,7 @@ class Projector:
             mean_opacity=arena.mean_opacity, covariance=arena.covariance,
             records=arena.records, keys=arena.keys, counts=arena.counts,
         )  # fmt: skip
-        mine = arena.colors[first_view:] if len(arena.colors) > 1 else arena.colors
-        if sets:
-            mine = [arena.colors[which] for which in dict.fromkeys(sets)]
+        mine = colors_of(arena, first_view, sets)
         bind(color=mine[0])
         if own_colors := len(views) > 1 < len(mine):
             bind(second_color=mine[1])
@@ -116,6 +113,15 @@ class Projector:
         self.release()
 
 
+def colors_of(arena: Arena, first_view: int, sets: Sequence[int]) -> list[moderngl.Buffer]:
+    """Those of sets, one a view; else where each view has its own, from `first_view`, the number of
+    the first of them in its frame; else one for all.
+    """
+    if sets:
+        return [arena.colors[which] for which in dict.fromkeys(sets)]
+    return arena.colors[first_view:] if len(arena.colors) > 1 else arena.colors
+
+
 def jacobian_clamp(view: View) -> tuple[float, float]:
     """Largest |x/z| and |y/z| at which the projection's slope is that of the place itself."""
     x, y = view.widest_tangents()
@@ -142,7 +148,7 @@ def limits(settings: RenderSettings) -> dict[str, object]:
     return numbers
 
 
-def set_uniforms(program: ComputeShader, **values: object) -> None:
+def set_uniforms(program: moderngl.ComputeShader, **values: object) -> None:
     for name, value in values.items():
         program[name].value = value
 

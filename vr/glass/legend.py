@@ -30,7 +30,7 @@ GAP_M = 0.010
 
 
 @dataclass(frozen=True)
-class Scale:
+class GlassScale:
     """What a palette's colours stand for."""
 
     palette: str
@@ -40,18 +40,18 @@ class Scale:
     ends: tuple[float, float] = (0.0, 1.0)  # shares of the range at the palette's ends
 
     @staticmethod
-    def of(stop: Stop | None, palette: str, ends: tuple[float, float]) -> "Scale | None":
+    def of(stop: Stop | None, palette: str, ends: tuple[float, float]) -> "GlassScale | None":
         """That of a thermal stop; None where there is none, or nobody knows its values."""
         if stop is None or not palette or stop.value_range is None:
             return None
-        return Scale(palette, *stop.value_range, stop.unit, ends)
+        return GlassScale(palette, *stop.value_range, stop.unit, ends)
 
 
 @dataclass(frozen=True)
 class ScaleCard(Card):
     """A card with colours and values instead of words."""
 
-    scale: Scale | None = None
+    scale: GlassScale | None = None
 
     def picture(self) -> np.ndarray:
         assert self.scale is not None
@@ -62,7 +62,7 @@ class ScaleCard(Card):
         return self.scale
 
 
-def cards_of(glass: HeldGlass, side: str, stop: str, scale: Scale | None) -> tuple[Card, ...]:
+def cards_of(glass: HeldGlass, side: str, stop: str, scale: GlassScale | None) -> tuple[Card, ...]:
     """The stop's name over the rim, and its scale outwards of the glass."""
     name = Card((stop,), glass.play_from_glass)
     height = name.size_m[1]
@@ -78,7 +78,7 @@ def cards_of(glass: HeldGlass, side: str, stop: str, scale: Scale | None) -> tup
 
 
 @lru_cache(maxsize=8)
-def scale_picture(scale: Scale) -> np.ndarray:
+def scale_picture(scale: GlassScale) -> np.ndarray:
     """(H, W, 4) uint8 display sRGB premultiplied by alpha, row 0 on top."""
     from PIL import Image, ImageDraw
 

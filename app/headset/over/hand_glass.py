@@ -18,7 +18,7 @@ from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
 from shapeshift.vr.frame import SIDES, Frame, Hand
 from shapeshift.vr.glass.held import HeldGlass, PixelBox, boxes_of, frame_of, held_glass
-from shapeshift.vr.glass.legend import Scale, cards_of
+from shapeshift.vr.glass.legend import GlassScale, cards_of
 from shapeshift.vr.glass.pane import Pane
 from shapeshift.vr.panel.carried import Carried
 from shapeshift.vr.scene_depth import EyeDepth
@@ -79,7 +79,7 @@ class HandGlass:
             return over
         _, moved = self._scenes(state)
         palette, _, stop = thermal_blend(moved)
-        scale = Scale.of(stop, palette, self._renderer.settings.heat_ends)
+        scale = GlassScale.of(stop, palette, self._renderer.settings.heat_ends)
         cards = (*over.cards, *cards_of(glass.held, self._side, glass.stop, scale))
         return replace(over, hands=(*over.hands, *frame_of(glass.held)), cards=cards)
 

@@ -1,8 +1,8 @@
-"""The panel's section "Glass": which stop is seen through a round glass in the hand."""
+"""Of the panel's section "Look": which stop is seen through a round glass in the hand."""
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.widgets.panel_rows import item_label
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label, subsection
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.over.glass_state import stop_names
 from shapeshift.app.headset.sections.comfort_section import lit_button
@@ -14,12 +14,15 @@ NONE, HELP = "no glass", "It is in the hand of the panel once the panel is close
 
 def draw_glass(state: XrState) -> None:
     """A button for no glass and one for each stop, lit where it is chosen."""
+    names = stop_names(state.editor)
+    if not names or not subsection("Glass", bool(state.glass.stop)):
+        return
     glass, gap = state.glass, imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - gap * (COLUMNS - 1)) / COLUMNS
     imgui.push_id("glass")
     if lit_button(item_label(NONE), not glass.stop, width):
         glass.stop = ""
-    for number, name in enumerate(stop_names(state.editor), 1):
+    for number, name in enumerate(names, 1):
         if number % COLUMNS:
             imgui.same_line()
         if lit_button(f"{name}###glass {number}", glass.stop == name, width):

@@ -25,10 +25,9 @@ from shapeshift.vr.touching import Touched
 from tests.support.renderer.frames import texture_target
 from tests.support.renderer.heat_scenes import model
 from tests.support.renderer.renderers import EITHER_ON_GL
+from tests.support.vr.vr_glass import BEFORE, away_of, upright
 from tests.support.vr.vr_hands import HEAD, a_frame, eyes, hand_at
 from tests.support.vr.vr_panel import Wearer, a_state, some_things
-from tests.vr.glass.test_glass_pane import away_of
-from tests.vr.glass.test_held_glass import BEFORE, upright
 
 RENDERERS = EITHER_ON_GL
 SIZE = (320, 290)  # of away_of, too
@@ -207,7 +206,7 @@ def test_where_there_is_no_room_it_is_put_away_and_the_panel_says_so(glass, monk
 def test_the_panel_chooses_it(ctx):
     picture = PanelPicture(ctx)
     wearer = Wearer(picture)
-    wearer.unfold("Glass")
+    wearer.unfold("Look", "Glass")
     wearer.scroll_to("heat")
     wearer.press("heat")
     assert wearer.state.glass.stop == "heat"

@@ -7,22 +7,22 @@ from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.runtime_models.model import Stop
 from shapeshift.vr.card import METRES_PER_PIXEL, PAD_PX
 from shapeshift.vr.glass.held import RADIUS_M, held_glass
-from shapeshift.vr.glass.legend import BAR_PX, Scale, cards_of, scale_picture
+from shapeshift.vr.glass.legend import BAR_PX, GlassScale, cards_of, scale_picture
+from tests.support.vr.vr_glass import upright
 from tests.support.vr.vr_hands import HEAD
-from tests.vr.glass.test_held_glass import upright
 
 HOT = Stop("Thermal", 0.5, "thermal", "ironbow", (10.0, 90.0), "\u00b0C")
 
 
 def test_only_a_thermal_stop_with_known_values_has_a_scale():
-    assert Scale.of(None, "ironbow", (0, 1)) is None
-    assert Scale.of(Stop("RGB", 0.0), "", (0, 1)) is None
-    assert Scale.of(HOT, "ironbow", (0, 1)) == Scale("ironbow", 10.0, 90.0, "\u00b0C")
+    assert GlassScale.of(None, "ironbow", (0, 1)) is None
+    assert GlassScale.of(Stop("RGB", 0.0), "", (0, 1)) is None
+    assert GlassScale.of(HOT, "ironbow", (0, 1)) == GlassScale("ironbow", 10.0, 90.0, "\u00b0C")
 
 
 @pytest.mark.parametrize("palette", ["ironbow", "viridis"])
 def test_its_colours_go_from_the_coldest_below_to_the_hottest_on_top(palette):
-    picture = scale_picture(Scale(palette, 10.0, 90.0, "\u00b0C"))
+    picture = scale_picture(GlassScale(palette, 10.0, 90.0, "\u00b0C"))
     column = picture[:, PAD_PX + BAR_PX // 2].astype(int)
     colors = np.rint(255 * palette_colors(palette)).astype(int)
     ground = picture[4, picture.shape[1] // 2].astype(int)
@@ -36,8 +36,8 @@ def test_its_colours_go_from_the_coldest_below_to_the_hottest_on_top(palette):
 
 
 @pytest.mark.parametrize("scale", [
-    Scale("ironbow", 10.0, 10.0, ""), Scale("gray", -1e-3, 1e-3, "a unit with a long name"),
-    Scale("turbo", 0.0, 1e6, "\u6e29\u5ea6"),
+    GlassScale("ironbow", 10.0, 10.0, ""), GlassScale("gray", -1e-3, 1e-3, "a long unit"),
+    GlassScale("turbo", 0.0, 1e6, "\u6e29\u5ea6"),
 ])  # fmt: skip
 def test_ranges_of_all_kinds_have_one(scale):
     picture = scale_picture(scale)
@@ -47,7 +47,7 @@ def test_ranges_of_all_kinds_have_one(scale):
 @pytest.mark.parametrize(("side", "way"), [("left", -1), ("right", 1)])
 def test_the_name_stands_on_the_rim_and_the_scale_outwards(side, way):
     glass = held_glass(upright(), HEAD)
-    scale = Scale.of(HOT, "ironbow", (0.0, 1.0))
+    scale = GlassScale.of(HOT, "ironbow", (0.0, 1.0))
     name, legend = cards_of(glass, side, "Thermal", scale)
     assert name.lines == ("Thermal",)
     into = np.linalg.inv(glass.play_from_glass.matrix())

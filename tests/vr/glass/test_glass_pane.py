@@ -8,8 +8,8 @@ from shapeshift.vr.glass.held import RADIUS_M, HeldGlass, boxes_of, held_glass
 from shapeshift.vr.glass.pane import Pane
 from shapeshift.vr.scene_depth import SceneDepth
 from tests.support.renderer.frames import texture_target
+from tests.support.vr.vr_glass import away_of, upright
 from tests.support.vr.vr_hands import HEAD, eyes
-from tests.vr.glass.test_held_glass import upright
 
 SIZE = (320, 290)
 EYES = eyes(SIZE)
@@ -35,26 +35,10 @@ def numbered(size: tuple[int, int], alpha: int = 255) -> np.ndarray:
     return np.stack([columns, rows, columns ^ rows, np.full_like(rows, alpha)], axis=2).astype("u1")
 
 
-def away_of(glass: HeldGlass, view) -> np.ndarray:
-    """(H, W) metres from the disc's middle where the ray of a pixel meets its plane, row 0 below:
-    a ray tracer of one plane.
-    """
-    left, right, down, up = view.tangents
-    rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
-    x = left + (columns + 0.5) * (right - left) / SIZE[0]
-    y = down + (rows + 0.5) * (up - down) / SIZE[1]
-    along = np.stack([x, y, -np.ones_like(x)], axis=2) @ view.world_from_eye.matrix()[:3, :3].T
-    plane = glass.play_from_glass.matrix()
-    eye, normal = view.world_from_eye.position, plane[:3, 2]
-    metres = (plane[:3, 3] - eye) @ normal / (along @ normal)
-    meets = eye + along * metres[..., None] - plane[:3, 3]
-    return np.where(metres > 0, np.linalg.norm(meets, axis=2), 1e3)
-
-
-def drawn(pane, target, eye: int, glass: HeldGlass, alpha: int = 255, depth=None):
+def drawn(ctx, pane, target, eye: int, glass: HeldGlass, alpha: int = 255, depth=None):
     """(H, W, 4) int, row 0 below, and the box."""
     box = boxes_of(glass, EYES)[eye]
-    picture = pane._ctx.texture(box[2:], 4, numbered(box[2:], alpha).tobytes(), alignment=1)
+    picture = ctx.texture(box[2:], 4, numbered(box[2:], alpha).tobytes(), alignment=1)
     target.clear(*(c / 255 for c in GROUND))
     pane.draw(target, EYES[eye], glass, picture, box, depth)
     picture.release()
@@ -66,11 +50,11 @@ def drawn(pane, target, eye: int, glass: HeldGlass, alpha: int = 255, depth=None
 @pytest.mark.parametrize("turned", [0.0, 0.8, 2.6])
 @pytest.mark.parametrize("eye", [0, 1])
 def test_within_the_disc_each_pixel_is_its_own_of_the_other_picture(
-    pane, target, eye, turned, alpha
+    ctx, pane, target, eye, turned, alpha
 ):
     """Whatever its alpha: over the room nothing of what was there may show."""
     glass = held_glass(upright(turned=turned), HEAD)
-    image, (left, bottom, width, height) = drawn(pane, target, eye, glass, alpha)
+    image, (left, bottom, width, height) = drawn(ctx, pane, target, eye, glass, alpha)
     away = away_of(glass, EYES[eye])
     # The edge is a pixel wide, by what the distance changes from one to the next: both ways, since
     # a shader takes such differences within blocks of 2 x 2.
@@ -87,15 +71,15 @@ def test_within_the_disc_each_pixel_is_its_own_of_the_other_picture(
 def test_nearer_splats_stand_before_it_and_farther_ones_do_not(ctx, pane, target):
     glass = held_glass(upright(), HEAD)
     away = away_of(glass, EYES[0])
-    plain, _ = drawn(pane, target, 0, glass)
+    plain, _ = drawn(ctx, pane, target, 0, glass)
     with SceneDepth(ctx) as scene_depth:
         for metres, hides in ((GLASS_M - 0.1, True), (GLASS_M + 0.1, False)):
             depth = np.zeros((SIZE[1], SIZE[0], 4), np.float32)
             depth[..., 0], depth[..., 3] = metres, 1.0
-            image, _ = drawn(pane, target, 0, glass, depth=scene_depth.of(depth, 1.0))
+            image, _ = drawn(ctx, pane, target, 0, glass, depth=scene_depth.of(depth, 1.0))
             assert (image == GROUND).all() if hides else (image == plain).all(), metres
         depth[..., :] *= 0.49  # a veil
-        image, _ = drawn(pane, target, 0, glass, depth=scene_depth.of(depth, 1.0))
+        image, _ = drawn(ctx, pane, target, 0, glass, depth=scene_depth.of(depth, 1.0))
     np.testing.assert_array_equal(image, plain)
     assert (away < RADIUS_M).any()
 
@@ -104,7 +88,7 @@ def test_it_leaves_the_context_as_it_was(ctx, pane, target):
     glass = held_glass(upright(), HEAD)
     with texture_target(ctx, SIZE) as other:
         other.use()
-        drawn(pane, target, 0, glass)
+        drawn(ctx, pane, target, 0, glass)
         other.use()
         box = boxes_of(glass, EYES)[0]
         picture = ctx.texture(box[2:], 4)

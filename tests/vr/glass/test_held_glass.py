@@ -1,7 +1,6 @@
 """Where a hand holds the glass, when its edge hides it, and which pixels of the eyes it covers."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,21 +18,11 @@ from shapeshift.vr.glass.held import (
     frame_of,
     held_glass,
 )
-from tests.support.vr.vr_hands import HEAD, eyes, hand_at
+from tests.support.vr.vr_glass import BEFORE, upright
+from tests.support.vr.vr_hands import HEAD, eyes
 
 SIZE = (640, 580)
 EYES = eyes(SIZE)
-BEFORE = (0.05, 1.45, -0.5)  # a hand before the eyes
-
-
-def upright(position=BEFORE, turned: float = 0.0):
-    """A fist whose thumb is up, turned by radians about the handle."""
-    hand = hand_at(position)
-    up = np.array([math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0])  # the grip's -Z to the sky
-    about = np.array([math.cos(turned / 2), 0.0, math.sin(turned / 2), 0.0])
-    matrix = Pose(np.zeros(3), about).matrix() @ Pose(np.zeros(3), up).matrix()
-    matrix[:3, 3] = position
-    return replace(hand, grip=Pose.from_matrix(matrix))
 
 
 def test_it_stands_on_the_thumb_s_side_and_looks_at_the_head():

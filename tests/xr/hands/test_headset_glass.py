@@ -12,8 +12,8 @@ from shapeshift.scene.pose import Pose, View
 from shapeshift.vr.frame import SIDES
 from shapeshift.vr.glass.held import RIM_M
 from tests.support.xr.person import CARRIES, FREE, SIZE, Person, open_panel, place, pose_of
+from tests.support.xr.reference_eyes import BEHIND, ROUNDING, drawn, eyes_of, scene_at
 from tests.support.xr.validation import complaints, switched_on
-from tests.xr.test_headset_pictures import BEHIND, ROUNDING, drawn, eyes_of, scene_at
 
 TILT = 0.35  # half of the angle by which the head looks down
 UPRIGHT = (np.cos(0.5), np.sin(0.5), 0.0, 0.0)  # of a fist that holds it up: leaning ahead
