@@ -94,7 +94,7 @@ def scale_picture(scale: GlassScale) -> np.ndarray:
     ImageDraw.Draw(mask).rounded_rectangle(box, CORNER_PX, fill=round(255 * HALF_CLEAR))
     draw, ink = ImageDraw.Draw(image), ImageDraw.Draw(mask)
     first, last = PAD_PX + (LINE_PX if unit else LINE_PX // 2), TALL_PX - PAD_PX - EM // 2
-    pieces = [((PAD_PX, PAD_PX + EM // 2), unit, bold)] if unit else []
+    pieces: list[tuple] = [((PAD_PX, PAD_PX + EM // 2), unit, bold)] if unit else []
     for value, text in zip(values, texts, strict=True):
         y = last - (last - first) * (value - scale.low) / ((scale.high - scale.low) or 1.0)
         for canvas, fill in ((draw, TEXT), (ink, 255)):
