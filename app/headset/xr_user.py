@@ -7,10 +7,12 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.fitting import Fitting
+from shapeshift.app.headset.over.glass_state import GlassState
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
 from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, move
@@ -90,6 +92,8 @@ class XrState:
     figures: Figures | None = None  # of the last second
     sees_through: bool = False  # the runtime can show the room behind pictures
     worn: KeptSettings = field(default_factory=KeptSettings)
+    glass: GlassState = field(default_factory=GlassState)
+    shown: Scene = field(default_factory=lambda: Scene(()))  # of this frame, as it is drawn
     fit: Fitting = field(init=False)
 
     def __post_init__(self) -> None:
