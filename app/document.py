@@ -23,6 +23,7 @@ from shapeshift.scene.cameras.framing import (
 from shapeshift.scene.document.scene_file import SceneFile, first_view, is_scene_file, scene_of
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.scene.sections.section import moved_shape
 from shapeshift.scene.selectors.selector import carried
 
 if TYPE_CHECKING:
@@ -204,7 +205,11 @@ def moved_object(obj: SceneObject, world_from_before: Pose) -> SceneObject:
     """An object, with its parts, after its world is moved."""
     pose = Pose.from_matrix(world_from_before.matrix() @ obj.world_from_object.matrix())
     parts = tuple(carried(selector, world_from_before) for selector in obj.selectors)
-    return replace(obj, world_from_object=pose, selectors=parts)
+    cuts = tuple(
+        replace(one, shape=moved_shape(one.shape, world_from_before)) if one.space == "world" else one
+        for one in obj.sections
+    )
+    return replace(obj, world_from_object=pose, selectors=parts, sections=cuts)
 
 
 def open_document(path: Path, options: ReadingOptions) -> Document:

@@ -14,6 +14,8 @@ import numpy as np
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.runtime_models.stop_weights import NO_STOPS, Control, Controls, StopBlend, is_each
 from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.sections.cut import kept_by
+from shapeshift.scene.sections.section import Section
 from shapeshift.scene.selectors.selector import Selector
 
 SNAP = 0.02  # of the slider's range: nearer than this to a stop is on the stop
@@ -30,15 +32,17 @@ def control_of(obj: SceneObject) -> Controls:
     """Of an object: one for all of it, or one an anchor (layers: a splat), float32: numbers (A,),
     or where these do not do weights of its stops (A, S).
 
-    A border shows what a shift from outside to inside shows on its way: no third stop.
+    A border shows what a shift from outside to inside shows on its way: no third stop.  What lies
+    beyond a section that shows another control there lies over all selectors.
     """
     x: Controls = obj.x
-    for selector in obj.selectors:
-        weights = selector_weights(obj, selector)
+    parts = [(selector_weights(obj, selector), selector.x) for selector in obj.selectors]
+    parts += [(weights_beyond(obj, one), one.beyond) for one in beyond_sections(obj)]
+    for weights, inside in parts:
         if not weights.any():  # a lens that looks elsewhere costs nothing
             continue
         whole = (weights == weights[0]).all()
-        x = obj.model.blend.between(x, selector.x, float(weights[0]) if whole else weights)
+        x = obj.model.blend.between(x, inside, float(weights[0]) if whole else weights)
     return np.clip(x, 0, 1).astype(np.float32) if is_each(x) else x
 
 
@@ -47,6 +51,25 @@ def selector_weights(obj: SceneObject, selector: Selector) -> np.ndarray:
     model = obj.model
     places = model.means if isinstance(model, SplatLayers) else model.anchors  # (A, 3) metres
     return selector.weights(_in_space(places, obj, selector.space))
+
+
+def controls_within(obj: SceneObject) -> list[Control]:
+    """Its own control, and those of its parts."""
+    beyond = [one.beyond for one in beyond_sections(obj) if one.beyond is not None]
+    return [obj.x, *(selector.x for selector in obj.selectors), *beyond]
+
+
+def beyond_sections(obj: SceneObject) -> tuple[Section, ...]:
+    """The sections that show another control beyond them."""
+    return tuple(one for one in obj.sections if one.enabled and one.beyond is not None)
+
+
+def weights_beyond(obj: SceneObject, section: Section) -> np.ndarray:
+    """(A,) float32 0..1: how much of each anchor (layers: splat) lies beyond a section."""
+    model = obj.model
+    places = model.means if isinstance(model, SplatLayers) else model.anchors  # (A, 3) metres
+    planes = section.half_spaces_of(obj.world_from_object)
+    return 1 - kept_by(planes, section.edge, section.width_m, places)
 
 
 def covered(obj: SceneObject, selectors: Sequence[Selector]) -> np.ndarray:
@@ -60,10 +83,11 @@ def covered(obj: SceneObject, selectors: Sequence[Selector]) -> np.ndarray:
 
 def control_key(obj: SceneObject) -> tuple:
     """What control_of depends on; of one model, equal keys give equal control values."""
-    if not any(selector.space == "world" for selector in obj.selectors):
-        return obj.x, obj.selectors
+    beyond = beyond_sections(obj)
+    if not any(part.space == "world" for part in (*obj.selectors, *beyond)):
+        return obj.x, obj.selectors, beyond
     pose = obj.world_from_object
-    return obj.x, obj.selectors, (*pose.position, *pose.wxyz)
+    return obj.x, obj.selectors, beyond, (*pose.position, *pose.wxyz)
 
 
 def _in_space(places: np.ndarray, obj: SceneObject, space: str) -> np.ndarray:
