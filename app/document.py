@@ -23,7 +23,7 @@ from shapeshift.scene.cameras.framing import (
 from shapeshift.scene.document.scene_file import SceneFile, first_view, is_scene_file, scene_of
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
-from shapeshift.scene.sections.section import moved_shape
+from shapeshift.scene.sections.section import carried_section
 from shapeshift.scene.selectors.selector import carried
 
 if TYPE_CHECKING:
@@ -205,10 +205,7 @@ def moved_object(obj: SceneObject, world_from_before: Pose) -> SceneObject:
     """An object, with its parts, after its world is moved."""
     pose = Pose.from_matrix(world_from_before.matrix() @ obj.world_from_object.matrix())
     parts = tuple(carried(selector, world_from_before) for selector in obj.selectors)
-    cuts = tuple(
-        replace(one, shape=moved_shape(one.shape, world_from_before)) if one.space == "world" else one
-        for one in obj.sections
-    )
+    cuts = tuple(carried_section(one, world_from_before) for one in obj.sections)
     return replace(obj, world_from_object=pose, selectors=parts, sections=cuts)
 
 

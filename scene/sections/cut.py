@@ -6,8 +6,8 @@ A capped edge truncates each Gaussian at the plane and takes the Gaussian with t
 mass, mean and covariance for it.  With s the deviation along the normal n, a = (d - n.mu) / s the
 sigmas inside, and lambda = phi(a) / Phi(a) of the standard normal distribution, the truncated one
 lies lambda sigmas further inside and has the variance s^2 (1 - a lambda - lambda^2) along n
-(Johnson, Kotz and Balakrishnan 1994, section 13.10); across n it keeps its shape, since the parts of
-a Gaussian along and across a direction that is conjugate to it are independent.
+(Johnson, Kotz and Balakrishnan 1994, section 13.10).  Along all that is independent of n, in the
+Gaussian's own metric, it keeps its shape.
 """
 
 from collections.abc import Iterable

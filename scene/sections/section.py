@@ -14,7 +14,7 @@ from shapeshift.runtime_models.shapes import four, three
 from shapeshift.runtime_models.stop_weights import Control, check_control
 from shapeshift.scene.pose import UNIT_SLACK, Pose
 
-SPACES = ("object", "world")
+SPACES = ("object", "world")  # the first is usual where an object has a section of its own
 # capped: splats that a section crosses are cut and reshaped; hard: a splat is there or not by its
 # centre; soft: its opacity falls to 0 over a width inside, by its centre.
 CAPPED, HARD, SOFT = EDGES = ("capped", "hard", "soft")
@@ -141,6 +141,13 @@ def moved_shape(shape: PlaneShape | BoxShape, pose: Pose) -> PlaneShape | BoxSha
     turned[:3, :3] = matrix[:3, :3] @ shape.axes
     centre = matrix[:3, :3] @ shape.centre + matrix[:3, 3]
     return BoxShape(three(centre), shape.half, four(Pose.from_matrix(turned).wxyz))
+
+
+def carried_section(section: Section, world_from_before: Pose) -> Section:
+    """What stands in the world after it is moved; what is fixed to an object goes with that."""
+    if section.space != "world":
+        return section
+    return replace(section, shape=moved_shape(section.shape, world_from_before))
 
 
 def held_by(section: Section, world_from_hand: Pose) -> Section:

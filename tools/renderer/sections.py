@@ -123,7 +123,6 @@ def picture_rows(model) -> list[str]:
             f"picture,{edge},,{db(picture, truth):.1f},{db(picture, truth, changed):.1f},"
             f"{beyond(aside, side, centre)}\n"
         )
-        out[-1] = out[-1]
     renderer.close()
     return out
 
@@ -144,7 +143,8 @@ def beyond(picture: np.ndarray, view: View, centre: np.ndarray) -> str:
     pixel_m = distance * (view.tangents[1] - view.tangents[0]) / view.size[0]
     inside = columns[:middle].mean()
     reach = np.flatnonzero(outside > 0.1 * inside)
-    return f"{outside.sum() / columns.sum():.4f},{(reach[-1] + 1 if len(reach) else 0) * pixel_m:.3f}"
+    farthest_m = (reach[-1] + 1 if len(reach) else 0) * pixel_m
+    return f"{outside.sum() / columns.sum():.4f},{farthest_m:.3f}"
 
 
 def medians_ms(jobs: dict[str, Callable[[int], None]]) -> dict[str, float]:
@@ -207,7 +207,13 @@ def main() -> None:
     names = ("offset", "scale", "rotation", "opacity")
     for row in picture_rows(demo):
         say(row.rstrip("\n") + ",,\n")
-    for name, model in (("shape differs", demo), ("colours alone", without_control(demo, *names))):
+    alike = without_control(demo, *names)
+    plain = tuple(replace(stop, kind="rgb", palette="") for stop in demo.stops)
+    cases = {
+        "shape differs": demo, "colours and heat": alike,
+        "colours alone": replace(alike, stops=plain),
+    }  # fmt: skip
+    for name, model in cases.items():
         sys.stdout.writelines(time_rows(name, model))
 
 
