@@ -116,11 +116,10 @@ class Section:
         normals, offsets = planes[:, :3], planes[:, 3]
         return np.column_stack([normals @ matrix[:3, :3], offsets - normals @ matrix[:3, 3]])
 
-    def flipped(self) -> "Section":
-        """A plane that keeps the other side."""
-        assert isinstance(self.shape, PlaneShape), "a box has no other side"
-        normal = three(-n for n in self.shape.normal)
-        return replace(self, shape=PlaneShape(normal, -self.shape.offset_m))
+
+def flipped(plane: PlaneShape) -> PlaneShape:
+    """The plane that keeps the other side."""
+    return PlaneShape(three(-n for n in plane.normal), -plane.offset_m)
 
 
 def plane_through(point: np.ndarray, normal: np.ndarray) -> PlaneShape:
