@@ -20,6 +20,7 @@ def restore_shapes(drawing: Drawing, i: int, decoded: DecodedObject) -> None:
     """
     if decoded.own is not None and moves_splats(decoded.cuts):
         drawing.write_splats(i, *decoded.own)
+        forget_colors(decoded.colored)
     decoded.own, decoded.cuts, decoded.opacity = None, (), 1.0
 
 

@@ -34,6 +34,7 @@ KEYS = (
 )
 GRASP = 14.0  # logical pixels about a handle that take hold of it
 DOT = 6.0  # logical pixels
+GRID_PART = 0.6  # of the scene's radius: how far a plane is drawn to either side
 
 
 def attach_sections(
@@ -46,7 +47,12 @@ def attach_sections(
     hooks.marks.append(handles.draw)
     hooks.opened.append(tool.forget)
     hooks.sections.append(
-        PanelSection("Sections", lambda scale: draw_cuts(tool, state, scale), opens=handles.opens)
+        PanelSection(
+            "Sections",
+            lambda scale: draw_cuts(tool, state, scale),
+            opens=handles.opens,
+            early=lambda: tool.on,
+        )
     )
     hooks.keys["Sections"] = list(KEYS)
     return tool
@@ -134,7 +140,7 @@ class SectionHandles:
             self._held = None if not tool.on else self._held
             return
         view, size = self._viewpoint.view(), self._window.logical_size
-        reach = self._state.radius
+        reach = GRID_PART * self._state.radius
         if isinstance(shape, PlaneShape):
             lines = tool.pivot + plane(np.array(shape.normal), reach)[:-1]
             face, tip = tool.handles()

@@ -22,6 +22,8 @@ def places(viewer) -> dict:
     return {handle.key: place_of(viewer, handle.place) for handle in viewer.sections.handles()}
 
 
+def along_x(place: np.ndarray, metres: float) -> np.ndarray:
+    return place + np.array([metres, 0.0, 0.0])
 
 
 def test_the_key_makes_a_plane_whose_dot_is_dragged_undone_and_saved(viewer, hands, tmp_path):
@@ -32,7 +34,7 @@ def test_the_key_makes_a_plane_whose_dot_is_dragged_undone_and_saved(viewer, han
     assert state.scene.objects[0].sections == (section,) and section.space == "world"
     start, camera = places(viewer)[0], viewer.viewpoint.view().eye_from_world()
     # The plane is across x; along x in the picture its dot goes by as many metres as a point would.
-    goal = place_of(viewer, tool.handles()[0].place + [0.1, 0, 0])
+    goal = place_of(viewer, along_x(tool.handles()[0].place, 0.1))
     hands.drag(start, goal)
     (moved,) = state.edited.file.sections
     pixel_m = 0.1 / np.hypot(*np.subtract(goal, start))
@@ -79,7 +81,7 @@ def test_a_face_of_a_box_moves_alone_and_of_an_object_it_goes_with_it(viewer, ha
     assert isinstance(box, BoxShape) and state.edited.file.sections == ()
     assert state.edited.file.items[0].sections[0].space == "object"
     start, handle = places(viewer)[0], tool.handles()[0]
-    hands.drag(start, place_of(viewer, handle.place + [0.2, 0, 0]))
+    hands.drag(start, place_of(viewer, along_x(handle.place, 0.2)))
     grown = tool.shape
     low, high = (np.array(b.centre) - b.half for b in (box, grown))
     np.testing.assert_allclose(high, low, atol=2e-6)  # the side opposite stays
