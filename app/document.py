@@ -186,8 +186,9 @@ def control_of_text(
     ends = [stop for stop in stops if not isinstance(stop.x, StopWeights)]  # of ways and blends
     try:
         return parse_control(word, ends, pace)
-    except ValueError:
-        raise UsageError(f"{said}: {no_control(word, stops)}") from None
+    except ValueError as error:
+        dated = word[4:5] == "-" and any(stop.date for stop in ends)
+        raise UsageError(f"{said}: {error if dated else no_control(word, stops)}") from None
 
 
 def no_control(word: str, stops: Sequence[Stop]) -> str:

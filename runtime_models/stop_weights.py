@@ -15,6 +15,7 @@ from typing import TypeGuard, overload
 import numpy as np
 
 from shapeshift.runtime_models.stop import ControlEncoding, Stop
+from shapeshift.runtime_models.stop_dates import x_of_date
 
 SUM_SLACK = 1e-6  # by which weights may miss 1: what six decimals in a file leave
 
@@ -296,6 +297,9 @@ def parse_control(text: str, stops: Sequence[Stop], pace: tuple[Pace, ...] = ())
     try:
         x = float(word)
     except ValueError:
+        date = _parse_date(word, stops)
+        if date is not None:
+            return date
         blend = _parse_way(word, known, StopBlend(tuple(stops), pace)) or _parse_blend(word, known)
         if blend is None:
             raise ValueError(_wanted(word, stops)) from None
@@ -303,6 +307,13 @@ def parse_control(text: str, stops: Sequence[Stop], pace: tuple[Pace, ...] = ())
     if not 0 <= x <= 1:
         raise ValueError(f"x is {word[:40]}, expected 0 to 1.")
     return x
+
+
+def _parse_date(word: str, stops: Sequence[Stop]) -> float | None:
+    """A date between the dated stops; None for what begins as none, or where no stop has one."""
+    if not (word[:4].isdigit() and word[4:5] == "-" and any(stop.date for stop in stops)):
+        return None
+    return x_of_date(word, stops)
 
 
 def _parse_way(word: str, known: dict[str, Stop], blend: StopBlend) -> Control | None:

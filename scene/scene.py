@@ -9,7 +9,7 @@ from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
 from shapeshift.scene.appearance import NEUTRAL, Appearance
 from shapeshift.scene.pose import UNIT_SLACK, Pose
-from shapeshift.scene.sections.section import Section
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import Selector
 
 IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -37,7 +37,7 @@ class SceneObject:
     selectors: tuple[Selector, ...] = ()  # parts with an x of their own; a later one lies above
     tint: Tint | None = None  # no look of its own: which object it is, what of it is chosen
     appearance: Appearance = NEUTRAL  # what of its own look is shown how
-    sections: tuple[Section, ...] = ()  # what of it is cut away, or at another x; all of them hold
+    sections: tuple[SceneSection, ...] = ()  # what of it is cut away, or at another x
 
     @property
     def seen(self) -> bool:

@@ -150,8 +150,7 @@ def run(options: Options) -> int:
     count = len(cameras.views) if cameras else None
     choose_paths(options, [label_of(control) for control in controls], count)
     document, views, selectors = open_views(options, cameras, size)
-    stops = tuple(stop for model in document.models for stop in model.stops)
-    cuts = read_cuts(options.section, stops)
+    cuts = read_cuts(options.section, document.models)
     subjects = [document_at(document, each) for each in controls]
     labels = [label_of(each, s.x) for each, s in zip(controls, subjects, strict=True)]
     rows, paths = choose_paths(options, labels, count)

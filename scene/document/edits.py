@@ -19,7 +19,7 @@ from shapeshift.scene.document.scene_file import (
     SceneItem,
 )
 from shapeshift.scene.pose import Pose
-from shapeshift.scene.sections.section import Section
+from shapeshift.scene.sections.section import SceneSection
 
 LONGEST_NAME = 100  # letters, as the reader takes them
 MOST_OBJECTS = 1000  # as the reader takes them
@@ -179,7 +179,7 @@ def set_appearance(file: SceneFile, name: str, appearance: Appearance) -> SceneF
     return file if appearance == file.appearance else replace(file, appearance=appearance)
 
 
-def set_sections(file: SceneFile, name: str, sections: tuple[Section, ...]) -> SceneFile:
+def set_sections(file: SceneFile, name: str, sections: tuple[SceneSection, ...]) -> SceneFile:
     """With other sections of an object, or of the whole scene where the name is "".  ValueError
     where there are too many.
     """

@@ -20,7 +20,7 @@ from shapeshift.scene.cameras.framing import frame_points, framing_view, scene_p
 from shapeshift.scene.orthographic import orthographic
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.sections.section import Section
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import UPRIGHT, Painted, Selector
 from shapeshift.scene.world.reactions import Machine, Reaction, State, TwoAxes
 
@@ -49,7 +49,7 @@ class SceneItem:
     visible: bool = True
     appearance: Appearance = NEUTRAL
     selectors: tuple[Selector, ...] = ()
-    sections: tuple[Section, ...] = ()
+    sections: tuple[SceneSection, ...] = ()
     collider: str | None = None  # a mesh's path, HULLS, or None: nothing can touch it
     static: bool = False  # touched, but never moved
     mass_kg: float = 1.0
@@ -95,7 +95,7 @@ class SceneFile:
     view: FirstView | None = None
     views: tuple[NamedView, ...] = ()  # to go to by their names
     appearance: Appearance = NEUTRAL  # of all objects, after their own
-    sections: tuple[Section, ...] = ()  # of all objects, in the world
+    sections: tuple[SceneSection, ...] = ()  # of all objects, in the world
     sky: Sky | None = None  # behind everything; None: what the model or the program has there
 
     @property
@@ -202,14 +202,14 @@ def object_of(
 
 
 def sections_of(
-    item: SceneItem, model: Model, of_scene: tuple[Section, ...]
-) -> tuple[Section, ...]:
+    item: SceneItem, model: Model, of_scene: tuple[SceneSection, ...]
+) -> tuple[SceneSection, ...]:
     """An object's own, then those of the scene; what shows stops beyond that the model has not is
     for other objects.
     """
     names = {stop.name for stop in model.stops}
 
-    def known(one: Section) -> bool:
+    def known(one: SceneSection) -> bool:
         blend = one.beyond
         return not isinstance(blend, StopWeights) or {n for n, w in blend.parts if w} <= names
 

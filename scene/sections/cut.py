@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.scene.pose import Pose
-from shapeshift.scene.sections.section import CAPPED, SOFT, Section
+from shapeshift.scene.sections.section import CAPPED, SOFT, SceneSection
 
 CAP_SIGMAS = 4.0  # farther from a plane than this a splat is left to the bit, or gone
 LEAST_KEPT = 1e-3  # of a splat's mass: below it nothing of it is drawn (the rule ends at 1/255)
@@ -35,7 +35,7 @@ class ObjectCut:
         return np.array(self.planes)
 
 
-def cuts_of(sections: Iterable[Section], world_from_object: Pose) -> tuple[ObjectCut, ...]:
+def cuts_of(sections: Iterable[SceneSection], world_from_object: Pose) -> tuple[ObjectCut, ...]:
     """Of an object that stands so: the enabled sections beyond which nothing is."""
     return tuple(
         ObjectCut(tuple(map(tuple, one.half_spaces_of(world_from_object))), one.edge, one.width_m)

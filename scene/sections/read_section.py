@@ -12,7 +12,7 @@ from shapeshift.scene.sections.section import (
     SOFT,
     BoxShape,
     PlaneShape,
-    Section,
+    SceneSection,
 )
 
 LONGEST = 120  # letters of a section that are quoted
@@ -22,7 +22,7 @@ FORMS = {
 }
 
 
-def read_section(text: str, stops: Sequence[Stop] = ()) -> Section:
+def read_section(text: str, stops: Sequence[Stop] = ()) -> SceneSection:
     """A section of the world of a text; ValueError, one sentence, for what is none.
 
     edge: capped, hard or soft, which has a width in metres.  X: what is shown beyond, of `stops`.
@@ -62,6 +62,6 @@ def read_section(text: str, stops: Sequence[Stop] = ()) -> Section:
             if kind == "plane"
             else BoxShape(three(rows[0]), three(rows[1]))
         )
-        return Section(shape=shape, edge=edge, width_m=width, beyond=beyond)
+        return SceneSection(shape=shape, edge=edge, width_m=width, beyond=beyond)
     except ValueError as error:
         raise ValueError(f"{said}: {error}") from None

@@ -73,7 +73,7 @@ class BoxShape:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Section:
+class SceneSection:
     """Outside of its shape an object is absent, or, with `beyond`, at another control."""
 
     shape: PlaneShape | BoxShape
@@ -142,14 +142,14 @@ def moved_shape(shape: PlaneShape | BoxShape, pose: Pose) -> PlaneShape | BoxSha
     return BoxShape(three(centre), shape.half, four(Pose.from_matrix(turned).wxyz))
 
 
-def carried_section(section: Section, world_from_before: Pose) -> Section:
+def carried_section(section: SceneSection, world_from_before: Pose) -> SceneSection:
     """What stands in the world after it is moved; what is fixed to an object goes with that."""
     if section.space != "world":
         return section
     return replace(section, shape=moved_shape(section.shape, world_from_before))
 
 
-def held_by(section: Section, world_from_hand: Pose) -> Section:
+def held_by(section: SceneSection, world_from_hand: Pose) -> SceneSection:
     """A section whose shape is given in a hand's frame, where the hand is now: in the world."""
     shape = moved_shape(section.shape, world_from_hand)
     return replace(section, shape=shape, space="world")

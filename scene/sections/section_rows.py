@@ -10,25 +10,25 @@ from shapeshift.scene.sections.section import (
     UPRIGHT,
     BoxShape,
     PlaneShape,
-    Section,
+    SceneSection,
 )
 
 MOST_SECTIONS = 16  # of a scene, and of an object
 
 
-def read_sections(row: Fields, spaces: tuple[str, ...] = SPACES) -> tuple[Section, ...]:
+def read_sections(row: Fields, spaces: tuple[str, ...] = SPACES) -> tuple[SceneSection, ...]:
     """What stands under "sections".  spaces: the ones there are, the usual one first.  BadFile."""
     found = row.rows("sections", MOST_SECTIONS, "section")
     return tuple(_read_section(each, spaces) for each in found)
 
 
-def _read_section(row: Fields, spaces: tuple[str, ...]) -> Section:
+def _read_section(row: Fields, spaces: tuple[str, ...]) -> SceneSection:
     for key in ("plane", "box"):
         row.value(key, None)  # both are keys here, whichever there is
     if row.has("plane") == row.has("box"):
         raise BadFile(f"{row.where}: wants either 'plane' or 'box'.")
     try:
-        section = Section(
+        section = SceneSection(
             shape=_read_plane(row) if row.has("plane") else _read_box(row.object("box")),
             edge=row.line("edge", CAPPED, EDGES),
             width_m=row.number("width_m", 0.0, "metres, 0 or more,", 0),
@@ -59,7 +59,7 @@ def _read_box(row: Fields) -> BoxShape:
     return box
 
 
-def section_row(section: Section, space: str) -> dict:
+def section_row(section: SceneSection, space: str) -> dict:
     """The inverse of a row that `read_sections` reads, where `space` is usual."""
     row: dict[str, object] = {}
     shape = section.shape

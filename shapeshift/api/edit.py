@@ -18,7 +18,7 @@ from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene as DrawnScene
 from shapeshift.scene.scene import SceneObject
-from shapeshift.scene.sections.section import Section
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import Selector
 
 if TYPE_CHECKING:
@@ -106,7 +106,9 @@ def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayer
     return join_layers(list(layers), stops, "exclusive", [])
 
 
-def sections_from(sections: Sequence["str | Section"], subject: Document) -> tuple[Section, ...]:
+def sections_from(
+    sections: Sequence["str | SceneSection"], subject: Document
+) -> tuple[SceneSection, ...]:
     """Sections of texts and of themselves.  Raises UsageError."""
     from shapeshift.scene.sections.read_section import read_section
 

@@ -14,7 +14,7 @@ from shapeshift.app.editor.panels.widgets.panel_rows import (
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.section_tool import DECIMALS, SectionTool
 from shapeshift.app.editor.texts.table import said
-from shapeshift.scene.sections.section import CAPPED, HARD, SOFT, PlaneShape, Section, flipped
+from shapeshift.scene.sections.section import CAPPED, HARD, SOFT, PlaneShape, SceneSection, flipped
 
 Vec = imgui.ImVec2
 ADD = {
@@ -52,7 +52,7 @@ def draw_cuts(tool: SectionTool, state: EditorState, ui_scale: float) -> None:
         imgui.pop_item_width()
 
 
-def _row(tool: SectionTool, number: int, section: Section, ui_scale: float) -> None:
+def _row(tool: SectionTool, number: int, section: SceneSection, ui_scale: float) -> None:
     """On or off, and the words that choose it."""
     changed, on = imgui.checkbox("##on", section.enabled)
     if changed:
@@ -74,7 +74,7 @@ def _row(tool: SectionTool, number: int, section: Section, ui_scale: float) -> N
     tip("Choose it: its handles are in the picture. Shift+O.", ui_scale)
 
 
-def _chosen(tool: SectionTool, state: EditorState, section: Section, ui_scale: float) -> None:
+def _chosen(tool: SectionTool, state: EditorState, section: SceneSection, ui_scale: float) -> None:
     number = tool.number
     if isinstance(section.shape, PlaneShape):
         _plane(tool, state, ui_scale)
@@ -118,7 +118,7 @@ def _plane(tool: SectionTool, state: EditorState, ui_scale: float) -> None:
     tip("What is kept and what is cut away change places.", ui_scale)
 
 
-def _beyond(tool: SectionTool, state: EditorState, section: Section, ui_scale: float) -> None:
+def _beyond(tool: SectionTool, state: EditorState, section: SceneSection, ui_scale: float) -> None:
     """Nothing beyond, or a stop."""
     index = state.chosen_index if tool.owner else 0
     stops = state.stops(index or 0)

@@ -19,7 +19,7 @@ from shapeshift.scene.sections.section import (
     SOFT,
     BoxShape,
     PlaneShape,
-    Section,
+    SceneSection,
     moved_shape,
     plane_through,
 )
@@ -56,13 +56,13 @@ class SectionTool:
         return self._state.chosen if self._state.chosen_index is not None else ""
 
     @property
-    def sections(self) -> tuple[Section, ...]:
+    def sections(self) -> tuple[SceneSection, ...]:
         file = self._state.edited.file
         item = edits.find(file, self.owner) if self.owner else None
         return item.sections if item is not None else file.sections
 
     @property
-    def current(self) -> Section | None:
+    def current(self) -> SceneSection | None:
         """The one that is edited."""
         return self.sections[self.number] if self.number < len(self.sections) else None
 
@@ -92,13 +92,15 @@ class SectionTool:
             else BoxShape(three(np.round(centre, DECIMALS)), three(np.round(half, DECIMALS)))
         )
         space = "object" if self.owner else "world"
-        made = Section(shape=moved_shape(shape, self._frame_from_world), edge=CAPPED, space=space)
-        if self._put((*self.sections, made), "add a section"):
+        made = SceneSection(
+            shape=moved_shape(shape, self._frame_from_world), edge=CAPPED, space=space
+        )
+        if self._record((*self.sections, made), "add a section"):
             self.number, self.on = len(self.sections) - 1, True
 
     def remove(self, number: int) -> None:
         kept = tuple(one for n, one in enumerate(self.sections) if n != number)
-        self._put(kept, "remove a section")
+        self._record(kept, "remove a section")
         self.number = max(min(self.number, len(kept) - 1), 0)
         self.on = self.on and bool(kept)
 
@@ -110,9 +112,9 @@ class SectionTool:
             values["width_m"] = 0.0
         sections = list(self.sections)
         sections[number] = replace(sections[number], **values)  # type: ignore[arg-type]
-        self._put(tuple(sections), what, together)
+        self._record(tuple(sections), what, together)
 
-    def _put(self, sections: tuple[Section, ...], what: str, together: str = "") -> bool:
+    def _record(self, sections: tuple[SceneSection, ...], what: str, together: str = "") -> bool:
         state = self._state
         try:
             edit(state, edits.set_sections(state.edited.file, self.owner, sections), what, together)

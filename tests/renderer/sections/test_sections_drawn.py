@@ -13,7 +13,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.sections.section import BoxShape, PlaneShape, Section
+from shapeshift.scene.sections.section import BoxShape, PlaneShape, SceneSection
 from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import front_view, one_splat, psnr_db, random_layers, random_model
 
@@ -23,7 +23,7 @@ CLOUD = random_layers(400, layers=2)
 NETWORKS = random_model(120)
 ACROSS = PlaneShape((0.6, 0.8, 0.0), 0.1)
 TURN = Pose(np.array([0.2, -0.1, 0.3]), np.array([0.5, 0.5, -0.5, 0.5]))
-AROUND = Section(shape=BoxShape((0.0, 0.0, 0.0), (50.0, 50.0, 50.0)))
+AROUND = SceneSection(shape=BoxShape((0.0, 0.0, 0.0), (50.0, 50.0, 50.0)))
 
 
 def drawn(renderer: Renderer, *things: SceneObject, **settings) -> np.ndarray:
@@ -33,8 +33,8 @@ def drawn(renderer: Renderer, *things: SceneObject, **settings) -> np.ndarray:
     return renderer.image().copy()
 
 
-def cut(shape, edge: str = "hard", **more) -> Section:
-    return Section(shape=shape, edge=edge, width_m=0.2 if edge == "soft" else 0.0, **more)
+def cut(shape, edge: str = "hard", **more) -> SceneSection:
+    return SceneSection(shape=shape, edge=edge, width_m=0.2 if edge == "soft" else 0.0, **more)
 
 
 @pytest.mark.parametrize("model", [CLOUD, NETWORKS], ids=["layers", "networks"])
@@ -98,7 +98,7 @@ def test_a_soft_edge_is_the_smooth_step_on_one_splat(renderer, inside_m):
     plain = drawn(renderer, obj, min_alpha=1e-6)
     part = min(max(inside_m / 0.2, 0), 1)
     weight = 3 * part**2 - 2 * part**3
-    soft = Section(shape=PlaneShape((0, 0, 1), inside_m), edge="soft", width_m=0.2)
+    soft = SceneSection(shape=PlaneShape((0, 0, 1), inside_m), edge="soft", width_m=0.2)
     got = drawn(renderer, replace(obj, sections=(soft,)), min_alpha=1e-6)
     np.testing.assert_allclose(got, plain * weight, atol=3e-6)
 

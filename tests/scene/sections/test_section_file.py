@@ -17,7 +17,7 @@ from shapeshift.scene.sections.read_section import read_section
 from shapeshift.scene.sections.section import (
     BoxShape,
     PlaneShape,
-    Section,
+    SceneSection,
     carried_section,
     flipped,
     held_by,
@@ -28,10 +28,10 @@ from tests.support.splat_scenes import random_layers
 TURN = Pose(np.array([0.3, -0.2, 0.5]), np.array([0.5, -0.5, 0.5, 0.5]))
 STOPS = (Stop("RGB", 0.0), Stop("Bone", 1.0))
 SECTIONS = (
-    Section(shape=PlaneShape((0.6, 0.0, 0.8), 0.25)),
-    Section(shape=PlaneShape((0.0, 1.0, 0.0), -1.5), edge="soft", width_m=0.05, enabled=False),
-    Section(shape=BoxShape((1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), edge="hard", beyond=0.5),
-    Section(
+    SceneSection(shape=PlaneShape((0.6, 0.0, 0.8), 0.25)),
+    SceneSection(shape=PlaneShape((0.0, 1.0, 0.0), -1.5), edge="soft", width_m=0.05, enabled=False),
+    SceneSection(shape=BoxShape((1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), edge="hard", beyond=0.5),
+    SceneSection(
         shape=BoxShape((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.5, 0.5, 0.5, 0.5)),
         beyond=StopWeights((("layer 0", 0.25), ("layer 1", 0.75))), edge="hard", space="object",
     ),
@@ -60,7 +60,7 @@ def test_what_is_left_out_is_usual_and_an_object_has_its_own_frame(tmp_path):
     row = {"name": "a", "model": "a.ply", "sections": [plane]}
     read = read_scene_file(written(tmp_path, sections=[plane], objects=[row]))
     (of_scene,), (own,) = read.sections, read.items[0].sections
-    assert of_scene == Section(shape=PlaneShape((0, 1, 0), 0.5), edge="capped", space="world")
+    assert of_scene == SceneSection(shape=PlaneShape((0, 1, 0), 0.5), edge="capped", space="world")
     assert own.space == "object" and own.shape == of_scene.shape
     scene = scene_of(read, {"a": random_layers(3)})
     assert scene.objects[0].sections == (own, of_scene)
@@ -99,7 +99,7 @@ def test_seventeen_sections_are_too_many(tmp_path):
 
 
 def test_sections_as_text():
-    assert read_section("plane:0,0,2,1") == Section(shape=PlaneShape((0, 0, 1), 0.5))
+    assert read_section("plane:0,0,2,1") == SceneSection(shape=PlaneShape((0, 0, 1), 0.5))
     soft = read_section("plane:1,0,0,-0.5:soft:0.1:beyond=bone", STOPS)
     assert (soft.edge, soft.width_m, soft.beyond) == ("soft", 0.1, 1.0)
     box = read_section("box:0,1,0:1,2,3:hard:beyond=RGB:0.5,Bone:0.5", STOPS)
@@ -135,10 +135,10 @@ def test_frames_and_hands():
     assert carried_section(fixed, TURN) is fixed
     np.testing.assert_array_equal(fixed.half_spaces_of(TURN), fixed.half_spaces)
     plane = SECTIONS[0].shape
-    both = [inside_of(Section(shape=s).half_spaces, places) for s in (plane, flipped(plane))]
+    both = [inside_of(SceneSection(shape=s).half_spaces, places) for s in (plane, flipped(plane))]
     np.testing.assert_allclose(both[0], -both[1], atol=1e-6)
     turned = moved_shape(SECTIONS[2].shape, TURN)
     signed = np.abs((moved - turned.centre) @ turned.axes) - turned.half
     np.testing.assert_allclose(
-        inside_of(Section(shape=turned).half_spaces, moved), -signed.max(axis=1), atol=1e-5
+        inside_of(SceneSection(shape=turned).half_spaces, moved), -signed.max(axis=1), atol=1e-5
     )
