@@ -120,7 +120,8 @@ def read_whole(path: Path, reading: Reading) -> Model:
             raise BadFile(nothing_to_show(path))
         if frames := frame_files(layers):
             in_time = replace(reading, mode=reading.mode or "exclusive")
-            return read_layers(frames, in_time, frame_stops(frames))
+            model = read_layers(frames, in_time, frame_stops(frames))
+            return replace(model, provenance=model.provenance | {"frames": len(frames)})
         return read_layers(layers, reading) if len(layers) > 1 else read_file(layers[0], reading)
     if is_scaffold(path):
         return read_scaffold(path, reading)

@@ -77,6 +77,7 @@ class StopBlend:
     stops: tuple[Stop, ...]
     pace: tuple[Pace, ...] = ()
     direct: bool = False
+    frames: bool = False  # the stops are moments: ways lead through what lies between
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -86,6 +87,11 @@ class StopBlend:
     def encodes_every_x(self) -> bool:
         """Whether a way between two numbers leads through all numbers between them."""
         return self.direct or len(self.stops) < 2
+
+    @cached_property
+    def is_time(self) -> bool:
+        """Whether x is time, so that the way between two moments leads through all between."""
+        return self.frames or (len(self.stops) > 1 and all(stop.date for stop in self.stops))
 
     @cached_property
     def _table(self) -> tuple[np.ndarray, np.ndarray]:
@@ -142,7 +148,8 @@ class StopBlend:
     def between(self, start: Controls, end: Control, part: float | np.ndarray) -> Controls:
         """`part` 0..1 of the way from one control to another, one or (A,) of them, at even pace.
 
-        Between two neighbours that is a number again; other ways lead there directly.
+        Between two neighbours that is a number again, and where x is time; other ways lead there
+        directly.
         """
         if np.ndim(part) == 0 and part in (0, 1):
             return end if part else start
@@ -171,7 +178,7 @@ class StopBlend:
             return False
         if is_each(start) and start.ndim == 2:
             return False
-        if self.encodes_every_x:
+        if self.encodes_every_x or self.is_time:
             return True
         xs = sorted(stop.x for stop in self.stops)
         low, high = min(np.min(start), end), max(np.max(start), end)

@@ -255,8 +255,8 @@ class OpenedScene:
     def with_sections(self, *sections: "str | SceneSection", name: str | None = None) -> Self:
         """The scene cut by planes and boxes; none: by none.
 
-        A section is a SceneSection, or a text such as "plane:1,0,0,0.2:soft:0.05" (normal, metres
-        along it, edge, width) or "box:0,0.4,0:0.5,0.3,0.5:beyond=Opened" (centre, half its sides,
+        A section is a SceneSection, or a text: "plane:1,0,0,0.2:soft:0.05" (normal, metres along
+        it, edge, width) or "box:0,0.4,0:0.5,0.3,0.5:beyond=Opened" (centre, half its sides,
         what is shown outside).  All of them hold.  name: of the object that they cut, where it is
         one alone; None: all.  Raises UsageError.
 

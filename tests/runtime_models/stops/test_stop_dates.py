@@ -128,6 +128,11 @@ def test_frames_are_stops_each_shown_alone_and_exactly(tmp_path):
         np.testing.assert_array_equal(model.means[mine], alone.means)
         np.testing.assert_array_equal(model.opacity[mine], alone.opacity)
     np.testing.assert_allclose(model.weights(0.25), [0.5, 0.5, 0])  # a cross-fade between
+    # A way from the first to the last leads through the one between, as time does.
+    assert [model.blend.between(0.0, 1.0, part) for part in (0.0, 0.25, 0.5, 1.0)] == [
+        0.0, 0.25, 0.5, 1.0,
+    ]  # fmt: skip
+    assert StopBlend(dated()).between(0.0, 1.0, 0.4) == 0.4
 
 
 def test_dated_frames_stand_as_far_apart_as_their_dates(tmp_path):
