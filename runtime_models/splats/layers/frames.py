@@ -61,15 +61,13 @@ def frame_files(files: list[Path]) -> list[Path]:
 
 
 def frame_stops(files: list[Path]) -> tuple[Stop, ...]:
-    """A stop a frame: with dates as far apart as these are, else evenly."""
-    names = stems_named([path.stem for path in files])
+    """A stop a frame: named by dates and as far apart as these are, else by files and evenly."""
     if not all(DATED.search(path.stem) for path in files):
-        last = len(files) - 1
+        last, names = len(files) - 1, stems_named([path.stem for path in files])
         return tuple(Stop(name, i / last, "layer") for i, name in enumerate(names))
     dates = [date_of(path) for path in files]
-    xs = places_of(dates)
-    rows = zip(names, xs, dates, strict=True)
-    return tuple(Stop(name, x, "layer", date=date) for name, x, date in rows)
+    pairs = zip(dates, places_of(dates), strict=True)
+    return tuple(Stop(date, x, "layer", date=date) for date, x in pairs)
 
 
 def date_of(path: Path) -> str:
