@@ -39,7 +39,9 @@ def control_of(obj: SceneObject) -> Controls:
     """
     x: Controls = obj.x
     parts = [(selector_weights(obj, selector), selector.x) for selector in obj.selectors]
-    parts += [(weights_beyond(obj, one), one.beyond) for one in beyond_sections(obj)]
+    for one in beyond_sections(obj):
+        assert one.beyond is not None, "those that show something"
+        parts.append((weights_beyond(obj, one), one.beyond))
     for weights, inside in parts:
         if not weights.any():  # a lens that looks elsewhere costs nothing
             continue

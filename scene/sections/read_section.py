@@ -57,7 +57,7 @@ def read_section(text: str, stops: Sequence[Stop] = ()) -> SceneSection:
     if edge not in EDGES:
         raise ValueError(f"{said}: edge is '{edge[:LONGEST]}'; {', '.join(EDGES)} are known.")
     try:
-        shape = (
+        shape: PlaneShape | BoxShape = (
             PlaneShape(three(rows[0][:3]), rows[0][3])
             if kind == "plane"
             else BoxShape(three(rows[0]), three(rows[1]))

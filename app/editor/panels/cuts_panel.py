@@ -14,6 +14,7 @@ from shapeshift.app.editor.panels.widgets.panel_rows import (
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.section_tool import DECIMALS, SectionTool
 from shapeshift.app.editor.texts.table import said
+from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.sections.section import CAPPED, HARD, SOFT, PlaneShape, SceneSection, flipped
 
 Vec = imgui.ImVec2
@@ -124,7 +125,7 @@ def _beyond(tool: SectionTool, state: EditorState, section: SceneSection, ui_sca
     stops = state.stops(index or 0)
     if len(stops) < 2:
         return
-    xs = [None, *(stop.x for stop in stops)]
+    xs: list[Control | None] = [None, *(stop.x for stop in stops)]
     names = [said("beyond: nothing")] + [said("beyond: {name}", name=s.name) for s in stops]
     if section.beyond not in xs:  # of the file: a number or a blend
         xs.append(section.beyond)

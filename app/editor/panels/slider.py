@@ -254,7 +254,8 @@ def _stop_names(
     line = imgui.get_text_line_height()
     low, high = along.left - KNOB * line, along.left + along.width + KNOB * line
     last_right = low - line  # names that would overlap the one before are left out
-    clicked, taken = None, []
+    taken: list[tuple[float, float]] = []  # from where to where a word stands
+    clicked = None
     for number, stop in enumerate(sorted(stops, key=lambda stop: stop.x)):
         size = imgui.calc_text_size(stop.name)
         left = min(max(along.place(stop.x) - size.x / 2, low), high - size.x)

@@ -86,7 +86,7 @@ class SectionTool:
         if not self._state.scene.objects:
             return
         centre, half = self._state.centre, (0.5 * self._state.radius,) * 3
-        shape = (
+        shape: PlaneShape | BoxShape = (
             plane_through(np.round(centre, DECIMALS), np.array([1.0, 0.0, 0.0]))
             if plane
             else BoxShape(three(np.round(centre, DECIMALS)), three(np.round(half, DECIMALS)))
