@@ -65,6 +65,7 @@ Debug = Literal[
 ]
 POSITIONAL, EXPERT = Opt(positional=True), Opt(expert=True)
 SIZE, CONTROL, REGIONS, MODALITY = (Opt(metavar=m) for m in ("SIZE", "X", "REGION", "MODALITY"))
+SECTIONS = Opt(metavar="SECTION")
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from shapeshift.scene.cameras.framing import (
 from shapeshift.scene.document.scene_file import SceneFile, first_view, is_scene_file, scene_of
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.scene.sections.section import carried_section
 from shapeshift.scene.selectors.selector import carried
 
 if TYPE_CHECKING:
@@ -185,8 +186,9 @@ def control_of_text(
     ends = [stop for stop in stops if not isinstance(stop.x, StopWeights)]  # of ways and blends
     try:
         return parse_control(word, ends, pace)
-    except ValueError:
-        raise UsageError(f"{said}: {no_control(word, stops)}") from None
+    except ValueError as error:
+        dated = word[4:5] == "-" and any(stop.date for stop in ends)
+        raise UsageError(f"{said}: {error if dated else no_control(word, stops)}") from None
 
 
 def no_control(word: str, stops: Sequence[Stop]) -> str:
@@ -204,7 +206,8 @@ def moved_object(obj: SceneObject, world_from_before: Pose) -> SceneObject:
     """An object, with its parts, after its world is moved."""
     pose = Pose.from_matrix(world_from_before.matrix() @ obj.world_from_object.matrix())
     parts = tuple(carried(selector, world_from_before) for selector in obj.selectors)
-    return replace(obj, world_from_object=pose, selectors=parts)
+    cuts = tuple(carried_section(one, world_from_before) for one in obj.sections)
+    return replace(obj, world_from_object=pose, selectors=parts, sections=cuts)
 
 
 def open_document(path: Path, options: ReadingOptions) -> Document:

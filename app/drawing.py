@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +15,12 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.files.whole_file import whole_file
+from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.appearance import NEUTRAL, Appearance, Background, Color, Sky, check_color
 from shapeshift.scene.scene import Scene
+from shapeshift.scene.sections.read_section import read_section
+from shapeshift.scene.sections.section import SceneSection
 
 LARGEST_SIDE = 16384  # pixels: the texture limit of common drivers
 MOST_PIXELS = LARGEST_SIDE * 8192  # float images of more do not fit one OpenCL buffer
@@ -154,4 +157,21 @@ def appearing(scene: Scene, appearance: Appearance) -> Scene:
     if appearance == NEUTRAL:
         return scene
     objects = (replace(obj, appearance=obj.appearance.under(appearance)) for obj in scene.objects)
+    return replace(scene, objects=tuple(objects))
+
+
+def read_cuts(texts: tuple[str, ...], models: Iterable[Model]) -> tuple[SceneSection, ...]:
+    """The sections that --section asks for, of a scene of these models.  Raises UsageError."""
+    stops = tuple(stop for model in models for stop in model.stops)
+    try:
+        return tuple(read_section(text, stops) for text in texts)
+    except ValueError as error:
+        raise UsageError(f"--section {error}") from None
+
+
+def sectioned(scene: Scene, sections: tuple[SceneSection, ...]) -> Scene:
+    """The scene with these of all objects, in addition to each object's own."""
+    if not sections:
+        return scene
+    objects = (replace(obj, sections=(*obj.sections, *sections)) for obj in scene.objects)
     return replace(scene, objects=tuple(objects))

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from shapeshift.renderer.colors.color_cache import ColorCache, forget_colors
 from shapeshift.renderer.colors.eye_colors import EyeColors
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
+from shapeshift.scene.sections.cut import ObjectCut
 
 BESIDE_SET = 2  # of colours, behind those of two eyes
 NO_SHADE = Shade(None)  # nothing is decoded yet
@@ -27,6 +30,9 @@ class DecodedObject:
     second: tuple[Shade, Appearance | None] | None = None  # the same of a second set of colours
     opacity: float = 1.0  # times that of its splats
     beside: tuple[Shade, Appearance | None] | None = None  # of the one for `Renderer.draw_beside`
+    own: tuple[np.ndarray, np.ndarray] | None = None  # mean_opacity (n, 4) and covariance (n, 8) as
+    #                                                   decoded, while it is shown otherwise
+    cuts: tuple[ObjectCut, ...] = ()  # what of `own` lies in the arena
     look: EyeColors | None = None  # made for the first pair of eyes
 
     def look_beside(self, look: tuple[Shade, Appearance | None]) -> None:

@@ -72,8 +72,12 @@ class Drawing(ABC):
         """
 
     @abstractmethod
-    def scale_opacity(self, i: int, factor: float) -> None:
-        """Makes the opacities of object i those that were decoded, times a factor."""
+    def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """mean_opacity (n, 4) and covariance (n, 8) of object i, in its frame; copies."""
+
+    @abstractmethod
+    def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
+        """Replaces what `read_splats` gives, until object i is decoded again; None: shapes stay."""
 
     @abstractmethod
     def wait_decoded(self) -> None:

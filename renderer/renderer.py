@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.renderer.backends import choose_backends, open_drawing
 from shapeshift.renderer.colors.color_cache import ColorCache, centre_of, forget_colors
-from shapeshift.renderer.colors.decode_colors import decode_colors, scale_opacity
+from shapeshift.renderer.colors.decode_colors import decode_colors
 from shapeshift.renderer.colors.eye_colors import drawn_together
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
@@ -34,6 +34,7 @@ from shapeshift.renderer.colors.two_looks import (
     two_false_colors,
 )
 from shapeshift.renderer.colors.wanted import own_colors
+from shapeshift.renderer.cut import place_splats, restore_shapes
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import BESIDE_SET, DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
@@ -111,13 +112,13 @@ class Renderer:
                     # What follows the eye is decoded with the colours, once the eye is known.
                     follows = first or shape_follows_control(obj.model)
                     if follows and not follows_eye(obj.model):
+                        restore_shapes(self.drawing, i, decoded)
                         self.drawing.decode_geometry(i, x)
                         self._geometry_runs += 1
-                        decoded.opacity = 1.0
                     decoded.x = x
                     decoded.version += 1
                 decoded.key = key
-                scale_opacity(self.drawing, i, obj, decoded)
+                place_splats(self.drawing, i, obj, decoded)
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.seen else HIDDEN for o in scene.objects]
         self.drawing.set_poses(poses)

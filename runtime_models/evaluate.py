@@ -210,6 +210,10 @@ class Evaluator:
         rows: of the anchors; x and direction are already of these rows alone.
         """
         every = self._anchored.features
+        if is_each(x) and isinstance(self._networks[name], FoldedNetwork):
+            first = alike(x, x[0])
+            if len(x) and alike(x[~first], x[~first][:1]).all():  # two sides of a sharp border
+                return self._run_sides(name, x, first, direction, rows, out)
         network, features = self._network(name, not is_each(x)), every[rows]
         out = self._room(name) if out is None else out
         psi = self._encoded(x)
@@ -221,6 +225,31 @@ class Evaluator:
             if direction is not None:
                 parts["direction"] = direction[part]
             out[part] = network.run(parts, None if base is None else base[part])
+        return out
+
+    def _run_sides(
+        self,
+        name: str,
+        x: np.ndarray,
+        first: np.ndarray,
+        direction: np.ndarray | None,
+        rows: np.ndarray | slice,
+        out: np.ndarray | None,
+    ) -> np.ndarray:
+        """The same where anchors have one of two controls: each folded for its own; first (n,) bool
+        says which.
+        """
+        out = self._room(name) if out is None else out
+        network, every = self._networks[name], self._anchored.features
+        base, numbers = network.feature_part(every), np.arange(len(every))[rows]
+        for side in (np.flatnonzero(first), np.flatnonzero(~first)):
+            for start in range(0, len(side), BATCH):
+                part = side[start : start + BATCH]
+                psi = self._anchored.psi(x[part[:1]])
+                parts = {"feature": every[numbers[part]], "control": psi}
+                if direction is not None:
+                    parts["direction"] = direction[part]
+                out[part] = network.run(parts, None if base is None else base[numbers[part]])
         return out
 
     def _network(self, name: str, one_control: bool) -> "FoldedNetwork | WholeNetwork":
@@ -276,6 +305,12 @@ class FrameColumns:
         elif name == "rotation":
             values = product(self._wxyz, values.reshape(-1, 4)).reshape(count, -1)
         return values
+
+
+def alike(x: np.ndarray, one: np.ndarray) -> np.ndarray:
+    """(n,) bool: which controls (n,) or (n, S) are this one."""
+    same = x == one
+    return same if same.ndim < 2 else same.all(axis=1)
 
 
 def _own(weights: np.ndarray, layer: np.ndarray) -> np.ndarray:

@@ -200,7 +200,7 @@ class SplatLayers:
     @cached_property
     def blend(self) -> StopBlend:
         """What a control means."""
-        return StopBlend(self.stops)
+        return StopBlend(self.stops, frames="frames" in self.provenance)
 
     def with_rows(self, rows: np.ndarray | slice) -> "SplatLayers":
         """These splats alone, in their order."""

@@ -24,6 +24,7 @@ from shapeshift.runtime_models.parts import splat_labels
 from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold, read_scaffold
 from shapeshift.runtime_models.splats.foreign_files import is_address, refusal
 from shapeshift.runtime_models.splats.formats import format_of, head_of
+from shapeshift.runtime_models.splats.layers.frames import frame_files, frame_stops
 from shapeshift.runtime_models.splats.layers.read_layer_list import (
     LIST,
     has_layer_list,
@@ -117,6 +118,10 @@ def read_whole(path: Path, reading: Reading) -> Model:
         layers = layer_files(path)
         if not layers:
             raise BadFile(nothing_to_show(path))
+        if frames := frame_files(layers):
+            in_time = replace(reading, mode=reading.mode or "exclusive")
+            model = read_layers(frames, in_time, frame_stops(frames))
+            return replace(model, provenance=model.provenance | {"frames": len(frames)})
         return read_layers(layers, reading) if len(layers) > 1 else read_file(layers[0], reading)
     if is_scaffold(path):
         return read_scaffold(path, reading)

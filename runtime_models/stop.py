@@ -15,6 +15,7 @@ class Stop:
     palette: str = ""  # colour map of a thermal stop ("ironbow", "gray", ...); "" = none
     value_range: tuple[float, float] | None = None  # the values that intensity 0 and 1 stand for
     unit: str = ""  # unit of value_range, e.g. "°C"
+    date: str = ""  # ISO 8601, when it was so; "": not known.  Of several they rise with x
 
 
 @dataclass(frozen=True)

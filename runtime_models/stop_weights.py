@@ -15,6 +15,7 @@ from typing import TypeGuard, overload
 import numpy as np
 
 from shapeshift.runtime_models.stop import ControlEncoding, Stop
+from shapeshift.runtime_models.stop_dates import x_of_date
 
 SUM_SLACK = 1e-6  # by which weights may miss 1: what six decimals in a file leave
 
@@ -76,6 +77,7 @@ class StopBlend:
     stops: tuple[Stop, ...]
     pace: tuple[Pace, ...] = ()
     direct: bool = False
+    frames: bool = False  # the stops are moments: ways lead through what lies between
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -85,6 +87,11 @@ class StopBlend:
     def encodes_every_x(self) -> bool:
         """Whether a way between two numbers leads through all numbers between them."""
         return self.direct or len(self.stops) < 2
+
+    @cached_property
+    def is_time(self) -> bool:
+        """Whether x is time, so that the way between two moments leads through all between."""
+        return self.frames or (len(self.stops) > 1 and all(stop.date for stop in self.stops))
 
     @cached_property
     def _table(self) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +148,8 @@ class StopBlend:
     def between(self, start: Controls, end: Control, part: float | np.ndarray) -> Controls:
         """`part` 0..1 of the way from one control to another, one or (A,) of them, at even pace.
 
-        Between two neighbours that is a number again; other ways lead there directly.
+        Between two neighbours that is a number again, and where x is time; other ways lead there
+        directly.
         """
         if np.ndim(part) == 0 and part in (0, 1):
             return end if part else start
@@ -170,7 +178,7 @@ class StopBlend:
             return False
         if is_each(start) and start.ndim == 2:
             return False
-        if self.encodes_every_x:
+        if self.encodes_every_x or self.is_time:
             return True
         xs = sorted(stop.x for stop in self.stops)
         low, high = min(np.min(start), end), max(np.max(start), end)
@@ -296,6 +304,9 @@ def parse_control(text: str, stops: Sequence[Stop], pace: tuple[Pace, ...] = ())
     try:
         x = float(word)
     except ValueError:
+        date = _parse_date(word, stops)
+        if date is not None:
+            return date
         blend = _parse_way(word, known, StopBlend(tuple(stops), pace)) or _parse_blend(word, known)
         if blend is None:
             raise ValueError(_wanted(word, stops)) from None
@@ -303,6 +314,13 @@ def parse_control(text: str, stops: Sequence[Stop], pace: tuple[Pace, ...] = ())
     if not 0 <= x <= 1:
         raise ValueError(f"x is {word[:40]}, expected 0 to 1.")
     return x
+
+
+def _parse_date(word: str, stops: Sequence[Stop]) -> float | None:
+    """A date between the dated stops; None for what begins as none, or where no stop has one."""
+    if not (word[:4].isdigit() and word[4:5] == "-" and any(stop.date for stop in stops)):
+        return None
+    return x_of_date(word, stops)
 
 
 def _parse_way(word: str, known: dict[str, Stop], blend: StopBlend) -> Control | None:

@@ -8,12 +8,16 @@ is clamped (sliders, snap, Sweep).  So nothing below ever meets such a value.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.stop_dates import seconds_of
 from shapeshift.runtime_models.stop_weights import NO_STOPS, Control, Controls, StopBlend, is_each
 from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.sections.cut import kept_by
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import Selector
 
 SNAP = 0.02  # of the slider's range: nearer than this to a stop is on the stop
@@ -30,15 +34,19 @@ def control_of(obj: SceneObject) -> Controls:
     """Of an object: one for all of it, or one an anchor (layers: a splat), float32: numbers (A,),
     or where these do not do weights of its stops (A, S).
 
-    A border shows what a shift from outside to inside shows on its way: no third stop.
+    A border shows what a shift from outside to inside shows on its way: no third stop.  What lies
+    beyond a section that shows another control there lies over all selectors.
     """
     x: Controls = obj.x
-    for selector in obj.selectors:
-        weights = selector_weights(obj, selector)
+    parts = [(selector_weights(obj, selector), selector.x) for selector in obj.selectors]
+    for one in beyond_sections(obj):
+        assert one.beyond is not None, "those that show something"
+        parts.append((weights_beyond(obj, one), one.beyond))
+    for weights, inside in parts:
         if not weights.any():  # a lens that looks elsewhere costs nothing
             continue
         whole = (weights == weights[0]).all()
-        x = obj.model.blend.between(x, selector.x, float(weights[0]) if whole else weights)
+        x = obj.model.blend.between(x, inside, float(weights[0]) if whole else weights)
     return np.clip(x, 0, 1).astype(np.float32) if is_each(x) else x
 
 
@@ -47,6 +55,25 @@ def selector_weights(obj: SceneObject, selector: Selector) -> np.ndarray:
     model = obj.model
     places = model.means if isinstance(model, SplatLayers) else model.anchors  # (A, 3) metres
     return selector.weights(_in_space(places, obj, selector.space))
+
+
+def controls_within(obj: SceneObject) -> list[Control]:
+    """Its own control, and those of its parts."""
+    beyond = [one.beyond for one in beyond_sections(obj) if one.beyond is not None]
+    return [obj.x, *(selector.x for selector in obj.selectors), *beyond]
+
+
+def beyond_sections(obj: SceneObject) -> tuple[SceneSection, ...]:
+    """The sections that show another control beyond them."""
+    return tuple(one for one in obj.sections if one.enabled and one.beyond is not None)
+
+
+def weights_beyond(obj: SceneObject, section: SceneSection) -> np.ndarray:
+    """(A,) float32 0..1: how much of each anchor (layers: splat) lies beyond a section."""
+    model = obj.model
+    places = model.means if isinstance(model, SplatLayers) else model.anchors  # (A, 3) metres
+    planes = section.half_spaces_of(obj.world_from_object)
+    return 1 - kept_by(planes, section.edge, section.width_m, places)
 
 
 def covered(obj: SceneObject, selectors: Sequence[Selector]) -> np.ndarray:
@@ -60,10 +87,11 @@ def covered(obj: SceneObject, selectors: Sequence[Selector]) -> np.ndarray:
 
 def control_key(obj: SceneObject) -> tuple:
     """What control_of depends on; of one model, equal keys give equal control values."""
-    if not any(selector.space == "world" for selector in obj.selectors):
-        return obj.x, obj.selectors
+    beyond = beyond_sections(obj)
+    if not any(part.space == "world" for part in (*obj.selectors, *beyond)):
+        return obj.x, obj.selectors, beyond
     pose = obj.world_from_object
-    return obj.x, obj.selectors, (*pose.position, *pose.wxyz)
+    return obj.x, obj.selectors, beyond, (*pose.position, *pose.wxyz)
 
 
 def _in_space(places: np.ndarray, obj: SceneObject, space: str) -> np.ndarray:
@@ -128,10 +156,15 @@ class Sweep:
     playing: bool = False
     ease: str = "smooth"  # one of EASES
     mode: str = "ping-pong"  # one of MODES: back the same way, back in one leg, or ends there
+    by_date: bool = False  # legs take as long as their stops' dates are apart, leg_s in the mean
 
     @staticmethod
     def over(blend: StopBlend) -> "Sweep":
-        return Sweep(tuple(sorted({stop.x for stop in blend.stops})), blend)
+        """Through all stops; evenly in time, without rests, where all have dates."""
+        xs = tuple(sorted({stop.x for stop in blend.stops}))
+        if len(xs) < 3 or not all(stop.date for stop in blend.stops):
+            return Sweep(xs, blend)
+        return Sweep(xs, blend, rest_s=0.0, ease="even", by_date=True)
 
     @property
     def way(self) -> tuple[float, ...]:
@@ -142,9 +175,20 @@ class Sweep:
         return self.xs + back + self.xs[:1]
 
     @property
+    def legs(self) -> tuple[float, ...]:
+        """Seconds of each leg of the way, without the rest before it."""
+        way = self.way
+        dates = {s.x: seconds_of(s.date) for s in self.blend.stops if s.date}
+        if not self.by_date or not all(x in dates for x in way) or len(way) < 2:
+            return (self.leg_s,) * max(len(way) - 1, 0)
+        apart = [abs(dates[b] - dates[a]) for a, b in pairwise(way)]
+        return tuple(self.leg_s * len(apart) * each / sum(apart) for each in apart)
+
+    @property
     def period(self) -> float:
         """Seconds of one round; 0 when there is nowhere to go."""
-        return max(len(self.way) - 1, 0) * (self.leg_s + self.rest_s)
+        legs = self.legs
+        return sum(legs) + len(legs) * self.rest_s
 
     def play(self, control: Control) -> Control:
         """Starts there; returns where: the beginning when a single round was at its end."""
@@ -170,7 +214,7 @@ class Sweep:
         if not self.period > 0:
             return self.xs[0] if self.xs else 0.0
         leg, into = self._place()
-        part = EASES[self.ease][0](min(max((into - self.rest_s) / self.leg_s, 0.0), 1.0))
+        part = EASES[self.ease][0](min(max((into - self.rest_s) / self.legs[leg], 0.0), 1.0))
         return self.blend.between(self.way[leg], self.way[leg + 1], part)
 
     @property
@@ -201,7 +245,8 @@ class Sweep:
         passing = [i for i in range(count) if min(way[i : i + 2]) <= x <= max(way[i : i + 2])]
         leg = min(passing, key=preferred)
         part = EASES[self.ease][1](part_at(leg))
-        self.seconds = leg * (self.leg_s + self.rest_s) + self.rest_s + part * self.leg_s
+        before, legs = sum(self.legs[:leg]) + leg * self.rest_s, self.legs
+        self.seconds = before + self.rest_s + part * legs[leg]
 
     def _shows(self, one: Control, other: Control) -> bool:
         """Whether two controls look the same."""
@@ -212,8 +257,12 @@ class Sweep:
 
     def _place(self) -> tuple[int, float]:
         """The leg of the way it is on, and seconds since it began, with the rest before it."""
-        step = self.leg_s + self.rest_s
+        legs = self.legs
         if self.mode == "once" and self.seconds >= self.period:
-            return len(self.way) - 2, step
-        leg, into = divmod(self.seconds % self.period, step)
-        return min(int(leg), len(self.way) - 2), into
+            return len(legs) - 1, legs[-1] + self.rest_s
+        into = self.seconds % self.period
+        for leg, seconds in enumerate(legs[:-1]):
+            if into < seconds + self.rest_s:
+                return leg, into
+            into -= seconds + self.rest_s
+        return len(legs) - 1, into

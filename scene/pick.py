@@ -9,6 +9,7 @@ from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.rotation import rotation_matrices
 from shapeshift.scene.control import control_of
 from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.sections.cut import cuts_of, inside_of
 
 SIGMAS = 3.0  # farther from its mean a splat takes no light worth counting
 MIN_ALPHA = 1 / 255  # as in the drawing rule
@@ -62,9 +63,11 @@ class Picker:
                 continue
             object_from_world = np.linalg.inv(obj.world_from_object.matrix())
             eye = object_from_world[:3, :3] @ origin + object_from_world[:3, 3]
-            depth, alpha, met = along(
-                self._splats(index, obj, eye), eye, object_from_world[:3, :3] @ ray, spread
-            )
+            splats_now = self._splats(index, obj, eye)
+            depth, alpha, met = along(splats_now, eye, object_from_world[:3, :3] @ ray, spread)
+            for cut in cuts_of(obj.sections, obj.world_from_object):  # nobody meets what is cut
+                there = inside_of(cut.half_spaces, splats_now.means[met]) >= 0
+                depth, alpha, met = depth[there], alpha[there], met[there]
             depths.append(depth)
             alphas.append(alpha)
             owners.append(np.full(len(depth), index))

@@ -9,6 +9,7 @@ from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
 from shapeshift.scene.appearance import NEUTRAL, Appearance
 from shapeshift.scene.pose import UNIT_SLACK, Pose
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import Selector
 
 IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -36,6 +37,7 @@ class SceneObject:
     selectors: tuple[Selector, ...] = ()  # parts with an x of their own; a later one lies above
     tint: Tint | None = None  # no look of its own: which object it is, what of it is chosen
     appearance: Appearance = NEUTRAL  # what of its own look is shown how
+    sections: tuple[SceneSection, ...] = ()  # what of it is cut away, or at another x
 
     @property
     def seen(self) -> bool:
@@ -57,7 +59,8 @@ class SceneObject:
                 f"{_numbers_text(pose.wxyz)}; finite metres and a quaternion of length 1 "
                 "are wanted."
             )
-        for control in (self.x, *(selector.x for selector in self.selectors)):
+        beyond = (one.beyond for one in self.sections if one.beyond is not None)
+        for control in (self.x, *(selector.x for selector in self.selectors), *beyond):
             check_control(control, f"object '{self.name}'")
             if isinstance(control, StopWeights):
                 self.model.blend.weights(control)  # knows every stop

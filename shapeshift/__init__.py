@@ -48,6 +48,7 @@ _NAMES_OF = {
     "scene.pose": ("Pose", "View", "look_at", "perspective"),
     "scene.scene": ("SceneObject",),
     "scene.stereo": ("stereo_pair",),
+    "scene.sections.section": ("BoxShape", "PlaneShape", "SceneSection"),
     "scene.selectors.selector": ("Box", "HalfSpace", "Lens", "Sphere"),
 }
 _MODULE_OF = {name: module for module, names in _NAMES_OF.items() for name in names}

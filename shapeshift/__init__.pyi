@@ -46,6 +46,9 @@ from shapeshift.scene.pose import View as View
 from shapeshift.scene.pose import look_at as look_at
 from shapeshift.scene.pose import perspective as perspective
 from shapeshift.scene.scene import SceneObject as SceneObject
+from shapeshift.scene.sections.section import BoxShape as BoxShape
+from shapeshift.scene.sections.section import PlaneShape as PlaneShape
+from shapeshift.scene.sections.section import SceneSection as SceneSection
 from shapeshift.scene.selectors.selector import Box as Box
 from shapeshift.scene.selectors.selector import HalfSpace as HalfSpace
 from shapeshift.scene.selectors.selector import Lens as Lens

@@ -6,7 +6,16 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Debug, Opt
+from shapeshift.app.command_line import (
+    CONTROL,
+    EXPERT,
+    POSITIONAL,
+    REGIONS,
+    SECTIONS,
+    SIZE,
+    Debug,
+    Opt,
+)
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
@@ -77,6 +86,10 @@ class Options(ReadingOptions):
     """Regions with an X of their own (a stop's name or a number) and a soft border in metres:
     sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border] half:x,y,z:nx,ny,nz:X[:border]
     lens:degrees:X[:border].  A later one lies over an earlier one.  Default: none."""
+    section: Annotated[tuple[str, ...], SECTIONS] = ()
+    """Planes and boxes in the world that cut all objects: plane:nx,ny,nz,d keeps the places p with
+    n.p <= d, box:x,y,z:hx,hy,hz its inside; then :capped, :hard or :soft:WIDTH for the edge, and
+    :beyond=X to show another stop there (docs/scene.md).  Default: none."""
     show: Annotated[str, Opt(metavar="VIEW")] = "full"
     """Of a scene with objects: full, overlay (each object tinted), background (without objects),
     isolated (objects alone) or isolated:NAME (one of them)."""
@@ -114,7 +127,9 @@ def run(options: Options) -> int:
         make_folder,
         open_renderer,
         parse_size,
+        read_cuts,
         read_look,
+        sectioned,
         split_controls,
     )
     from shapeshift.app.errors import UsageError
@@ -135,6 +150,7 @@ def run(options: Options) -> int:
     count = len(cameras.views) if cameras else None
     choose_paths(options, [label_of(control) for control in controls], count)
     document, views, selectors = open_views(options, cameras, size)
+    cuts = read_cuts(options.section, document.models)
     subjects = [document_at(document, each) for each in controls]
     labels = [label_of(each, s.x) for each, s in zip(controls, subjects, strict=True)]
     rows, paths = choose_paths(options, labels, count)
@@ -152,10 +168,10 @@ def run(options: Options) -> int:
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
             if options.stereo_colors != "auto":
                 renderer.settings = replace(renderer.settings, stereo_colors=options.stereo_colors)
-        scenes = [with_selectors(shown[c], selectors[i]) for c, i in rows]
+        scenes = [sectioned(with_selectors(shown[c], selectors[i]), cuts) for c, i in rows]
         work = (renderer, scenes, [views[i] for _, i in rows], paths, options.stereo)
         if options.output == "picture":
-            draw_all(*work, *shapes_of(options, document, scenes, rows, selectors))
+            draw_all(*work, *shapes_of(options, document, cuts, rows, selectors))
         else:
             draw_outputs(*work, options.output, unit_of(options, document, views))
     say(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}")
@@ -324,16 +340,17 @@ def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
         raise UsageError(f"--select {error}") from None
 
 
-def shapes_of(options: Options, document: "Document", scenes: list, rows, selectors) -> tuple:
+def shapes_of(options: Options, document: "Document", cuts: tuple, rows, selectors) -> tuple:
     """The scenes whose shape is laid under each picture, and how much of it; () for none."""
     if not options.shape_of:
         return ()
     from shapeshift.app.decomposition.show_views import show_objects
-    from shapeshift.app.drawing import appearing, read_look
+    from shapeshift.app.drawing import appearing, read_look, sectioned
 
     shape = show_objects(document_at(document, options.shape_of, "--shape-of").scene, options.show)
     shape = appearing(shape, read_look(options)[0])
-    return [with_selectors(shape, selectors[i]) for _, i in rows], options.detail
+    scenes = [sectioned(with_selectors(shape, selectors[i]), cuts) for _, i in rows]
+    return scenes, options.detail
 
 
 def draw_all(

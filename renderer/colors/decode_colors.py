@@ -6,12 +6,13 @@ from shapeshift.renderer.colors.color_cache import color_key
 from shapeshift.renderer.colors.tint import tinted
 from shapeshift.renderer.colors.two_looks import Look
 from shapeshift.renderer.colors.wanted import wanted_anchors, wanted_of_follower
+from shapeshift.renderer.cut import place_splats, restore_shapes
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.scene.pose import View
-from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.scene import Scene
 
 
 def decode_colors(
@@ -45,20 +46,12 @@ def decode_colors(
             continue
         with tinted(drawing, i, obj, colored):
             if due and follows:
+                restore_shapes(drawing, i, decoded)
                 drawing.decode_geometry(i, decoded.x, eye, wanted)
                 ran[0] += 1
-                decoded.opacity = 1.0
-                scale_opacity(drawing, i, obj, decoded)
+                place_splats(drawing, i, obj, decoded)
             if due:
                 shade, grade = looks[i]
                 drawing.decode_color(i, shade, eye, wanted, at_once, grade)
                 ran[1] += 1
     return ran[0], ran[1]
-
-
-def scale_opacity(drawing: Drawing, i: int, obj: SceneObject, decoded: DecodedObject) -> None:
-    """Its splats as opaque as its appearance says; nothing where they are."""
-    opacity = obj.appearance.opacity
-    if decoded.opacity != opacity:
-        drawing.scale_opacity(i, opacity)
-        decoded.opacity = opacity

@@ -7,6 +7,7 @@ import numpy as np
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_weights import Controls, StopBlend
 from shapeshift.scene.appearance import Background, Color, Sky
+from shapeshift.scene.control import controls_within
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
@@ -126,14 +127,14 @@ def palette_between(name: str, ends: tuple[float, float]) -> np.ndarray:
 
 def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
     """(palette name, weight 0..1, stop) of the visible object that is nearest to a thermal stop, or
-    has a selector that is: what a legend tells.
+    has a part that is: what a legend tells.
 
     The weight is 1 at a thermal stop and falls to 0 at the next stop that is not thermal.
     Name "" (the stop's colours are final) and weight 0: nothing to do.
     """
     best: tuple[str, float, Stop | None] = ("", 0.0, None)
     for obj in scene.objects:
-        for x in (obj.x, *(selector.x for selector in obj.selectors)) if obj.seen else ():
+        for x in controls_within(obj) if obj.seen else ():
             weights, stop = thermal_weights(obj.model.blend, x)
             if stop is not None and weights[0] > best[1]:
                 best = (stop.palette, float(weights[0]), stop)

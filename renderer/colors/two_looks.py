@@ -18,6 +18,7 @@ from shapeshift.runtime_models.stop_weights import same_controls
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.control import control_of
 from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.sections.cut import cuts_of
 
 Look = tuple[Shade, Appearance | None]  # which colours are decoded, and how they are graded
 
@@ -33,6 +34,8 @@ def _alike(a: SceneObject, b: SceneObject) -> bool:
         return False
     matrices = (a.world_from_object.matrix(), b.world_from_object.matrix())
     if a.appearance.opacity != b.appearance.opacity or not np.array_equal(*matrices):
+        return False
+    if cuts_of(a.sections, a.world_from_object) != cuts_of(b.sections, b.world_from_object):
         return False
     return not shape_follows_control(a.model) or same_controls(control_of(a), control_of(b))
 

@@ -199,23 +199,24 @@ class Arena:
         if end > start:
             self.color.write(rows, offset=16 * start)
 
-    def read_opacity(self, i: int) -> np.ndarray:
-        """(n,) of object i."""
-        return self._mean_opacity_of(i)[:, 3]
+    def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """mean_opacity (n, 4) and covariance (n, 8) of object i."""
+        start, count = self.starts[i], self.starts[i + 1] - self.starts[i]
+        if not count:
+            return np.zeros((0, 4), np.float32), np.zeros((0, 8), np.float32)
+        parts = ((self.mean_opacity, 4), (self.covariance, 8))
+        data = [(b.read(4 * width * count, offset=4 * width * start), width) for b, width in parts]
+        places, shapes = (np.frombuffer(d, np.float32).reshape(-1, w).copy() for d, w in data)
+        return places, shapes
 
-    def write_opacity(self, i: int, opacity: np.ndarray) -> None:
-        """Other opacities (n,) of object i; its means stay."""
-        rows = self._mean_opacity_of(i)
-        rows[:, 3] = opacity
-        if len(rows):
-            self.mean_opacity.write(rows, offset=16 * self.starts[i])
-
-    def _mean_opacity_of(self, i: int) -> np.ndarray:
-        start, end = self.starts[i], self.starts[i + 1]
-        if end == start:
-            return np.zeros((0, 4), np.float32)
-        data = self.mean_opacity.read(16 * (end - start), offset=16 * start)
-        return np.frombuffer(data, np.float32).reshape(-1, 4).copy()
+    def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
+        """The inverse of `read_splats`; None: shapes stay."""
+        start, end = self._rows(i, mean_opacity, "places")
+        parts = ((self.mean_opacity, mean_opacity, 4), (self.covariance, covariance, 8))
+        for buffer, rows, width in parts if end > start else ():
+            if rows is not None:
+                data = np.ascontiguousarray(rows, np.float32)
+                buffer.write(data, offset=4 * width * start)
 
     def write_heat(self, i: int, heat: np.ndarray) -> None:
         """Uploads what thermal stops have in the colours of object i, (n, 4), to the set in use."""

@@ -57,7 +57,6 @@ class QuadsDrawing(Drawing):
         self._models: list[Model] = []
         self._most: list[float] = []  # brightest colour of each of these; []: not known yet
         self._grades: dict[int, Appearance | None] = {}  # of objects whose colours are graded
-        self._own_opacity: dict[int, np.ndarray] = {}  # as decoded, where the arena has others
         self._last = 0  # row of the counts of the view drawn last
         self.draws_heat = False  # in addition to the colours, from the next frame on
         self.arena: Arena  # these two from allocate() on
@@ -73,7 +72,7 @@ class QuadsDrawing(Drawing):
         self._release_arena()
         self._changed = True
         self._models, self._most = models, []
-        self._grades, self._own_opacity = {}, {}
+        self._grades = {}
         counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
         self.arena = Arena(self._gpu, counts, antialiased)
         self._decoder = Decoder(self._gpu, self.arena, models, self._mlps)
@@ -91,7 +90,6 @@ class QuadsDrawing(Drawing):
         seen: np.ndarray | None = None,
     ) -> None:
         self._changed = True
-        self._own_opacity.pop(i, None)
         self._decoder.geometry(i, x, eye_object, seen)
 
     def color_set(self, which: int, count: int) -> None:
@@ -109,10 +107,11 @@ class QuadsDrawing(Drawing):
         self._grades[i] = grade
         self._decoder.shade(i, shade, eye_object, seen, at_once, grade)
 
-    def scale_opacity(self, i: int, factor: float) -> None:
-        if i not in self._own_opacity:
-            self._own_opacity[i] = self.arena.read_opacity(i)
-        self.arena.write_opacity(i, self._own_opacity[i] * np.float32(factor))
+    def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        return self.arena.read_splats(i)
+
+    def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
+        self.arena.write_splats(i, mean_opacity, covariance)
         self._changed = True
 
     def wait_decoded(self) -> None:

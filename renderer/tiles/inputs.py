@@ -1,11 +1,19 @@
-"""Views, limits and backgrounds as rasterizer/ takes them."""
+"""Views, limits and backgrounds as rasterizer/ takes them; rows of its arrays, both ways."""
 
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.project_arena import Limits
 from shapeshift.rasterizer.resolve import Behind
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Background, Color, Sky, up_of_eye
 from shapeshift.scene.pose import View
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
 
 
 def behind(background: Background, view: View) -> Behind | Color:
@@ -31,3 +39,17 @@ def limits_of(settings: RenderSettings) -> Limits:
         settings.fade,
         settings.low_pass,
     )
+
+
+def read_rows(device: Device, rows: slice, *arrays: "Array") -> tuple[np.ndarray, ...]:
+    """Copies of the same rows of some arrays (N, w)."""
+    if rows.start == rows.stop:  # OpenCL has no buffers of nothing
+        return tuple(np.zeros((0, array.shape[1]), np.float32) for array in arrays)
+    return tuple(device.download(array[rows]).copy() for array in arrays)
+
+
+def write_rows(rows: slice, *pairs: "tuple[Array, np.ndarray | None]") -> None:
+    """Replaces these rows of arrays (N, w); None: they stay."""
+    for array, given in pairs if rows.start < rows.stop else ():
+        if given is not None:
+            array[rows].set(np.ascontiguousarray(given, np.float32))

@@ -33,7 +33,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.tiles.depth import depth_picture, surface_picture
-from shapeshift.renderer.tiles.inputs import behind, camera_of, limits_of
+from shapeshift.renderer.tiles.inputs import behind, camera_of, limits_of, read_rows, write_rows
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
@@ -55,8 +55,11 @@ class _Slot:
     evaluator: Evaluator
     sh: "Array | None"  # of coefficients; None: the colour comes from a network
     colors: ColorMemory
-    own_opacity: np.ndarray | None = None  # as decoded, where the arena has others
     placed: bool = False  # layers: the control value changes nothing but their opacity
+
+    @property
+    def rows(self) -> slice:
+        return slice(self.start, self.start + self.count)
 
 
 class TilesDrawing(Drawing):
@@ -122,7 +125,7 @@ class TilesDrawing(Drawing):
         seen: np.ndarray | None = None,
     ) -> None:
         slot = self._slots[i]
-        self._changed, slot.own_opacity = True, None
+        self._changed = True
         splats = slot.evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
         if slot.placed:
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
@@ -147,7 +150,7 @@ class TilesDrawing(Drawing):
         grade: Appearance | None = None,
     ) -> None:
         slot = self._slots[i]
-        rows = slice(slot.start, slot.start + slot.count)
+        rows = slot.rows
         if self._heats[self._set] is None and shade.heats:
             self._heats[self._set] = self.device.zeros((self.splats, 4))
         kept = self._heats[self._set]
@@ -171,19 +174,20 @@ class TilesDrawing(Drawing):
     ) -> None:
         """The colours of one object at x, as they are decoded."""
         if slot.sh is not None:
-            rows = slice(slot.start, slot.start + slot.count)
+            rows = slot.rows
             shade_sh(self.device, slot.sh, eye, rows, self._mean_opacity, self._color, seen)
         else:
             key = (self._set, part)
             pack_color(self.device, slot.colors.at(key, x, eye, seen), slot.start, self._color)
 
-    def scale_opacity(self, i: int, factor: float) -> None:
-        slot = self._slots[i]
-        if slot.own_opacity is None:
-            rows = slice(slot.start, slot.start + slot.count)
-            slot.own_opacity = self.device.download(self._mean_opacity[rows])[:, 3].copy()
-        scaled = slot.own_opacity * np.float32(factor)
-        pack_opacity(self.device, scaled, slot.start, self._mean_opacity)
+    def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        arrays = (self._mean_opacity, self._covariance)
+        mean_opacity, covariance = read_rows(self.device, self._slots[i].rows, *arrays)
+        return mean_opacity, covariance
+
+    def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
+        pairs = ((self._mean_opacity, mean_opacity), (self._covariance, covariance))
+        write_rows(self._slots[i].rows, *pairs)
         self._changed = True
 
     def wait_decoded(self) -> None:
@@ -346,18 +350,15 @@ class TilesDrawing(Drawing):
             pack_color(self.device, np.reshape(color, (self.splats, 3)), 0, each)
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
-        slot, heat = self._slots[i], self._heats[self._set]
-        rows = slice(slot.start, slot.start + slot.count)
-        if not slot.count:
-            return np.zeros((0, 3), np.float32), None
-        read = self.device.download
-        return read(self._color[rows])[:, :3].copy(), None if heat is None else read(heat[rows])
+        heat, rows = self._heats[self._set], self._slots[i].rows
+        (color,) = read_rows(self.device, rows, self._color)
+        kept = None if heat is None or not len(color) else read_rows(self.device, rows, heat)[0]
+        return color[:, :3], kept
 
     def replace_colors(self, i: int, color: np.ndarray, heat: np.ndarray | None) -> None:
-        start, kept = self._slots[i].start, self._heats[self._set]
-        pack_color(self.device, color, start, self._color)
-        if heat is not None and kept is not None and len(heat):
-            kept[start : start + len(heat)].set(np.ascontiguousarray(heat, np.float32))
+        pack_color(self.device, color, self._slots[i].start, self._color)
+        if (kept := self._heats[self._set]) is not None:
+            write_rows(self._slots[i].rows, (kept, heat))
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         if not self.splats:

@@ -15,6 +15,7 @@ from shapeshift.runtime_models.model import (
     Stop,
 )
 from shapeshift.runtime_models.package.package_files import FORMAT, FRAMES_FORMAT
+from shapeshift.runtime_models.stop_dates import check_dates
 from shapeshift.runtime_models.stop_weights import Pace
 
 LARGEST_COUNT = 4096  # splats an anchor, features, Gaussians of the encoding
@@ -117,16 +118,21 @@ def read_stops(entry: Fields) -> tuple[Stop, ...]:
     names = [stop.name for stop in stops]
     if len(set(names)) < len(names):
         raise BadFile(f"{entry.where}: two stops have one name in {shown(names)}.")
+    try:
+        check_dates(stops)
+    except ValueError as error:
+        raise BadFile(f"{entry.where}: {error}") from None
     return stops
 
 
 def read_stop(entry: Fields) -> Stop:
     name, x = entry.text("name"), entry.number("x", wanted="0 to 1", low=0, high=1)
     kind, palette = entry.line("kind", known=STOP_KINDS), entry.text("palette", "")
+    date = entry.line("date") if entry.has("date") else ""
     if not entry.has("value_range"):
-        return Stop(name, x, kind, palette)
+        return Stop(name, x, kind, palette, date=date)
     value_range = entry.pair("value_range", most=LARGEST_NUMBER)
-    return Stop(name, x, kind, palette, value_range, entry.text("unit", ""))
+    return Stop(name, x, kind, palette, value_range, entry.text("unit", ""), date)
 
 
 def read_pace(top: Fields, stops: set[str]) -> tuple[Pace, ...]:

@@ -19,11 +19,13 @@ from shapeshift.scene.document.scene_file import (
     SceneItem,
 )
 from shapeshift.scene.pose import Pose
+from shapeshift.scene.sections.section import SceneSection
 
 LONGEST_NAME = 100  # letters, as the reader takes them
 MOST_OBJECTS = 1000  # as the reader takes them
 MOST_VIEWS = 100  # as the reader takes them
 DECIMALS, FINER = 6, 9  # of metres and of a quaternion: hands are no finer, files are short
+MOST_SECTIONS = 16  # as the reader takes them
 MOST_STEPS = 500  # that can be undone
 MOST_BYTES = 256 << 20  # of what the steps keep besides the file: painted regions of large scenes
 
@@ -175,6 +177,17 @@ def set_appearance(file: SceneFile, name: str, appearance: Appearance) -> SceneF
     if name:
         return change(file, name, appearance=appearance)
     return file if appearance == file.appearance else replace(file, appearance=appearance)
+
+
+def set_sections(file: SceneFile, name: str, sections: tuple[SceneSection, ...]) -> SceneFile:
+    """With other sections of an object, or of the whole scene where the name is "".  ValueError
+    where there are too many.
+    """
+    if len(sections) > MOST_SECTIONS:
+        raise ValueError(f"There are {MOST_SECTIONS} sections, the most that a scene file has.")
+    if name:
+        return change(file, name, sections=sections)
+    return file if sections == file.sections else replace(file, sections=sections)
 
 
 def set_sky(file: SceneFile, sky: Sky | None) -> SceneFile:

@@ -21,6 +21,7 @@ from shapeshift.scene.document.scene_file import (
     SceneItem,
 )
 from shapeshift.scene.pose import UNIT_SLACK
+from shapeshift.scene.sections.section_rows import read_sections
 from shapeshift.scene.selectors.selector import Box, Selector, Sphere
 from shapeshift.scene.selectors.selector_rows import build, read_selector_row
 from shapeshift.scene.world.reactions import KINDS, Reaction, State, TwoAxes
@@ -49,6 +50,7 @@ def read_scene_file(path: str | Path) -> SceneFile:
     view = read_view(file.optional_object("view"))
     views = read_views(file)
     appearance, sky = read_appearance(file), read_sky(file)
+    sections = read_sections(file, ("world",))
     file.refuse_unknown_keys()
     items = tuple(read_item(row, path.name) for row in rows)
     names = [item.name for item in items]
@@ -66,6 +68,7 @@ def read_scene_file(path: str | Path) -> SceneFile:
         views=views,
         appearance=appearance,
         sky=sky,
+        sections=sections,
     )
 
 
@@ -115,6 +118,7 @@ def read_looks(row: Fields) -> dict:
         "visible": row.flag("visible", True),
         "appearance": read_appearance(row),
         "selectors": read_selectors(row),
+        "sections": read_sections(row),
         "collider": collider,
         "friction": row.number("friction", 0.6, "0 to 10", 0, FRICTION),
         "restitution": row.number("restitution", 0.0, "0 to 1", 0, RESTITUTION),

@@ -20,6 +20,7 @@ from shapeshift.scene.cameras.framing import frame_points, framing_view, scene_p
 from shapeshift.scene.orthographic import orthographic
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import UPRIGHT, Painted, Selector
 from shapeshift.scene.world.reactions import Machine, Reaction, State, TwoAxes
 
@@ -48,6 +49,7 @@ class SceneItem:
     visible: bool = True
     appearance: Appearance = NEUTRAL
     selectors: tuple[Selector, ...] = ()
+    sections: tuple[SceneSection, ...] = ()
     collider: str | None = None  # a mesh's path, HULLS, or None: nothing can touch it
     static: bool = False  # touched, but never moved
     mass_kg: float = 1.0
@@ -93,6 +95,7 @@ class SceneFile:
     view: FirstView | None = None
     views: tuple[NamedView, ...] = ()  # to go to by their names
     appearance: Appearance = NEUTRAL  # of all objects, after their own
+    sections: tuple[SceneSection, ...] = ()  # of all objects, in the world
     sky: Sky | None = None  # behind everything; None: what the model or the program has there
 
     @property
@@ -152,10 +155,7 @@ def read_models(
 
 def scene_of(file: SceneFile, models: Mapping[str, Model]) -> Scene:
     """What is drawn: every object with its model, where and how the file says.  Raises BadFile."""
-    appearance = file.appearance
-    return Scene(
-        tuple(object_of(item, models[item.name], i, appearance) for i, item in labelled(file))
-    )
+    return Scene(tuple(object_of(item, models[item.name], i, file) for i, item in labelled(file)))
 
 
 def labelled(file: SceneFile) -> list[tuple[int, SceneItem]]:
@@ -166,19 +166,24 @@ def labelled(file: SceneFile) -> list[tuple[int, SceneItem]]:
 
 def with_own_appearance(file: SceneFile) -> SceneFile:
     """The same scene, in which each object has what the file says of all of them, too."""
-    if file.appearance == NEUTRAL:
+    if file.appearance == NEUTRAL and not file.sections:
         return file
-    of_all, background = file.appearance, file.background
-    if background is not None:
-        background = replace(background, appearance=background.appearance.under(of_all))
-    items = tuple(replace(i, appearance=i.appearance.under(of_all)) for i in file.items)
-    return replace(file, items=items, background=background, appearance=NEUTRAL)
+
+    def own(item: SceneItem) -> SceneItem:
+        sections = (*item.sections, *file.sections)
+        return replace(item, appearance=item.appearance.under(file.appearance), sections=sections)
+
+    background = own(file.background) if file.background is not None else None
+    items = tuple(map(own, file.items))
+    return replace(file, items=items, background=background, appearance=NEUTRAL, sections=())
 
 
 def object_of(
-    item: SceneItem, model: Model, label: int, of_scene: Appearance = NEUTRAL
+    item: SceneItem, model: Model, label: int, file: SceneFile | None = None
 ) -> SceneObject:
-    """The object as it is drawn; of_scene: what the file says of all.  Raises BadFile."""
+    """The object as it is drawn, with what the file says of all.  Raises BadFile."""
+    of_scene = file.appearance if file is not None else NEUTRAL
+    cuts = file.sections if file is not None else ()
     count = len(model.means if isinstance(model, SplatLayers) else model.anchors)
     for selector in item.selectors:
         if isinstance(selector, Painted) and len(selector.weight) != count:
@@ -190,9 +195,25 @@ def object_of(
         return SceneObject(
             item.name, model, item.pose, item.x, label, item.visible, item.selectors,
             appearance=item.appearance.under(of_scene),
+            sections=sections_of(item, model, cuts),
         )  # fmt: skip
     except ValueError as error:  # a blend of stops that its model has not
         raise BadFile(f"object '{item.name}': 'x': {error}") from None
+
+
+def sections_of(
+    item: SceneItem, model: Model, of_scene: tuple[SceneSection, ...]
+) -> tuple[SceneSection, ...]:
+    """An object's own, then those of the scene; what shows stops beyond that the model has not is
+    for other objects.
+    """
+    names = {stop.name for stop in model.stops}
+
+    def known(one: SceneSection) -> bool:
+        blend = one.beyond
+        return not isinstance(blend, StopWeights) or {n for n, w in blend.parts if w} <= names
+
+    return (*item.sections, *filter(known, of_scene))
 
 
 def machine_of(item: SceneItem, model: Model) -> Machine:

@@ -10,6 +10,7 @@ from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.appearance import NEUTRAL
 from shapeshift.scene.document.appearance_rows import appearance_row, sky_row
 from shapeshift.scene.document.scene_file import FORMAT, HULLS, FirstView, SceneFile, SceneItem
+from shapeshift.scene.sections.section_rows import section_row
 from shapeshift.scene.selectors.selector_rows import selector_row
 from shapeshift.scene.world.reactions import Reaction
 
@@ -28,6 +29,8 @@ def write_scene_file(file: SceneFile, path: str | Path) -> None:
         out["appearance"] = appearance_row(file.appearance)
     if file.sky:
         out["sky"] = sky_row(file.sky)
+    if file.sections:
+        out["sections"] = [section_row(one, "world") for one in file.sections]
     if file.background:
         row = item_row(file.background, file, path.parent)
         out["background"] = {k: v for k, v in row.items() if k not in ("name", "static")}
@@ -65,6 +68,8 @@ def item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
         row["appearance"] = appearance_row(item.appearance)
     if item.selectors:
         row["selectors"] = [selector_row(selector) for selector in item.selectors]
+    if item.sections:
+        row["sections"] = [section_row(one, "object") for one in item.sections]
     if item.states:
         row["states"] = [{"name": state.name, "x": control_row(state.x)} for state in item.states]
     if item.reactions:

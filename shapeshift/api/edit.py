@@ -18,6 +18,7 @@ from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene as DrawnScene
 from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import Selector
 
 if TYPE_CHECKING:
@@ -103,6 +104,19 @@ def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayer
             np.zeros(len(splats.means), np.int32), stops[:1],
         )  # fmt: skip
     return join_layers(list(layers), stops, "exclusive", [])
+
+
+def sections_from(
+    sections: Sequence["str | SceneSection"], subject: Document
+) -> tuple[SceneSection, ...]:
+    """Sections of texts and of themselves.  Raises UsageError."""
+    from shapeshift.scene.sections.read_section import read_section
+
+    stops = stops_of(subject)
+    try:
+        return tuple(read_section(s, stops) if isinstance(s, str) else s for s in sections)
+    except ValueError as error:
+        raise UsageError(f"section {error}") from None
 
 
 def regions_of(

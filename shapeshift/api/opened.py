@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from shapeshift.api.arguments import DEFAULT_SIZE, X
-from shapeshift.api.edit import changed, describe, regions_of, stops_of
+from shapeshift.api.edit import changed, describe, regions_of, sections_from, stops_of
 from shapeshift.api.objects import SceneObjects
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
@@ -18,6 +18,7 @@ from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.document import edits
 from shapeshift.scene.scene import Scene as DrawnScene
 from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import Selector
 
 
@@ -248,5 +249,24 @@ class OpenedScene:
         chosen = regions_of(regions, obj.model, self._subject.view(DEFAULT_SIZE))
         objects = tuple(
             replace(each, selectors=chosen) if each is obj else each for each in self.objects
+        )
+        return self._with(replace(self._subject, scene=DrawnScene(objects)))
+
+    def with_sections(self, *sections: "str | SceneSection", name: str | None = None) -> Self:
+        """The scene cut by planes and boxes; none: by none.
+
+        A section is a SceneSection, or a text: "plane:1,0,0,0.2:soft:0.05" (normal, metres along
+        it, edge, width) or "box:0,0.4,0:0.5,0.3,0.5:beyond=Opened" (centre, half its sides,
+        what is shown outside).  All of them hold.  name: of the object that they cut, where it is
+        one alone; None: all.  Raises UsageError.
+
+            scene.with_sections("plane:1,0,0,0")
+            scene.with_sections(ss.SceneSection(shape=ss.PlaneShape((0, 1, 0), 0.5), beyond=1.0))
+        """
+        chosen = sections_from(sections, self._subject)
+        cut = self.objects if name is None else (self._one(name),)
+        objects = tuple(
+            replace(each, sections=chosen) if any(each is one for one in cut) else each
+            for each in self.objects
         )
         return self._with(replace(self._subject, scene=DrawnScene(objects)))

@@ -15,7 +15,7 @@ Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.
 ORDER = (
     "Scale", "Room", "Touch", "Stops", "Look", "Inspect", "Gallery", "Scenes", "Comfort", "Camera",
-    "Film", "Objects", "Parts", "Regions", "Export", "Settings", "Performance",
+    "Film", "Objects", "Parts", "Regions", "Sections", "Export", "Settings", "Performance",
 )  # fmt: skip
 
 

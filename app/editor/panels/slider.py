@@ -13,6 +13,7 @@ from shapeshift.app.editor.state.arrange import go_to_stop, steer_by_hand
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.track import Grip, Track, half_ways, read_x
 from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_dates import calendar_ticks
 from shapeshift.scene.control import SNAP
 
 Vec = imgui.ImVec2
@@ -22,6 +23,7 @@ VALUE, PACE, SPLIT = 54.0, 46.0, 30.0  # widths: the number, the seconds, the sp
 ROOMY = 380.0  # less than this in a row and the seconds are left to the panel's section Play
 KNOB_INKS = (theme.ACCENT, theme.SECOND)
 LINE = 0.68  # of a row's height: where the track runs, below the names of its stops
+DATE_ROOM = 6.0  # lines of text that a tick of the calendar has at the least
 KNOB, SLACK = 0.56, 0.2  # of a line of text: the knob's radius, and how far beside it it is taken
 
 
@@ -226,7 +228,8 @@ def _line(stops: Sequence[Stop], x: float, along: Track, y: float) -> None:
         (left, middle, theme.color(theme.ACCENT, 0.85)),
     ):
         draw.add_rect_filled(Vec(low, y - half), Vec(high, y + half), ink, half)
-    for tick in half_ways(stops):
+    dates = calendar_ticks(stops, round(along.width / (DATE_ROOM * line)))
+    for tick in [x for x, _ in dates] or half_ways(stops):
         at, tall = along.place(tick), line * 0.3
         ink = theme.color(theme.MUTED)
         draw.add_line(Vec(at, y - tall), Vec(at, y + tall), ink, max(1.0, line / 12))
@@ -243,11 +246,15 @@ def _knob(place: float, y: float, radius: float, ink: tuple[float, float, float]
 def _stop_names(
     stops: Sequence[Stop], xs: Sequence[float], along: Track, corner: imgui.ImVec2
 ) -> int | None:
-    """A name above each stop, lit where a knob is; returns the number of the one clicked."""
+    """A name above each stop, lit where a knob is; returns the number of the one clicked.
+
+    Where stops have dates, those of a calendar stand where names leave room.
+    """
     draw = imgui.get_window_draw_list()
     line = imgui.get_text_line_height()
     low, high = along.left - KNOB * line, along.left + along.width + KNOB * line
     last_right = low - line  # names that would overlap the one before are left out
+    taken: list[tuple[float, float]] = []  # from where to where a word stands
     clicked = None
     for number, stop in enumerate(sorted(stops, key=lambda stop: stop.x)):
         size = imgui.calc_text_size(stop.name)
@@ -263,4 +270,11 @@ def _stop_names(
         on = [ink for x, ink in zip(xs, KNOB_INKS, strict=False) if abs(stop.x - x) < 1e-3]
         ink = theme.color(theme.ACCENT if hovered else (on or [theme.TEXT])[0])
         draw.add_text(Vec(left, corner.y), ink, stop.name)
+        taken.append((left, left + size.x))
+    for x, words in calendar_ticks(stops, round(along.width / (DATE_ROOM * line))):
+        wide = imgui.calc_text_size(words).x
+        left = min(max(along.place(x) - wide / 2, low), high - wide)
+        if all(left > b + line * 0.5 or left + wide < a - line * 0.5 for a, b in taken):
+            draw.add_text(Vec(left, corner.y), theme.color(theme.MUTED), words)
+            taken.append((left, left + wide))
     return clicked

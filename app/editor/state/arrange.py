@@ -16,7 +16,13 @@ from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.control import Shift, Sweep
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.edits import Change, History
-from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled, object_of
+from shapeshift.scene.document.scene_file import (
+    SceneFile,
+    SceneItem,
+    labelled,
+    object_of,
+    sections_of,
+)
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 
@@ -103,6 +109,8 @@ def arrange(state: EditorState, changed: Sequence[Change]) -> None:
         else:
             obj = changed_object(state.scene.objects[index], item, change)
             obj = appearing(obj, item, state.edited.file)
+            cuts = sections_of(item, obj.model, state.edited.file.sections)
+            obj = obj if obj.sections == cuts else replace(obj, sections=cuts)
             rows.append((obj, state.filed[index], state.sweeps[index], state.sources[index]))
             moved[index] = number
     state.reorder_rows(rows, moved)
@@ -121,8 +129,7 @@ def fresh_row(
 ) -> tuple[SceneObject, object, Sweep, Source]:
     """What the state holds of an object that was not there."""
     source = state.edited.source(item)
-    of_scene = state.edited.file.appearance
-    obj = object_of(item, state.in_palette(source.model), label, of_scene)
+    obj = object_of(item, state.in_palette(source.model), label, state.edited.file)
     sweep = Sweep.over(source.model.blend)
     sweep.resume_at(item.x)
     return obj, source.model, sweep, source

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_dates import x_of_date
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
 from shapeshift.scene.control import SNAP, snap
 
@@ -113,11 +114,16 @@ def stepped(x: float, steps: int) -> float:
 
 
 def read_x(text: str, stops: Sequence[Stop]) -> float:
-    """x of what was typed: a number from 0 to 1, or a stop's name.  ValueError, one sentence."""
+    """x of what was typed: a number from 0 to 1, a stop's name, or a date where stops have dates.
+
+    ValueError, one sentence.
+    """
     word = text.strip()
     named = {stop.name.casefold(): stop.x for stop in reversed(stops)}  # the first of a ring's ends
     if word.casefold() in named:
         return named[word.casefold()]
+    if word[4:5] == "-" and any(stop.date for stop in stops):
+        return x_of_date(word, stops)
     try:
         x = float(word.replace(",", "."))
     except ValueError:

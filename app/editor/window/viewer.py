@@ -43,6 +43,7 @@ from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
 from shapeshift.app.editor.window.parts import attach_parts
 from shapeshift.app.editor.window.pictures import write_numbered_png, write_png
+from shapeshift.app.editor.window.sections.section_handles import attach_sections
 from shapeshift.app.editor.window.shell import Shell
 from shapeshift.app.editor.window.shown import FrameRequest, Shown
 from shapeshift.app.editor.window.touch import attach_touch
@@ -96,6 +97,7 @@ class Viewer:
         self.films = attach_films(window, state, self.viewpoint, *more)
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
+        self.sections = attach_sections(window, state, self.viewpoint, self.hooks)
         seen = Seen(
             renderer, self.shown.forget, lambda: self._moving, lambda: self.layout,
             lambda: self.settings.temperature,

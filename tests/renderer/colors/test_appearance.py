@@ -87,7 +87,7 @@ def test_neutral_is_the_frame_without_to_the_bit_and_runs_nothing(renderer, monk
     drawn(renderer, replace(obj, appearance=Appearance(1.0, 2.0, (0.1, 0.2, 0.3), 0.4)))
     np.testing.assert_array_equal(drawn(renderer, obj), plain)
     scaled, graded, decode = [], [], renderer.drawing.decode_color
-    monkeypatch.setattr(renderer.drawing, "scale_opacity", lambda *values: scaled.append(values))
+    monkeypatch.setattr(renderer.drawing, "write_splats", lambda *values: scaled.append(values))
     monkeypatch.setattr(
         renderer.drawing, "decode_color", lambda *a: (graded.append(a[5]), decode(*a))
     )

@@ -21,6 +21,7 @@ SAYING: dict[str, tuple[int, ...] | None] = {
 # Tables of texts that functions are handed: what of a dictionary is a text, by module.
 KEYS, VALUES, ALL = "keys", "values", "all"
 TABLES = {
+    "cuts_panel": {"ADD": ALL, "EDGES": VALUES},
     "empty_panel": {"CHOICES": ALL, "WHAT": ALL},
     "keys_sheet": {"GROUPS": ALL},
     "open_row": {"NEW": ALL},
@@ -58,8 +59,8 @@ HEADSET_TABLES = {
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
 # of app/editor/window: KEYS of the sheet
 KEY_TABLES = (
-    "devices.gamepads", "devices.space_mice", "inspection.mouse_marks", "objects", "parts", "split",
-    "touch", "wipe",
+    "devices.gamepads", "devices.space_mice", "inspection.mouse_marks", "objects", "parts",
+    "sections.section_handles", "split", "touch", "wipe",
 )  # fmt: skip
 STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
 LETTERS = re.compile(r"[A-Za-z]{2}")

@@ -103,6 +103,9 @@ def _sweep(state: EditorState, index: int, ui_scale: float) -> None:
     )
     tip("How speed changes on the way from one stop to the next.", ui_scale)
     imgui.pop_item_width()
+    if any(stop.date for stop in state.stops(index)):
+        _, sweep.by_date = imgui.checkbox(item_label("even in time"), sweep.by_date)
+        tip("Ways take as long as the dates of their stops are apart.", ui_scale)
     _visited(state, index, sweep, ui_scale)
 
 

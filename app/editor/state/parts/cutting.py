@@ -21,7 +21,9 @@ from shapeshift.runtime_models.shapes import four, three
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneFile, SceneItem
 from shapeshift.scene.pick import anchor_places
-from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import IDENTITY, SceneObject
+from shapeshift.scene.sections.section import SceneSection, moved_shape
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Painted, Selector, Sphere
 
 STRAYS = 1.0  # percent of the anchors of a scene that may lie below its floor
@@ -116,6 +118,7 @@ def without_pieces(
     rest = replace(
         item, model=piece.name, part=None, placed=True, **standing(obj, place),
         selectors=split_selectors(item.selectors, kept, place),
+        sections=split_sections(item.sections, place),
     )  # fmt: skip
     alone = len(file.all_items) == 1 and not (item.reactions or item.states or item.two_axes)
     becomes = item is file.background or (has_objects and alone)
@@ -185,7 +188,21 @@ def item_of_piece(
         visible=pick.visible and obj.visible,
         appearance=item.appearance,
         selectors=split_selectors(item.selectors, pick.rows, place),
+        sections=split_sections(item.sections, place),
         collider=pick.collider,
+    )
+
+
+def split_sections(
+    sections: tuple[SceneSection, ...], place: np.ndarray
+) -> tuple[SceneSection, ...]:
+    """Those of an object for a piece of it, whose frame begins at `place` (3,)."""
+    piece_from_object = Pose(-place, IDENTITY.wxyz)
+    return tuple(
+        replace(one, shape=moved_shape(one.shape, piece_from_object))
+        if one.space == "object"
+        else one
+        for one in sections
     )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.state.arrange import place, redo, undo
+from shapeshift.app.editor.state.arrange import edit, place, redo, undo
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source, read_files
@@ -21,8 +21,11 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, HULLS
 from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import IDENTITY
+from shapeshift.scene.sections.section import PlaneShape, SceneSection
 from tests.support.desktop.desktop_stand import ball
 from tests.support.models import make_random_model
 from tests.support.splat_scenes import front_view
@@ -251,6 +254,29 @@ def test_regions_stay_where_they_were(state):
     assert [(r.kind, r.index) for r in state.regions.items] == [("painted", 0), ("sphere", 0)]
     np.testing.assert_array_equal(picture(state), before)
     assert isinstance(state.regions.items[0], Region)
+
+
+def test_sections_stay_where_they_were(state):
+    """A piece's frame begins elsewhere; its sections cut the same places of the world."""
+    section = SceneSection(shape=PlaneShape((0.6, 0.8, 0.0), 0.1), space="object")
+    name = state.scene.objects[0].name
+    edit(state, edits.set_sections(state.edited.file, name, (section,)), "add a section")
+    edit(
+        state, edits.set_sections(state.edited.file, "", (replace(section, space="world"),)), "add"
+    )
+    world = [one.half_spaces_of(IDENTITY) for one in state.scene.objects[0].sections]
+    make_object(state, 0, np.arange(COUNT) < 20, "part")
+    assert len(state.scene.objects) == 2
+    for obj in state.scene.objects:
+        matrix = obj.world_from_object.matrix()
+        for one, before in zip(obj.sections, world, strict=True):
+            (*normal, offset), (*wanted, at) = (
+                one.half_spaces_of(obj.world_from_object)[0],
+                before[0],
+            )
+            turned = matrix[:3, :3] @ normal
+            assert turned == pytest.approx(wanted, abs=1e-9)
+            assert offset + turned @ matrix[:3, 3] == pytest.approx(at, abs=1e-6)
 
 
 def test_plain_splats_are_cut_and_saved(tmp_path):
