@@ -1,0 +1,121 @@
+"""Where the later scene's world lies in the earlier one's: the same, near it, or looked for."""
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.app.change.draw_pairs import Progress, Visit, draw_side, rings_around
+from shapeshift.renderer.colors.palette import LUMINANCE
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.colmap_child import run_child
+from shapeshift.scene.change.seen_pair import SeenSide, edge_pixels
+from shapeshift.scene.change.similarity import Registration, Similarity, fit_surfaces
+from shapeshift.scene.inspection.value_picture import world_points
+from shapeshift.scene.pose import View
+
+if TYPE_CHECKING:
+    from shapeshift.renderer.renderer import Renderer
+
+SCRIPT = Path(__file__).with_name("match_run.py")
+FAILURE = "matching the two scenes ended with code {code}, perhaps for want of memory."
+SIZE = (320, 240)
+POINTS = 20_000  # of each surface, at most
+SHARED = 0.5  # of each surface that must lie on the other's
+OVERLAP = 0.6  # of the surfaces that lie together already: then nothing is looked for
+RESIDUAL = 0.012  # of the radius, that is allowed between them
+ERROR = 0.03  # of the radius, of a match
+INLIERS = 20  # matches that agree
+
+
+def register(
+    renderer: "Renderer",
+    before: Visit,
+    after: Visit,
+    names: tuple[str, str],
+    progress: Progress,
+) -> Registration:
+    """A's world from B's.  Raises BadFile, one sentence, where the scenes do not fit together.
+
+    Worlds that lie together already stay as they are unless closest points move them farther than
+    they are apart; else features of drawn pictures are matched, and closest points make it exact.
+    """
+    views_a, sides_a = _drawn(renderer, before, "A", progress)
+    views_b, sides_b = _drawn(renderer, after, "B", progress)
+    a, b = surface_of(views_a, sides_a), surface_of(views_b, sides_b)
+    for name, points in zip(names, (a, b), strict=True):
+        if len(points) < 100:
+            raise BadFile(f"{name} shows next to nothing from around it; nothing can be compared.")
+    radius = before.document.bounds()[1]
+    progress("laying both worlds together", 0.0)
+    identity = Similarity.identity()
+    found, residual, shared = fit_surfaces(a, b, identity, radius, scaled=False)
+    plain = fit_surfaces(a, b, identity, radius, scaled=False, rounds=0)
+    if plain[2] >= OVERLAP and shared >= OVERLAP and residual <= RESIDUAL * radius:
+        step = float(np.median(np.linalg.norm(found.apply(b) - b, axis=1)))
+        if step <= max(plain[1], residual):
+            return Registration(identity, "common", *plain[1:])
+        return Registration(found, "icp", residual, shared)
+    progress("matching features", 0.0)
+    start = _by_features(views_a, sides_a, views_b, sides_b, radius, names)
+    found, residual, shared = fit_surfaces(a, b, start, radius, scaled=True)
+    if not (shared >= SHARED and residual <= RESIDUAL * radius):
+        raise BadFile(
+            f"{names[1]} does not fit {names[0]}: {100 * shared:.0f} % of their surfaces lie "
+            f"together, {100 * residual:.1f} cm apart; {100 * SHARED:.0f} % and "
+            f"{100 * RESIDUAL * radius:.1f} cm are wanted; pose both captures together."
+        )
+    return Registration(found, "features", residual, shared)
+
+
+def _drawn(
+    renderer: "Renderer", visit: Visit, what: str, progress: Progress
+) -> tuple[list[View], list[SeenSide]]:
+    views = rings_around(*visit.document.bounds(), SIZE)
+    return views, draw_side(renderer, visit, views, Similarity.identity(), False, what, progress)
+
+
+def surface_of(views: list[View], sides: list[SeenSide]) -> np.ndarray:
+    """(n, 3) metres: what the views see, evenly thinned."""
+    parts = []
+    for view, side in zip(views, sides, strict=True):
+        parts.append(_places(view, side)[~edge_pixels(side.depth_m)])
+    points = np.concatenate(parts)
+    rows = np.random.default_rng(0).permutation(len(points))[:POINTS]
+    return points[np.sort(rows)]
+
+
+def _places(view: View, side: SeenSide) -> np.ndarray:
+    """(H, W, 3) metres, NaN where nothing is."""
+    height, width = side.depth_m.shape
+    rows, columns = np.mgrid[:height, :width] + 0.5
+    return world_points(view, np.stack([columns, rows], axis=2), side.depth_m)
+
+
+def _by_features(
+    views_a: list[View], sides_a: list[SeenSide], views_b: list[View], sides_b: list[SeenSide],
+    radius: float, names: tuple[str, str],
+) -> Similarity:  # fmt: skip
+    """Roughly A's world from B's.  Raises BadFile."""
+    arrays: dict[str, np.ndarray] = {"error_m": np.array(ERROR * radius),
+                                     "counts": np.array([len(views_a), len(views_b)])}  # fmt: skip
+    for side, views, seen in (("a", views_a, sides_a), ("b", views_b, sides_b)):
+        for i, (view, each) in enumerate(zip(views, seen, strict=True)):
+            gray = (each.color * each.coverage[..., None]) @ LUMINANCE
+            arrays[f"{side}{i}"] = (np.clip(gray, 0, 1) * 255 + 0.5).astype(np.uint8)
+            arrays[f"p{side}{i}"] = _places(view, each).astype(np.float32)
+    with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
+        given, wanted = Path(folder, "pictures.npz"), Path(folder, "found.npz")
+        np.savez(given, **arrays)
+        log = Path(folder, "log.txt")
+        run_child(SCRIPT, [str(given), str(wanted)], log, lambda *_: None, FAILURE)
+        with np.load(wanted) as file:
+            matrix, inliers, matches = file["matrix"], int(file["inliers"]), int(file["matches"])
+    if not (inliers >= INLIERS and np.isfinite(matrix).all()):
+        raise BadFile(
+            f"{names[0]} and {names[1]} share too little: {inliers} of {matches} matches agree on "
+            f"one place, {INLIERS} are wanted; pose both captures together, in one world."
+        )
+    scale = float(np.cbrt(np.linalg.det(matrix[:, :3])))
+    return Similarity(matrix[:, :3] / scale, matrix[:, 3], scale)
