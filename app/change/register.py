@@ -34,22 +34,30 @@ def register(
     before: Visit,
     after: Visit,
     names: tuple[str, str],
+    views: list[View] | None,
     progress: Progress,
 ) -> Registration:
     """A's world from B's.  Raises BadFile, one sentence, where the scenes do not fit together.
 
     Worlds that lie together already stay as they are unless closest points move them farther than
     they are apart; else features of drawn pictures are matched, and closest points make it exact.
+    views: of A's world; None: from all around each.
     """
-    views_a, sides_a = _drawn(renderer, before, "A", progress)
-    views_b, sides_b = _drawn(renderer, after, "B", progress)
-    a, b = surface_of(views_a, sides_a), surface_of(views_b, sides_b)
+    origins = [np.asarray(each.document.origin) for each in (before, after)]
+    identity = Similarity(np.eye(3), origins[1] - origins[0])  # one world, each from its own zero
+    of_a = views or rings_around(*before.document.bounds(), SIZE)
+    of_b = rings_around(*after.document.bounds(), SIZE)
+    if views is not None:
+        of_b = [identity.view_in_b(view) for view in views]
+    itself = Similarity.identity()
+    sides_a = draw_side(renderer, before, of_a, itself, False, "A", progress)
+    sides_b = draw_side(renderer, after, of_b, itself, False, "B", progress)
+    a, b = surface_of(of_a, sides_a), surface_of(of_b, sides_b)
     for name, points in zip(names, (a, b), strict=True):
         if len(points) < 100:
             raise BadFile(f"{name} shows next to nothing from around it; nothing can be compared.")
     radius = before.document.bounds()[1]
     progress("laying both worlds together", 0.0)
-    identity = Similarity.identity()
     found, residual, shared = fit_surfaces(a, b, identity, radius, scaled=False)
     plain = fit_surfaces(a, b, identity, radius, scaled=False, rounds=0)
     if plain[2] >= OVERLAP and shared >= OVERLAP and residual <= RESIDUAL * radius:
@@ -58,7 +66,7 @@ def register(
             return Registration(identity, "common", *plain[1:])
         return Registration(found, "icp", residual, shared)
     progress("matching features", 0.0)
-    start = _by_features(views_a, sides_a, views_b, sides_b, radius, names)
+    start = _by_features(of_a, sides_a, of_b, sides_b, radius, names)
     found, residual, shared = fit_surfaces(a, b, start, radius, scaled=True)
     if not (shared >= SHARED and residual <= RESIDUAL * radius):
         raise BadFile(
@@ -67,13 +75,6 @@ def register(
             f"{100 * RESIDUAL * radius:.1f} cm are wanted; pose both captures together."
         )
     return Registration(found, "features", residual, shared)
-
-
-def _drawn(
-    renderer: "Renderer", visit: Visit, what: str, progress: Progress
-) -> tuple[list[View], list[SeenSide]]:
-    views = rings_around(*visit.document.bounds(), SIZE)
-    return views, draw_side(renderer, visit, views, Similarity.identity(), False, what, progress)
 
 
 def surface_of(views: list[View], sides: list[SeenSide]) -> np.ndarray:

@@ -31,7 +31,7 @@ class ChangeSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class ChangedPlace:
     """Where something changed.  Metres in the world of the earlier scene."""
 
     kind: str  # one of KINDS
@@ -39,6 +39,7 @@ class Place:
     area_m2: float  # of its surface that was seen
     amount: float  # metres moved; metres to the nearest surface; values; Lab
     unit: str
+    level: float = np.nan  # the values there now, of places that are hotter or colder
     before: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (n, 3) of a moved one
     number: int = 0  # from 1 on, by size
 
@@ -69,7 +70,7 @@ class Place:
 
 def find_places(
     before: Cells, after: Cells, settings: ChangeSettings, unit: str = ""
-) -> list[Place]:
+) -> list[ChangedPlace]:
     """All places, the largest surface first.  unit: of the values."""
     gone, new = ((c.through >= THROUGH) & (c.away_m >= settings.least_m) for c in (before, after))
     vanished = [_Part(before, rows) for rows in parts(before.points, gone, settings)]
@@ -79,7 +80,7 @@ def find_places(
         kind = "appeared" if part.cells is after else "vanished"
         away = part.cells.away_m[part.rows]
         amount = float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else np.inf
-        places.append(Place(kind, part.points, part.area_m2(settings), amount, "m"))
+        places.append(ChangedPlace(kind, part.points, part.area_m2(settings), amount, "m"))
     zone = inside_any(after.points, [p.points for p in (*vanished, *appeared)], settings)
     still = after.through < THROUGH
     with np.errstate(invalid="ignore"):
@@ -95,8 +96,9 @@ def find_places(
                 change, said = color_distance(after.color_change[rows]), "Lab"
             else:
                 change, said = -after.value_change[rows], unit
-            amount = float(np.median(change))
-            places.append(Place(kind, part.points, part.area_m2(settings), amount, said))
+            amount, area = float(np.median(change)), part.area_m2(settings)
+            level = np.nan if kind == "recoloured" else float(np.median(after.value[rows]))
+            places.append(ChangedPlace(kind, part.points, area, amount, said, level))
     places.sort(key=lambda place: -place.area_m2)
     return [replace(place, number=i) for i, place in enumerate(places, 1)]
 
@@ -164,7 +166,7 @@ class _Part:
 
 def pair_moved(
     vanished: list[_Part], appeared: list[_Part], settings: ChangeSettings
-) -> tuple[list[Place], list[_Part]]:
+) -> tuple[list[ChangedPlace], list[_Part]]:
     """Moved things, and what is left: what vanished at one place and appeared at another, as large,
     of the same colours, and of the same shape after a turn about the vertical.
     """
@@ -186,7 +188,7 @@ def pair_moved(
         used[0].add(i)
         used[1].add(j)
         gone, new = vanished[i].points, appeared[j].points
-        place = Place("moved", new, appeared[j].area_m2(settings), 0.0, "m", gone)
+        place = ChangedPlace("moved", new, appeared[j].area_m2(settings), 0.0, "m", before=gone)
         places.append(replace(place, amount=float(np.linalg.norm(place.shift))))
     left = [part for i, part in enumerate(vanished) if i not in used[0]]
     left += [part for j, part in enumerate(appeared) if j not in used[1]]
