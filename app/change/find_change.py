@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.app.change.draw_pairs import Progress, Visit, draw_pairs, rings_around
 from shapeshift.app.change.register import register
 from shapeshift.app.errors import UsageError
-from shapeshift.scene.change.cells import Cells, cells_of
+from shapeshift.scene.change.cells import SurfaceCells, cells_of
 from shapeshift.scene.change.places import ChangedPlace, ChangeSettings, find_places
 from shapeshift.scene.change.seen_pair import SeenPair, samples_of
 from shapeshift.scene.change.similarity import Registration
@@ -38,7 +38,9 @@ class ChangeChoice:
                 raise UsageError(f"the {name} is {value:g} m; 0 (by the scene) or more is wanted.")
         for name, value in (("value", self.least_value), ("colour", self.least_color)):
             if not 0 < value < np.inf:
-                raise UsageError(f"the least {name} that counts is {value:g}; more than 0 is wanted.")
+                raise UsageError(
+                    f"the least {name} that counts is {value:g}; more than 0 is wanted."
+                )
         cell = self.cell_m or radius / CELLS
         return ChangeSettings(
             cell, self.least_m or APART * cell, self.least_value, self.least_color
@@ -46,11 +48,8 @@ class ChangeChoice:
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
-    """What two visits differ in.
-
-    Places are metres in the world of the earlier scene's file.
-    """
+class SceneChange:
+    """What two visits differ in; places are in metres of the earlier scene as it is opened."""
 
     places: tuple[ChangedPlace, ...]
     registration: Registration
@@ -62,12 +61,12 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class FoundChange:
-    """The same with what pictures and layers are made of; its places lie in A's own metres."""
+    """The same with what pictures and layers are made of."""
 
-    change: Change
+    change: SceneChange
     before: Visit
     after: Visit
-    cells: tuple[Cells, Cells]  # of before and after
+    cells: tuple[SurfaceCells, SurfaceCells]  # of before and after
     pairs: list[SeenPair]
 
 
@@ -101,7 +100,7 @@ def find_change(
     change = cells[1].value_change
     known = change[np.isfinite(change)]
     overall = -float(np.median(known)) if len(known) else float("nan")
-    found = Change(tuple(places), registration, settings, unit, compared, overall)
+    found = SceneChange(tuple(places), registration, settings, unit, compared, overall)
     return FoundChange(found, before, after, cells, pairs)
 
 

@@ -19,7 +19,7 @@ from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_spl
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.write_plain import merged
 from shapeshift.scene.cameras.framing import default_view
-from shapeshift.scene.change.cells import Cells
+from shapeshift.scene.change.cells import SurfaceCells
 from shapeshift.scene.change.places import color_distance
 from shapeshift.scene.change.similarity import Similarity
 
@@ -99,7 +99,7 @@ def measures(found: FoundChange, means: np.ndarray) -> list[tuple[str, str, np.n
     ]
 
 
-def shape_change(cells: Cells, found: FoundChange) -> np.ndarray:
+def shape_change(cells: SurfaceCells, found: FoundChange) -> np.ndarray:
     """(m,) metres to the other visit's surface where that sees through, else 0."""
     reach = found.before.document.bounds()[1]
     return np.where(cells.through >= 0.5, np.minimum(cells.away_m, reach), 0.0)
@@ -113,7 +113,9 @@ def spread(points: np.ndarray, values: np.ndarray, means: np.ndarray, cell_m: fl
     if not good.any():
         return np.zeros(len(means))
     values = values[good]
-    away, near = cKDTree(points[good]).query(means, k=min(4, len(values)), distance_upper_bound=NEAR * cell_m)
+    away, near = cKDTree(points[good]).query(
+        means, k=min(4, len(values)), distance_upper_bound=NEAR * cell_m
+    )
     away, near = away.reshape(len(means), -1), near.reshape(len(means), -1)
     held = np.where(np.isfinite(away), values[np.minimum(near, len(values) - 1)], np.nan)
     known = np.isfinite(held).any(axis=1)

@@ -1,8 +1,9 @@
 """A process of its own for where one world lies in another: `python -P match_run.py IN OUT`.
 
 SIFT features (Lowe 2004) of pictures that were drawn of two scenes, each of one with each of the
-other, matched by pycolmap; the places that they show in both worlds give the similarity by LO-RANSAC
-(Chum et al. 2003), one thread, the same every time.  See colmap_child.py for why it is a process.
+other, matched by pycolmap; the places that they show in both worlds give the similarity by
+LO-RANSAC (Chum et al. 2003), one thread, the same every time.  See colmap_child.py for why it is a
+process.
 
 Reads: IN.npz with a0 a1 ... b0 b1 ... (H, W) uint8, pa0 ... pb0 ... (H, W, 3) places in metres, NaN
 where nothing is, error_m and counts (2,), how many of each.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.app.change.draw_pairs import Progress
-from shapeshift.app.change.find_change import Change, FoundChange
+from shapeshift.app.change.find_change import FoundChange, SceneChange
 from shapeshift.app.change.layers import write_layers
 from shapeshift.app.change.pictures import pictures_of, words
 from shapeshift.app.errors import UsageError
@@ -45,7 +45,7 @@ def finite(value: float, digits: int) -> float | None:
     return round(float(value), digits) if np.isfinite(value) else None
 
 
-def change_rows(change: Change, names: tuple[str, str], origin: np.ndarray) -> dict:
+def change_rows(change: SceneChange, names: tuple[str, str], origin: np.ndarray) -> dict:
     """All as JSON has it."""
     found = change.registration
     a_from_b = np.eye(4)
@@ -68,7 +68,7 @@ def change_rows(change: Change, names: tuple[str, str], origin: np.ndarray) -> d
     }
 
 
-def csv_text(change: Change, origin: np.ndarray) -> str:
+def csv_text(change: SceneChange, origin: np.ndarray) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -76,7 +76,7 @@ def csv_text(change: Change, origin: np.ndarray) -> str:
     return text.getvalue()
 
 
-def registration_words(change: Change) -> str:
+def registration_words(change: SceneChange) -> str:
     """One sentence."""
     found = change.registration
     how = {
@@ -92,7 +92,7 @@ def registration_words(change: Change) -> str:
     )
 
 
-def print_places(change: Change, origin: np.ndarray) -> None:
+def print_places(change: SceneChange, origin: np.ndarray) -> None:
     """The table on standard output."""
     from rich.table import Table
     from rich.text import Text
@@ -159,7 +159,7 @@ def write_change(
     write_whole(folder / JSON, text.encode())
 
 
-def marks_of(change: Change, origin: np.ndarray) -> MarksFile:
+def marks_of(change: SceneChange, origin: np.ndarray) -> MarksFile:
     """A box a place, in the world of A's file."""
     room = change.settings.cell_m
     marks = []

@@ -44,10 +44,7 @@ def words(place: ChangedPlace) -> str:
 def pictures_of(
     renderer: "Renderer", found: FoundChange, place: ChangedPlace, progress: Progress
 ) -> np.ndarray:
-    """(H, 3 W, 3) before, after and the place marked, from the side that most of it is seen from.
-
-    place: in A's own metres.
-    """
+    """(H, 3 W, 3) before, after and the place marked, from the side that shows most of it."""
     view = best_view(found, place)
     from_b = found.change.registration.a_from_b
     pair = draw_pairs(renderer, found.before, found.after, [view], from_b, progress)[0]
@@ -77,7 +74,10 @@ def heat_colors(value: np.ndarray, scale: ColorScale) -> np.ndarray:
 def best_view(found: FoundChange, place: ChangedPlace) -> View:
     """A close look at a place from the direction that shows most of it."""
     later = place.kind != "vanished"
-    seen = [int(sees(pair, later, place.points).sum()) for pair in found.pairs]
+    seen = [
+        int(sees(pair, later, place.points).sum() + sees(pair, False, place.before).sum())
+        for pair in found.pairs
+    ]
     best = found.pairs[int(np.argmax(seen))].view
     every = np.concatenate([place.points, place.before])
     low, high = every.min(axis=0), every.max(axis=0)

@@ -10,7 +10,7 @@ LEAST_VIEWS = 3  # that a cell must be seen in: one view is no evidence
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class SurfaceCells:
     """The surface of one visit, a row a cube that is seen in LEAST_VIEWS views or more."""
 
     points: np.ndarray  # (m, 3) metres, A's world: the mean of what was seen in it
@@ -26,7 +26,7 @@ class Cells:
         return len(self.points)
 
 
-def cells_of(own: Samples, other: Samples, cell_m: float) -> Cells:
+def cells_of(own: Samples, other: Samples, cell_m: float) -> SurfaceCells:
     """One visit's cells with side cell_m."""
     from scipy.spatial import cKDTree
 
@@ -49,7 +49,7 @@ def cells_of(own: Samples, other: Samples, cell_m: float) -> Cells:
     away = np.full(len(kept), np.inf)
     if len(other.points) and len(kept):
         away = cKDTree(other.points).query(points)[0]
-    return Cells(
+    return SurfaceCells(
         points,
         views[kept],
         means(row, own.through[order], len(kept)),

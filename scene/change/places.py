@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shapeshift.scene.change.cells import Cells, lab_of
+from shapeshift.scene.change.cells import SurfaceCells, lab_of
 from shapeshift.scene.change.similarity import Similarity, fit_surfaces, rotation_of
 
 KINDS = ("moved", "appeared", "vanished", "hotter", "colder", "recoloured")
@@ -69,7 +69,7 @@ class ChangedPlace:
 
 
 def find_places(
-    before: Cells, after: Cells, settings: ChangeSettings, unit: str = ""
+    before: SurfaceCells, after: SurfaceCells, settings: ChangeSettings, unit: str = ""
 ) -> list[ChangedPlace]:
     """All places, the largest surface first.  unit: of the values."""
     gone, new = ((c.through >= THROUGH) & (c.away_m >= settings.least_m) for c in (before, after))
@@ -145,7 +145,7 @@ def parts(points: np.ndarray, mask: np.ndarray, settings: ChangeSettings) -> lis
 class _Part:
     """Some cells of one visit."""
 
-    cells: Cells
+    cells: SurfaceCells
     rows: np.ndarray
 
     @property
@@ -158,9 +158,7 @@ class _Part:
         return lab_of(self.cells.color[self.rows]).mean(axis=0)
 
     def area_m2(self, settings: ChangeSettings) -> float:
-        """A surface crosses 1.5 as many cubes as its area has squares, in the mean of directions.
-
-        """
+        """Surfaces cross 1.5 as many cubes as their area has squares, over all directions."""
         return len(self.rows) * settings.cell_m**2 / 1.5
 
 

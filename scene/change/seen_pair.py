@@ -1,5 +1,4 @@
-"""What two visits show in one view: colours, depths, values; and where one sees through the other.
-"""
+"""What two visits show in one view, and where one sees through what the other has."""
 
 from dataclasses import dataclass
 from functools import cached_property

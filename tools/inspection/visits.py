@@ -50,7 +50,7 @@ class Planted:
 
 
 PLANTED = (
-    Planted("moved", tuple(np.add(MUG, MUG_MOVED) + (0, 0.04, 0)), 0.06),
+    Planted("moved", tuple(np.add(MUG, MUG_MOVED) + np.array([0, 0.04, 0])), 0.06),
     Planted("appeared", TOOL_BOX, 0.06),
     Planted("vanished", OIL_CAN, 0.08),
     Planted("hotter", GAUGE, 0.06),
