@@ -80,10 +80,11 @@ def run(options: Options) -> int:
     if options.camera:
         cameras = named_cameras(options.camera, options.scene_a, options, size)
     documents = [open_document(path, options) for path in (options.scene_a, options.scene_b)]
-    visits = [
+    before, after = (
         visit_of(document, name, options.stop, options.range)
         for document, name in zip(documents, names, strict=True)
-    ]
+    )
+    visits = before, after
     if said := without_heat(*visits, names):
         say(said)
     views = None if cameras is None else list(documents[0].sees(cameras).views)
@@ -91,7 +92,7 @@ def run(options: Options) -> int:
         open_renderer(options.context, options.drawing) as (renderer, _),
         progress_after(PATIENCE_S) as progress,
     ):
-        found = find_change(renderer, *visits, names, choice, views, progress)
+        found = find_change(renderer, visits, names, choice, views, progress)
         if options.out is not None:
             write_change(renderer, found, names, options.out, progress)
     if options.json:

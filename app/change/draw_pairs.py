@@ -111,16 +111,12 @@ def draw_side(
     return sides
 
 
-def draw_pairs(
-    renderer: "Renderer",
-    before: Visit,
-    after: Visit,
-    views: list[View],
-    a_from_b: Similarity,
-    progress: Progress,
-) -> list[SeenPair]:
-    """Both visits in views of A's world."""
-    heat = before.thermal is not None and after.thermal is not None
-    first = draw_side(renderer, before, views, Similarity.identity(), heat, "A", progress)
-    second = draw_side(renderer, after, views, a_from_b, heat, "B", progress)
-    return [SeenPair(*three) for three in zip(views, first, second, strict=True)]
+def draw_pair(
+    renderer: "Renderer", before: Visit, after: Visit, view: View, a_from_b: Similarity
+) -> SeenPair:
+    """Both visits in one view of A's world."""
+    silent: Progress = lambda what, part: None  # noqa: E731
+    itself = Similarity.identity()
+    first = draw_side(renderer, before, [view], itself, True, "A", silent)
+    second = draw_side(renderer, after, [view], a_from_b, True, "B", silent)
+    return SeenPair(view, first[0], second[0])

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.app.change.draw_pairs import Progress, Visit, draw_pairs, rings_around
-from shapeshift.app.change.register import register
+from shapeshift.app.change.draw_pairs import Progress, Visit, draw_side, rings_around
+from shapeshift.app.change.register import common_world, register
 from shapeshift.app.errors import UsageError
 from shapeshift.scene.change.cells import SurfaceCells, cells_of
 from shapeshift.scene.change.places import ChangedPlace, ChangeSettings, find_places
 from shapeshift.scene.change.seen_pair import SeenPair, samples_of
-from shapeshift.scene.change.similarity import Registration
+from shapeshift.scene.change.similarity import Registration, Similarity
 from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
@@ -72,20 +72,26 @@ class FoundChange:
 
 def find_change(
     renderer: "Renderer",
-    before: Visit,
-    after: Visit,
+    visits: tuple[Visit, Visit],
     names: tuple[str, str],
     choice: ChangeChoice,
     views: list[View] | None,
     progress: Progress,
 ) -> FoundChange:
     """views: of A's own metres; None: from all around.  Raises BadFile, UsageError."""
+    before, after = visits
     heat = check_values(before, after, names)
     centre, radius = before.document.bounds()
     settings = choice.settings(radius)
-    registration = register(renderer, before, after, names, views, progress)
     chosen = views or rings_around(centre, radius, choice.size)
-    pairs = draw_pairs(renderer, before, after, chosen, registration.a_from_b, progress)
+    common = common_world(before, after)
+    first = draw_side(renderer, before, chosen, Similarity.identity(), heat, "A", progress)
+    second = draw_side(renderer, after, chosen, common, heat, "B", progress)
+    registration = register(renderer, visits, names, chosen, (first, second), progress)
+    if registration.how != "common":
+        found_b = registration.a_from_b
+        second = draw_side(renderer, after, chosen, found_b, heat, "B", progress)
+    pairs = [SeenPair(*three) for three in zip(chosen, first, second, strict=True)]
     progress("comparing", 0.0)
     samples = [samples_of(pairs, later, settings.least_m) for later in (False, True)]
     cells = (

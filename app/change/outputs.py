@@ -149,7 +149,7 @@ def write_change(
     places = found.change.places
     for i, place in enumerate(places[:MOST_PICTURES]):
         progress("drawing the places", i / len(places))
-        picture = pictures_of(renderer, found, place, lambda what, part: None)
+        picture = pictures_of(renderer, found, place)
         save_png(picture, folder / f"place_{place.number:03}_{place.kind}.png")
     progress("writing the layers", 0.0)
     write_layers(found, folder / LAYERS)

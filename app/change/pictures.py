@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.app.change.draw_pairs import Progress, draw_pairs
+from shapeshift.app.change.draw_pairs import draw_pair
 from shapeshift.app.change.find_change import FoundChange
 from shapeshift.app.commands.compare_sheet import written
 from shapeshift.app.inspection.pictures import ColorScale, with_scale_bar
@@ -41,13 +41,11 @@ def words(place: ChangedPlace) -> str:
     return said
 
 
-def pictures_of(
-    renderer: "Renderer", found: FoundChange, place: ChangedPlace, progress: Progress
-) -> np.ndarray:
+def pictures_of(renderer: "Renderer", found: FoundChange, place: ChangedPlace) -> np.ndarray:
     """(H, 3 W, 3) before, after and the place marked, from the side that shows most of it."""
     view = best_view(found, place)
     from_b = found.change.registration.a_from_b
-    pair = draw_pairs(renderer, found.before, found.after, [view], from_b, progress)[0]
+    pair = draw_pair(renderer, found.before, found.after, view, from_b)
     heat = place.kind in ("hotter", "colder")
     sides = (pair.before, pair.after)
     pictures = [np.where(s.coverage[..., None] >= 0.5, s.color, NOTHING) for s in sides]

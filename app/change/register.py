@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SCRIPT = Path(__file__).with_name("match_run.py")
 FAILURE = "matching the two scenes ended with code {code}, perhaps for want of memory."
-SIZE = (320, 240)
+FEWEST = 100  # pixels that a surface must have, over all views
 POINTS = 20_000  # of each surface, at most
 SHARED = 0.5  # of each surface that must lie on the other's
 OVERLAP = 0.6  # of the surfaces that lie together already: then nothing is looked for
@@ -30,56 +30,78 @@ ERROR = 0.03  # of the radius, of a match
 INLIERS = 20  # matches that agree
 
 
+def common_world(before: Visit, after: Visit) -> Similarity:
+    """A's metres from B's where both files mean one world: each counts from a zero of its own."""
+    origins = [np.asarray(each.document.origin) for each in (before, after)]
+    return Similarity(np.eye(3), origins[1] - origins[0])
+
+
 def register(
     renderer: "Renderer",
-    before: Visit,
-    after: Visit,
+    visits: tuple[Visit, Visit],
     names: tuple[str, str],
-    views: list[View] | None,
+    views: list[View],
+    sides: tuple[list[SeenSide], list[SeenSide]],
     progress: Progress,
 ) -> Registration:
     """A's world from B's.  Raises BadFile, one sentence, where the scenes do not fit together.
 
     Worlds that lie together already stay as they are unless closest points move them farther than
     they are apart; else features of drawn pictures are matched, and closest points make it exact.
-    views: of A's world; None: from all around each.
+    views: of A's own metres; sides: what both show in them, taken to be in one world.
     """
-    origins = [np.asarray(each.document.origin) for each in (before, after)]
-    identity = Similarity(np.eye(3), origins[1] - origins[0])  # one world, each from its own zero
-    of_a = views or rings_around(*before.document.bounds(), SIZE)
-    of_b = rings_around(*after.document.bounds(), SIZE)
-    if views is not None:
-        of_b = [identity.view_in_b(view) for view in views]
-    itself = Similarity.identity()
-    sides_a = draw_side(renderer, before, of_a, itself, False, "A", progress)
-    sides_b = draw_side(renderer, after, of_b, itself, False, "B", progress)
-    a, b = surface_of(of_a, sides_a), surface_of(of_b, sides_b)
-    for name, points in zip(names, (a, b), strict=True):
-        if len(points) < 100:
-            raise BadFile(f"{name} shows next to nothing from around it; nothing can be compared.")
-    radius = before.document.bounds()[1]
+    radius = visits[0].document.bounds()[1]
+    a = surface_of(views, sides[0])
+    refuse_empty(a, names[0])
     progress("laying both worlds together", 0.0)
-    found, residual, shared = fit_surfaces(a, b, identity, radius, scaled=False)
-    plain = fit_surfaces(a, b, identity, radius, scaled=False, rounds=0)
-    if plain[2] >= OVERLAP and shared >= OVERLAP and residual <= RESIDUAL * radius:
-        step = float(np.median(np.linalg.norm(found.apply(b) - identity.apply(b), axis=1)))
-        # along flat walls closest points slide freely: then nothing lies nearer than before
-        if step <= max(plain[1], residual) or residual > BETTER * plain[1]:
-            return Registration(identity, "common", *plain[1:])
-        return Registration(found, "icp", residual, shared)
+    found = _in_common(a, views, sides[1], common_world(*visits), radius)
+    if found is not None:
+        return found
+    around = rings_around(*visits[1].document.bounds(), views[0].size)
+    seen = draw_side(renderer, visits[1], around, Similarity.identity(), False, "B", progress)
+    b = surface_of(around, seen)
+    refuse_empty(b, names[1])
     progress("matching features", 0.0)
-    start = _by_features(of_a, sides_a, of_b, sides_b, radius, names)
-    found, residual, shared = fit_surfaces(a, b, start, radius, scaled=True)
-    step = float(np.median(np.linalg.norm(found.apply(b) - start.apply(b), axis=1)))
-    if step > ERROR * radius:  # it slid: features know better
-        found, residual, shared = fit_surfaces(a, b, start, radius, scaled=True, rounds=0)
+    start = _by_features(views, sides[0], around, seen, radius, names)
+    fitted, residual, shared = fit_surfaces(a, b, start, radius, scaled=True)
+    if moved_by(fitted, start, b) > ERROR * radius:  # it slid: features know better
+        fitted, residual, shared = fit_surfaces(a, b, start, radius, scaled=True, rounds=0)
     if not (shared >= SHARED and residual <= RESIDUAL * radius):
         raise BadFile(
             f"{names[1]} does not fit {names[0]}: {100 * shared:.0f} % of their surfaces lie "
             f"together, {100 * residual:.1f} cm apart; {100 * SHARED:.0f} % and "
             f"{100 * RESIDUAL * radius:.1f} cm are wanted; pose both captures together."
         )
-    return Registration(found, "features", residual, shared)
+    return Registration(fitted, "features", residual, shared)
+
+
+def _in_common(
+    a: np.ndarray, views: list[View], sides_b: list[SeenSide], common: Similarity, radius: float
+) -> Registration | None:
+    """Where both lie together already; None: they do not."""
+    b = surface_of([common.view_in_b(view) for view in views], sides_b)
+    if len(b) < FEWEST:
+        return None
+    plain = fit_surfaces(a, b, common, radius, scaled=False, rounds=0)
+    fitted, residual, shared = fit_surfaces(a, b, common, radius, scaled=False)
+    if not (min(plain[2], shared) >= OVERLAP and residual <= RESIDUAL * radius):
+        return None
+    # along flat walls closest points slide freely: then nothing lies nearer than before
+    farther = moved_by(fitted, common, b) > max(plain[1], residual)
+    if farther and residual <= BETTER * plain[1]:
+        return Registration(fitted, "icp", residual, shared)
+    return Registration(common, "common", *plain[1:])
+
+
+def moved_by(found: Similarity, start: Similarity, points: np.ndarray) -> float:
+    """Metres, median over points (n, 3)."""
+    return float(np.median(np.linalg.norm(found.apply(points) - start.apply(points), axis=1)))
+
+
+def refuse_empty(points: np.ndarray, name: str) -> None:
+    """Raises BadFile."""
+    if len(points) < FEWEST:
+        raise BadFile(f"{name} shows next to nothing from around it; nothing can be compared.")
 
 
 def surface_of(views: list[View], sides: list[SeenSide]) -> np.ndarray:

@@ -5,7 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shapeshift.scene.change.cells import SurfaceCells, lab_of
-from shapeshift.scene.change.similarity import Similarity, fit_surfaces, rotation_of
+from shapeshift.scene.change.similarity import (
+    Similarity,
+    fit_surfaces,
+    rotation_of,
+    surface_normals,
+)
 
 KINDS = ("moved", "appeared", "vanished", "hotter", "colder", "recoloured")
 GEOMETRY = KINDS[:3]
@@ -112,7 +117,7 @@ def inside_any(
     points: np.ndarray, groups: list[np.ndarray], settings: ChangeSettings
 ) -> np.ndarray:
     """(n,) bool: which points lie in the convex hull of a group, or BESIDE cells around it."""
-    from scipy.spatial import Delaunay
+    from scipy.spatial import ConvexHull
 
     out, reach = np.zeros(len(points), bool), BESIDE * settings.cell_m
     steps = (np.indices((2, 2, 2)).reshape(3, -1).T * 2 - 1) * reach  # corners of a cube
@@ -121,7 +126,8 @@ def inside_any(
         low, high = wide.min(axis=0), wide.max(axis=0)
         near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
         if len(near):
-            out[near] |= Delaunay(wide).find_simplex(points[near]) >= 0
+            planes = ConvexHull(wide).equations  # (faces, 4): outwards, and how far
+            out[near] |= (points[near] @ planes[:, :3].T + planes[:, 3] <= 1e-9).all(axis=1)
     return out
 
 
@@ -158,8 +164,9 @@ class _Part:
         return lab_of(self.cells.color[self.rows]).mean(axis=0)
 
     def area_m2(self, settings: ChangeSettings) -> float:
-        """Surfaces cross 1.5 as many cubes as their area has squares, over all directions."""
-        return len(self.rows) * settings.cell_m**2 / 1.5
+        """A plane crosses as many cubes as its three shadows along the axes have squares."""
+        shadows = np.abs(surface_normals(self.points)).sum(axis=1)
+        return float((settings.cell_m**2 / shadows).sum())
 
 
 def pair_moved(
@@ -185,8 +192,8 @@ def pair_moved(
             continue
         used[0].add(i)
         used[1].add(j)
-        gone, new = vanished[i].points, appeared[j].points
-        place = ChangedPlace("moved", new, appeared[j].area_m2(settings), 0.0, "m", before=gone)
+        area, points = appeared[j].area_m2(settings), appeared[j].points
+        place = ChangedPlace("moved", points, area, 0.0, "m", before=vanished[i].points)
         places.append(replace(place, amount=float(np.linalg.norm(place.shift))))
     left = [part for i, part in enumerate(vanished) if i not in used[0]]
     left += [part for j, part in enumerate(appeared) if j not in used[1]]

@@ -252,18 +252,17 @@ def change(
     if folder is not None:
         check_folder(folder, overwrite)
     scenes = opened(before), opened(after)
-    first, second = (scene.path.name if scene.path else said
-                     for scene, said in zip(scenes, ("before", "after"), strict=True))  # fmt: skip
-    visits = [
-        visit_of(scene.subject, name, stop, value_range)
-        for scene, name in zip(scenes, (first, second), strict=True)
-    ]
+    names = (scenes[0].path or plain("before")).name, (scenes[1].path or plain("after")).name
+    visits = (
+        visit_of(scenes[0].subject, names[0], stop, value_range),
+        visit_of(scenes[1].subject, names[1], stop, value_range),
+    )
     views = None if cameras is None else choose_views(scenes[0], cameras, 1, size)
 
     def work(frames: "FrameRenderer") -> SceneChange:
-        found = find_change(frames, *visits, (first, second), choice, views, progress or silent)
+        found = find_change(frames, visits, names, choice, views, progress or silent)
         if folder is not None:
-            write_change(frames, found, (first, second), folder, progress or silent)
+            write_change(frames, found, names, folder, progress or silent)
         return found.change
 
     with shared_renderer(drawing, context, RenderSettings(), BLACK) as renderer:

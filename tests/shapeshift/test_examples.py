@@ -30,6 +30,7 @@ LEAVES = {
     "12_styles.py": ["12_fur.png", "12_print.png", "12_styles.shift"],
     "11_objects.py": ["11_room.scene.json", "11_without.png", "11_warm.png", "11_fallen.png"],
     "14_inspect.py": [],
+    "15_change.py": ["15_change.png", "15_change/places.csv", "15_change/place_001_moved.png"],
     "13_film.py": ["13_film.webp", "13_frames/00000.png", "13_frames/depth/00001.png"],
 }
 

@@ -36,7 +36,6 @@ def trained(work: Path, name: str, seconds: float) -> Path:
     changed, turn, seed = VISITS[name]
     capture, package = work / name, work / f"{name}.shift"
     if not (capture / "transforms.json").is_file():
-        print(f"ray-tracing {name}", file=sys.stderr)
         make_visit(capture, changed, turn)
     if not package.is_file():
         words = ["train", str(capture), "--out", str(package), "--seconds", f"{seconds:g}"]
@@ -96,7 +95,7 @@ def main() -> None:
         f"# {VIEWS} photos of {SIZE[0]}x{SIZE[1]} a stop and visit, ray-traced\n"
     )
     options.out.write_text(head + COLUMNS + "\n" + "\n".join(rows) + "\n")
-    print(options.out.read_text())
+    sys.stdout.write(options.out.read_text())
 
 
 if __name__ == "__main__":

@@ -135,15 +135,15 @@ def test_the_layers_open_as_a_scene_that_measures_change(written):
     def at(place, stop) -> float:
         return scene.temperature(place, stop=stop)
 
-    top = np.array(GREEN.centre) + (0, GREEN.half[1], 0)
+    top = np.add(GREEN.centre, (0, GREEN.half[1], 0))
     assert at(top, "Change of heat") == pytest.approx(15, abs=0.5)
-    assert at(np.array(TALL.centre) + (0, TALL.half[1], 0), "Change of heat") == pytest.approx(
+    assert at(np.add(TALL.centre, (0, TALL.half[1], 0)), "Change of heat") == pytest.approx(
         -12, abs=0.5
     )
     still = (-0.5, 0.0, 0.4)
     assert at(still, "Change of heat") == pytest.approx(0, abs=0.5)
     # the top of what vanished, which B has not: 12 cm above the table
-    gone = np.array(BLUE.centre) + (0, BLUE.half[1], 0)
+    gone = np.add(BLUE.centre, (0, BLUE.half[1], 0))
     assert at(gone, "Change of shape") == pytest.approx(120, abs=25)
     assert at(still, "Change of shape") < 5
 
