@@ -84,8 +84,8 @@ def main(given: str, wanted: str) -> None:
     if len(of_a) >= LEAST:
         ransac = pycolmap.RANSACOptions()
         ransac.max_error, ransac.random_seed = error, 0
-        found = pycolmap.estimate_sim3d_robust(of_b, of_a, ransac)
-        if found is not None:
+        found: Any = pycolmap.estimate_sim3d_robust(of_b, of_a, ransac)
+        if found is not None:  # a dict, though its signature says a Sim3d
             matrix = found["tgt_from_src"].matrix()
             moved = of_b @ matrix[:, :3].T + matrix[:, 3]
             inliers = int((np.linalg.norm(moved - of_a, axis=1) <= error).sum())
