@@ -35,6 +35,7 @@ def write_layers(found: FoundChange, folder: Path) -> int:
     a_from_b = found.change.registration.a_from_b
     before = baked(found.before, Similarity.identity())
     after = baked(found.after, a_from_b)
+    layers: list[tuple[str, str, PlainSplats, tuple[float, float] | None]]
     layers = [("Before", "", before, None), ("After", "", after, None)]
     union = with_what_is_gone(before, after, found)
     for name, unit, values, least in measures(found, union.means):

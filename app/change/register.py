@@ -139,7 +139,7 @@ def _by_features(
             arrays[f"p{side}{i}"] = _places(view, each).astype(np.float32)
     with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
         given, wanted = Path(folder, "pictures.npz"), Path(folder, "found.npz")
-        np.savez(given, **arrays)
+        np.savez(given, **arrays)  # type: ignore[arg-type]  # its stubs take switches alone
         log = Path(folder, "log.txt")
         run_child(SCRIPT, [str(given), str(wanted)], log, lambda *_: None, FAILURE)
         with np.load(wanted) as file:

@@ -186,7 +186,8 @@ def pair_moved(
             misfit = shape_misfit(gone.points, new.points)
             if misfit <= FITS * settings.cell_m:
                 found.append((misfit, i, j))
-    places, used = [], (set(), set())
+    places: list[ChangedPlace] = []
+    used: tuple[set[int], set[int]] = (set(), set())
     for _, i, j in sorted(found):
         if i in used[0] or j in used[1]:
             continue
