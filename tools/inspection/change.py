@@ -5,7 +5,8 @@
 WORK gets the visits that tools/inspection/visits.py ray-traces (before, after, again: nothing
 changed, other photos, another seed), each trained with the usual settings for --seconds of one
 core; what is there already is used as it is.  A row a comparison and place: what was planted, the
-place that was found for it, how far its middle is beside the planted one, and what is false.
+place that was found for it, how far its middle is beside the planted one, and what is false:
+planted "nothing".  "A part of one" is warm in truth, but was found as a place of its own.
 """
 
 import argparse
@@ -19,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import shapeshift as ss  # noqa: E402
-from tools.inspection.visits import MUG_MOVED, PLANTED, SIZE, VIEWS, make_visit  # noqa: E402
+from tools.inspection.visits import MUG_MOVED, PLANTED, SIZE, VIEWS, make_visit, true_warming  # noqa: E402
 
 # name: (changed, turn of the cameras, seed of the training)
 VISITS = {"before": (False, 0.0, 0), "after": (True, 0.11, 0), "again": (False, 0.23, 1)}
@@ -27,6 +28,7 @@ PAIRS = (("before", "after"), ("again", "after"), ("before", "again"))
 COLUMNS = (
     "comparison,residual_cm,shared,planted,found,beside_cm,area_cm2,amount,unit,planted_amount"
 )
+LEAST_C = 5.0  # of the command's default
 # Of the planted changes, in their order; heat falls off at grazing angles by up to a fifth.
 AMOUNTS = (float(np.linalg.norm(MUG_MOVED)), None, None, 22.0, None, 20.0)
 
@@ -59,6 +61,11 @@ def matched(places: tuple[ss.ChangedPlace, ...]) -> list[tuple[int, int]]:
     return sorted(out)
 
 
+def is_piece(place: ss.ChangedPlace) -> bool:
+    """Whether a place beside those that were matched is a part of what did get hotter."""
+    return place.kind == "hotter" and float(np.median(true_warming(place.points))) >= LEAST_C
+
+
 def rows_of(first: str, second: str, changed: ss.SceneChange) -> list[str]:
     head = f"{first} to {second}"
     fit = f"{100 * changed.registration.residual_m:.2f},{changed.registration.shared:.2f}"
@@ -75,7 +82,8 @@ def rows_of(first: str, second: str, changed: ss.SceneChange) -> list[str]:
                     f"{place.amount:.3f},{place.unit},{wanted}")  # fmt: skip
     for j, place in enumerate(changed.places):
         if j not in [b for _, b in pairs]:
-            rows.append(f"{head},{fit},nothing,{place.kind},,{1e4 * place.area_m2:.0f},"
+            truth = "a part of one" if second == "after" and is_piece(place) else "nothing"
+            rows.append(f"{head},{fit},{truth},{place.kind},,{1e4 * place.area_m2:.0f},"
                         f"{place.amount:.3f},{place.unit},")  # fmt: skip
     return rows or [f"{head},{fit},nothing,none,,,,,"]
 

@@ -70,6 +70,13 @@ def warmer(solid: Solid, heat: Callable[[np.ndarray], np.ndarray]) -> Solid:
     return replace(solid, surface=replace(solid.surface, celsius=celsius))
 
 
+WARMED: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "gauge": lambda p: np.full(len(p), 22.0),
+    "cabinet": lambda p: 30 * bump(p, DOOR, 0.035),
+    "motor": lambda p: 20.0 * (p[:, 0] < MOTOR[0] - 0.105),
+}
+
+
 def solids_of(changed: bool) -> list[Solid]:
     out = []
     for name, solids in things(opened=False):
@@ -79,16 +86,24 @@ def solids_of(changed: bool) -> list[Solid]:
             move = np.eye(4)
             move[:3, 3] = MUG_MOVED
             solids = [replace(s, world_from_local=move @ s.world_from_local) for s in solids]
-        if changed and name == "gauge":
-            solids = [warmer(s, lambda p: np.full(len(p), 22.0)) for s in solids]
-        if changed and name == "cabinet":
-            solids = [warmer(s, lambda p: 30 * bump(p, DOOR, 0.035)) for s in solids]
-        if changed and name == "motor":
-            solids = [warmer(s, lambda p: 20.0 * (p[:, 0] < MOTOR[0] - 0.105)) for s in solids]
+        if changed and name in WARMED:
+            solids = [warmer(s, WARMED[name]) for s in solids]
         out += solids
     if changed:
         blue = Material((0.16, 0.30, 0.70), 22.0, 0.2, 25.0)
         out.append(box(TOOL_BOX, TOOL_BOX_HALF, blue, 0.004))
+    return out
+
+
+def true_warming(points: np.ndarray) -> np.ndarray:
+    """(n,) °C by which the surface next to world points (n, 3) got hotter, before its slant."""
+    solids = [(s, name) for name, of_it in things(opened=False) for s in of_it]
+    away = np.stack([np.abs(solid.distance(points)) for solid, _ in solids])  # (solids, n)
+    nearest = np.argmin(away, axis=0)
+    out = np.zeros(len(points))
+    for i in np.unique(nearest):
+        if (heat := WARMED.get(solids[i][1])) is not None:
+            out[nearest == i] = heat(points[nearest == i])
     return out
 
 
