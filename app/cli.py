@@ -27,6 +27,10 @@ COMMANDS = {
         "inspection.measure",
         "distances, angles and areas on a scene, with their uncertainty",
     ),
+    "change": (
+        "change.change",
+        "what moved, appeared, vanished or got hotter between two captures of a place",
+    ),
     "lint": ("commands.lint", "what is wrong with a file, and what opening it repairs"),
     "info": ("commands.info", "what is in a scene"),
     "compare": (

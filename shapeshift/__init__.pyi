@@ -1,3 +1,4 @@
+from shapeshift.api.inspect import change as change
 from shapeshift.api.learn import TrainedScene as TrainedScene
 from shapeshift.api.learn import evaluate as evaluate
 from shapeshift.api.learn import poses as poses
@@ -15,6 +16,7 @@ from shapeshift.api.render import Renderer as Renderer
 from shapeshift.api.scene import Scene as Scene
 from shapeshift.api.write import Exported as Exported
 from shapeshift.api.write import export as export
+from shapeshift.app.change.find_change import SceneChange as SceneChange
 from shapeshift.app.errors import UsageError as UsageError
 from shapeshift.app.paths import DEMO as DEMO
 from shapeshift.app.paths import TOUCH as TOUCH
@@ -35,6 +37,7 @@ from shapeshift.runtime_models.stop_weights import StopWeights as StopWeights
 from shapeshift.scene.appearance import Appearance as Appearance
 from shapeshift.scene.appearance import Sky as Sky
 from shapeshift.scene.cameras.camera_list import CameraList as CameraList
+from shapeshift.scene.change.places import ChangedPlace as ChangedPlace
 from shapeshift.scene.inspection.marks import Isotherm as Isotherm
 from shapeshift.scene.inspection.marks import Mark as Mark
 from shapeshift.scene.inspection.marks import MarkReading as MarkReading

@@ -1,13 +1,16 @@
 """What a scene measures: degrees, depths, marks, lengths; from its values, never from colours."""
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.api.arguments import Camera, PathText, Size
+from shapeshift.api.arguments import Camera, PathText, Progress, Size
 from shapeshift.api.opened import OpenedScene
-from shapeshift.api.render import shared_renderer
+from shapeshift.api.read import opened
+from shapeshift.api.render import Context, Drawing, shared_renderer
 from shapeshift.api.views import choose_views
+from shapeshift.app.change.find_change import ChangeChoice, SceneChange
 from shapeshift.app.errors import UsageError
 from shapeshift.app.inspection.draw_values import (
     ThermalChoice,
@@ -31,6 +34,9 @@ from shapeshift.scene.inspection.marks_file import (
 )
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import View
+
+if TYPE_CHECKING:
+    from shapeshift.renderer.renderer import Renderer as FrameRenderer
 
 BLACK = (0.0, 0.0, 0.0)
 Place = Sequence[float]  # (column, row) in pixels of a view, or (x, y, z) metres in the world
@@ -200,3 +206,64 @@ def _point(picture: ValuePicture, place: Place) -> Point:
     if len(numbers) == 3:
         return Point(numbers, np.zeros((3, 3)))
     return picture.picked((numbers[0], numbers[1]))
+
+
+def silent(what: str, part: float) -> None:
+    """Nobody listens."""
+
+
+def change(
+    before: PathText | OpenedScene,
+    after: PathText | OpenedScene,
+    *,
+    degrees: float = 5.0,
+    millimetres: float = 0.0,
+    stop: str = "",
+    value_range: tuple[float, float] | None = None,
+    cameras: Camera | None = None,
+    size: Size = (320, 240),
+    out: PathText | None = None,
+    overwrite: bool = False,
+    drawing: Drawing = "auto",
+    context: Context = "auto",
+    progress: Progress | None = None,
+) -> SceneChange:
+    """Where an earlier and a later scene of one place differ: `places`, the largest first, each
+    with its kind (moved, appeared, vanished, hotter, colder, recoloured), centre and box in metres
+    of `before`, area_m2, amount and unit; and `registration`, how their worlds fit together.
+
+    degrees, millimetres: from where on heat and shapes count; 0 mm is a thirty-second of the
+    scene's radius.  stop: whose colours and shapes are compared; "": the first that is not thermal.
+    value_range: of thermal stops that do not say it.  cameras: views of `before`; None is all
+    around.  out: a folder, as the command writes it.  Raises UsageError, BadFile where the scenes
+    do not fit together.
+
+        for place in ss.change("march.shift", "june.shift").places:
+            print(place.kind, place.centre, place.amount, place.unit)
+    """
+    from shapeshift.api.views import choose_views
+    from shapeshift.app.change.draw_pairs import visit_of
+    from shapeshift.app.change.find_change import find_change
+    from shapeshift.app.change.outputs import check_folder, write_change
+
+    choice = ChangeChoice(0.0, millimetres / 1000, degrees, size=size)
+    choice.settings(1.0)  # refused before anything is read
+    folder = None if out is None else plain(str(out))
+    if folder is not None:
+        check_folder(folder, overwrite)
+    scenes = opened(before), opened(after)
+    names = (scenes[0].path or plain("before")).name, (scenes[1].path or plain("after")).name
+    visits = (
+        visit_of(scenes[0].subject, names[0], stop, value_range),
+        visit_of(scenes[1].subject, names[1], stop, value_range),
+    )
+    views = None if cameras is None else choose_views(scenes[0], cameras, 1, size)
+
+    def work(frames: "FrameRenderer") -> SceneChange:
+        found = find_change(frames, visits, names, choice, views, progress or silent)
+        if folder is not None:
+            write_change(frames, found, names, folder, progress or silent)
+        return found.change
+
+    with shared_renderer(drawing, context, RenderSettings(), BLACK) as renderer:
+        return renderer.inspect(work)

@@ -85,6 +85,7 @@ LIGHT = [
     ("compare", "a.ply", "b.ply", *SIZE),
     ("render", "a.ply", "--out", "light/pictures", *SIZE),
     ("film", "a.ply", "--seconds", "0.1", "--out", "light/film.gif", *SIZE),
+    ("change", "a.ply", "a.ply"),
     ("measure", "a.ply", "--distance", "0,0,0", "1,0,0", *SIZE),
     ("thermal", "a.ply", "--stop", "a", "--colors", "gray", "--range", "0", "1",
      "--out", "light/heat.png", *SIZE),

@@ -31,6 +31,7 @@ LEAVES = {
     "11_objects.py": ["11_room.scene.json", "11_without.png", "11_warm.png", "11_fallen.png"],
     "14_inspect.py": [],
     "15_sections.py": ["15_plane.png", "15_beyond.png", "15_box.png"],
+    "16_change.py": ["16_change.png", "16_change/places.csv", "16_change/place_001_moved.png"],
     "13_film.py": ["13_film.webp", "13_frames/00000.png", "13_frames/depth/00001.png"],
 }
 

@@ -93,13 +93,21 @@ def things(opened: bool) -> list[tuple[str, list[Solid]]]:
 
 @lru_cache(maxsize=2)
 def place(opened: bool) -> tuple[Place, Clearance]:
-    here = Place.of([solid for _, solids in things(opened) for solid in solids])
+    return placed([solid for _, solids in things(opened) for solid in solids])
+
+
+def placed(solids: list[Solid]) -> tuple[Place, Clearance]:
+    here = Place.of(solids)
     return here, Clearance.of(here, (-0.75, -0.2, -0.48), (0.75, 0.5, 0.48))
 
 
 def radiance(stop: str) -> Radiance:
     """What a ray of that stop's camera brings home: colour (n, 3) and solid (n,)."""
-    here, clearance = place(stop == "Opened")
+    return radiance_of(*place(stop == "Opened"), stop == "Thermal")
+
+
+def radiance_of(here: Place, clearance: Clearance, heat: bool):
+    """The same of any solids in the workshop's light."""
 
     def rgb(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         hits = look(here, o, d)
@@ -116,7 +124,7 @@ def radiance(stop: str) -> Radiance:
         share = np.where(hits.index >= 0, (celsius - COLD) / (HOT - COLD), GREY)
         return np.repeat(np.clip(share, 0, 1)[:, None], 3, axis=1), hits.index
 
-    return thermal if stop == "Thermal" else rgb
+    return thermal if heat else rgb
 
 
 def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:

@@ -1,0 +1,122 @@
+"""Two visits drawn from the same cameras: colours, depths, degrees."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.app.document import Document
+from shapeshift.app.errors import UsageError
+from shapeshift.app.inspection.draw_values import (
+    ThermalChoice,
+    ThermalScene,
+    draw_values,
+    thermal_scene,
+)
+from shapeshift.renderer.surface import SOLID
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.cameras.framing import fit_distance, view_from
+from shapeshift.scene.change.seen_pair import SeenPair, SeenSide
+from shapeshift.scene.change.similarity import Similarity
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from shapeshift.renderer.renderer import Renderer
+
+Progress = Callable[[str, float], None]  # what is done, part 0..1
+FOV_Y = 0.75  # radians
+# Elevations in degrees, and cameras around at each: as things are photographed that stand.
+RINGS = ((12.0, 10), (34.0, 10), (60.0, 6))
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """One scene that is compared."""
+
+    document: Document
+    photo: Stop | None  # that its colours and shapes are drawn at; None: it has values alone
+    thermal: ThermalScene | None  # None: no thermal stop
+
+    @property
+    def shape(self) -> Scene:
+        """What depths are drawn of."""
+        if self.photo is not None:
+            return self.document.placed(self.photo.name).scene
+        assert self.thermal is not None
+        return self.thermal.scene
+
+
+def visit_of(document: Document, name: str, stop: str = "", value_range=None) -> Visit:
+    """A scene with the stops that are compared.  stop: the one of colours; "": the first that is
+    not thermal.  value_range: of the thermal stop, where the scene has none.  Raises UsageError.
+    """
+    if document.file is not None:
+        raise UsageError(f"{name} is a scene file of objects; change compares two models.")
+    stops = document.models[0].stops
+    photos = [each for each in stops if each.kind != "thermal"]
+    if stop:
+        photos = [each for each in stops if each.name.casefold() == stop.casefold()]
+        if not photos:
+            names = ", ".join(each.name for each in stops)
+            raise UsageError(f"{name} has no stop '{stop}'; it has {names}.")
+    thermal = None
+    hot = [each for each in stops if each.kind == "thermal" and each.palette]
+    if hot:
+        if hot[0].value_range is None and value_range is None:
+            raise UsageError(
+                f"the stop '{hot[0].name}' of {name} does not say which values black and white "
+                "stand for; say it: --range LOW HIGH."
+            )
+        thermal = thermal_scene(document, ThermalChoice(hot[0].name, value_range))
+    if not photos and thermal is None:
+        raise UsageError(f"{name} has no stop whose values or colours could be compared.")
+    return Visit(document, photos[0] if photos else None, thermal)
+
+
+def rings_around(centre: np.ndarray, radius: float, size: tuple[int, int]) -> list[View]:
+    """Views from above the horizon all around, each of the whole."""
+    views, distance = [], fit_distance(radius, size, FOV_Y)
+    for number, (degrees, count) in enumerate(RINGS):
+        level, height = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+        for i in range(count):
+            turn = 2 * np.pi * (i + number / len(RINGS)) / count
+            way = np.array([level * np.sin(turn), height, level * np.cos(turn)])
+            views.append(view_from(centre + distance * way, centre, radius, size, FOV_Y))
+    return views
+
+
+def draw_side(
+    renderer: "Renderer", visit: Visit, views: list[View], a_from_b: Similarity, heat: bool,
+    what: str, progress: Progress,
+) -> list[SeenSide]:  # fmt: skip
+    """A visit in views of A's world; heat: with its values.  what: it is called to progress."""
+    sides = []
+    own = [a_from_b.view_in_b(view) for view in views]
+    shape = visit.shape
+    for i, view in enumerate(own):
+        progress(f"drawing {what}", i / len(own))
+        renderer.update(shape)
+        renderer.draw([view])
+        rgba = renderer.image(0).astype(np.float64)
+        color = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
+        depth = renderer.surface(view).depth(SOLID).astype(np.float64) * a_from_b.scale
+        sides.append(SeenSide(np.clip(color, 0, 1), rgba[..., 3], depth))
+    if heat and visit.thermal is not None:
+        for i, view in enumerate(own):
+            progress(f"drawing the heat of {what}", i / len(own))
+            seen = draw_values(renderer, visit.thermal, view)
+            sides[i] = replace(sides[i], value=seen.values)
+    return sides
+
+
+def draw_pair(
+    renderer: "Renderer", before: Visit, after: Visit, view: View, a_from_b: Similarity
+) -> SeenPair:
+    """Both visits in one view of A's world."""
+    silent: Progress = lambda what, part: None  # noqa: E731
+    itself = Similarity.identity()
+    first = draw_side(renderer, before, [view], itself, True, "A", silent)
+    second = draw_side(renderer, after, [view], a_from_b, True, "B", silent)
+    return SeenPair(view, first[0], second[0])

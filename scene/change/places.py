@@ -1,0 +1,221 @@
+"""Places where two visits differ: cells that hang together, each told apart by its kind."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from shapeshift.scene.change.cells import SurfaceCells, lab_of
+from shapeshift.scene.change.similarity import (
+    Similarity,
+    fit_surfaces,
+    rotation_of,
+    surface_normals,
+)
+
+KINDS = ("moved", "appeared", "vanished", "hotter", "colder", "recoloured")
+GEOMETRY = KINDS[:3]
+TOUCH = 1.8  # cells between the middles of two that hang together
+THROUGH = 0.5  # part of the views in which the other visit sees through
+BESIDE = 4.0  # cells from a change of geometry: heat and colour there are of that
+SHADE = 0.35  # how much lightness counts beside hue: shadows wander with what throws them
+ALIKE = 18.0  # Lab: what is moved keeps its colours so nearly
+LARGER = 2.5  # times the other's area: the same thing is seen as so much more or less
+TURNS = 12  # about the vertical, from which a moved thing is fitted
+FITS = 1.2  # cells: median distance of a thing to itself where it stands now
+
+
+@dataclass(frozen=True)
+class ChangeSettings:
+    """From where on something counts."""
+
+    cell_m: float  # metres, side of the cubes in which views are joined
+    least_m: float  # metres that a surface is off
+    least_value: float = 5.0  # in the thermal stops' unit
+    least_color: float = 14.0  # Lab, lightness counted by SHADE
+    least_cells: int = 12  # of a place
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedPlace:
+    """Where something changed.  Metres in the world of the earlier scene."""
+
+    kind: str  # one of KINDS
+    points: np.ndarray  # (n, 3) of what shows it: of the later visit, where it is there
+    area_m2: float  # of its surface that was seen
+    amount: float  # metres moved; metres to the nearest surface; values; Lab
+    unit: str
+    level: float = np.nan  # the values there now, of places that are hotter or colder
+    before: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (n, 3) of a moved one
+    number: int = 0  # from 1 on, by size
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(3,) middle of its box."""
+        low, high = self.box
+        return (low + high) / 2
+
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) and (3,): its lowest and highest corner."""
+        return self.points.min(axis=0), self.points.max(axis=0)
+
+    @property
+    def size(self) -> np.ndarray:
+        """(3,) metres along the axes."""
+        low, high = self.box
+        return high - low
+
+    @property
+    def shift(self) -> np.ndarray:
+        """(3,) metres that a moved one went; else NaN."""
+        if self.kind != "moved":
+            return np.full(3, np.nan)
+        return self.centre - (self.before.min(axis=0) + self.before.max(axis=0)) / 2
+
+
+def find_places(
+    before: SurfaceCells, after: SurfaceCells, settings: ChangeSettings, unit: str = ""
+) -> list[ChangedPlace]:
+    """All places, the largest surface first.  unit: of the values."""
+    gone, new = ((c.through >= THROUGH) & (c.away_m >= settings.least_m) for c in (before, after))
+    vanished = [_Part(before, rows) for rows in parts(before.points, gone, settings)]
+    appeared = [_Part(after, rows) for rows in parts(after.points, new, settings)]
+    places, left = pair_moved(vanished, appeared, settings)
+    for part in left:
+        kind = "appeared" if part.cells is after else "vanished"
+        away = part.cells.away_m[part.rows]
+        amount = float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else np.inf
+        places.append(ChangedPlace(kind, part.points, part.area_m2(settings), amount, "m"))
+    zone = inside_any(after.points, [p.points for p in (*vanished, *appeared)], settings)
+    still = after.through < THROUGH
+    with np.errstate(invalid="ignore"):
+        hotter = still & ~zone & (after.value_change <= -settings.least_value)
+        colder = still & ~zone & (after.value_change >= settings.least_value)
+        colored = still & (color_distance(after.color_change) >= settings.least_color)
+    for kind, mask in (("hotter", hotter), ("colder", colder), ("recoloured", colored)):
+        for rows in parts(after.points, mask, settings):
+            if zone[rows].any():
+                continue  # a shadow, or where a thing stood: of the change of geometry
+            part = _Part(after, rows)
+            if kind == "recoloured":
+                change, said = color_distance(after.color_change[rows]), "Lab"
+            else:
+                change, said = -after.value_change[rows], unit
+            amount, area = float(np.median(change)), part.area_m2(settings)
+            level = np.nan if kind == "recoloured" else float(np.median(after.value[rows]))
+            places.append(ChangedPlace(kind, part.points, area, amount, said, level))
+    places.sort(key=lambda place: -place.area_m2)
+    return [replace(place, number=i) for i, place in enumerate(places, 1)]
+
+
+def color_distance(lab: np.ndarray) -> np.ndarray:
+    """(...) of Lab differences (..., 3), lightness counted by SHADE."""
+    return np.sqrt((SHADE * lab[..., 0]) ** 2 + lab[..., 1] ** 2 + lab[..., 2] ** 2)
+
+
+def inside_any(
+    points: np.ndarray, groups: list[np.ndarray], settings: ChangeSettings
+) -> np.ndarray:
+    """(n,) bool: which points lie in the convex hull of a group, or BESIDE cells around it."""
+    from scipy.spatial import ConvexHull
+
+    out, reach = np.zeros(len(points), bool), BESIDE * settings.cell_m
+    steps = (np.indices((2, 2, 2)).reshape(3, -1).T * 2 - 1) * reach  # corners of a cube
+    for group in groups:
+        wide = (group[:, None] + steps).reshape(-1, 3)  # a solid, also around a flat group
+        low, high = wide.min(axis=0), wide.max(axis=0)
+        near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+        if len(near):
+            planes = ConvexHull(wide).equations  # (faces, 4): outwards, and how far
+            out[near] |= (points[near] @ planes[:, :3].T + planes[:, 3] <= 1e-9).all(axis=1)
+    return out
+
+
+def parts(points: np.ndarray, mask: np.ndarray, settings: ChangeSettings) -> list[np.ndarray]:
+    """Rows of each group of marked cells that hangs together and is large enough."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    rows = np.flatnonzero(mask)
+    if len(rows) < settings.least_cells:
+        return []
+    near = cKDTree(points[rows]).query_pairs(TOUCH * settings.cell_m, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(near)), near.T), (len(rows), len(rows)))
+    count, label = connected_components(graph, directed=False)
+    groups = [rows[label == i] for i in range(count)]
+    return [group for group in groups if len(group) >= settings.least_cells]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Some cells of one visit."""
+
+    cells: SurfaceCells
+    rows: np.ndarray
+
+    @property
+    def points(self) -> np.ndarray:
+        return self.cells.points[self.rows]
+
+    @property
+    def color(self) -> np.ndarray:
+        """(3,) Lab, mean."""
+        return lab_of(self.cells.color[self.rows]).mean(axis=0)
+
+    def area_m2(self, settings: ChangeSettings) -> float:
+        """A plane crosses as many cubes as its three shadows along the axes have squares."""
+        shadows = np.abs(surface_normals(self.points)).sum(axis=1)
+        return float((settings.cell_m**2 / shadows).sum())
+
+
+def pair_moved(
+    vanished: list[_Part], appeared: list[_Part], settings: ChangeSettings
+) -> tuple[list[ChangedPlace], list[_Part]]:
+    """Moved things, and what is left: what vanished at one place and appeared at another, as large,
+    of the same colours, and of the same shape after a turn about the vertical.
+    """
+    found = []
+    for i, gone in enumerate(vanished):
+        for j, new in enumerate(appeared):
+            sizes = sorted((len(gone.rows), len(new.rows)))
+            if sizes[1] > LARGER * sizes[0]:
+                continue
+            if np.linalg.norm(gone.color - new.color) > ALIKE:
+                continue
+            misfit = shape_misfit(gone.points, new.points)
+            if misfit <= FITS * settings.cell_m:
+                found.append((misfit, i, j))
+    places: list[ChangedPlace] = []
+    used: tuple[set[int], set[int]] = (set(), set())
+    for _, i, j in sorted(found):
+        if i in used[0] or j in used[1]:
+            continue
+        used[0].add(i)
+        used[1].add(j)
+        area, points = appeared[j].area_m2(settings), appeared[j].points
+        place = ChangedPlace("moved", points, area, 0.0, "m", before=vanished[i].points)
+        places.append(replace(place, amount=float(np.linalg.norm(place.shift))))
+    left = [part for i, part in enumerate(vanished) if i not in used[0]]
+    left += [part for j, part in enumerate(appeared) if j not in used[1]]
+    return places, left
+
+
+def shape_misfit(a: np.ndarray, b: np.ndarray) -> float:
+    """Metres by which points b (M, 3) lie beside a (N, 3) after the best turn about +Y and shift:
+    the larger of both medians of nearest distances.
+    """
+    from scipy.spatial import cKDTree
+
+    middle_a, middle_b = ((p.min(axis=0) + p.max(axis=0)) / 2 for p in (a, b))
+    radius = float(np.linalg.norm(a - middle_a, axis=1).max())
+    best = np.inf
+    tree = cKDTree(a)
+    for turn in 2 * np.pi * np.arange(TURNS) / TURNS:
+        rotation = rotation_of(np.array([0.0, turn, 0.0]))
+        start = Similarity(rotation, middle_a - rotation @ middle_b)
+        for found in (start, fit_surfaces(a, b, start, 4 * radius, scaled=False)[0]):
+            moved = found.apply(b)
+            there, back = tree.query(moved)[0], cKDTree(moved).query(a)[0]
+            best = min(best, float(max(np.median(there), np.median(back))))
+    return best
