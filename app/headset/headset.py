@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,9 +17,11 @@ from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
     from shapeshift.app.headset.scene_shelf import SceneShelf
+    from shapeshift.app.headset.session.headset_link import HeadsetLink
     from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
+MOST_WAIT_S = 3600.0  # for a runtime that went away
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,9 @@ class Options(ReadingOptions):
     where the runtime knows them."""
     obstacles: bool = True
     """Darken the picture where the head goes into what stands in the scene."""
+    reopen: Annotated[float, Opt(metavar="SECONDS")] = 10.0
+    """Where the runtime goes away, try so long to go on in a new session, with all as it is; 0:
+    not at all."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     target_ms: Annotated[float | None, EXPERT] = None
@@ -125,6 +131,8 @@ def check(options: Options) -> None:
             raise UsageError(f"{name} is for --quality auto; leave one of the two out.")
     if options.vignette is not None and not 0 <= options.vignette <= 1:
         raise UsageError(f"--vignette is {options.vignette:g}, expected 0 to 1.")
+    if not 0 <= options.reopen <= MOST_WAIT_S:
+        raise UsageError(f"--reopen is {options.reopen:g}, expected 0 to {MOST_WAIT_S:g} seconds.")
     if options.text_size is not None and not LEAST_SIZE <= options.text_size <= MOST_SIZE:
         size = f"{options.text_size:g}, expected {LEAST_SIZE:g} to {MOST_SIZE:g}"
         raise UsageError(f"--text-size is {size}.")
@@ -153,14 +161,15 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.mirror import open_mirror
     from shapeshift.app.headset.open_xr import open_xr
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
+    from shapeshift.app.headset.session.headset_link import HeadsetLink
     from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.xr_app import XrApp
     from shapeshift.app.paths import config_folder
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
-    from shapeshift.vr.openxr.instance import Instance, Lost
+    from shapeshift.vr.openxr.instance import Lost
 
-    with Instance() as instance:
+    with HeadsetLink(partial(open_session, options), options.reopen) as link:
         worn = worn_settings(options)
         document, editor = open_xr(options.scene or DEMO, options, options.x)
         speak_first(ProgramSettings.read(config_folder()), editor.messages)
@@ -173,7 +182,7 @@ def wear(options: Options) -> int:
         with (
             Report(options.report, options.lines, options.pictures, options.every) as report,
             open_mirror(has_display(), options.mirror) as mirror,
-            open_session(instance, mirror.ctx, options) as session,
+            link.opened_on(mirror.ctx) as session,
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
@@ -181,25 +190,31 @@ def wear(options: Options) -> int:
             wearing = Wearing(
                 options.floor, options.hints, options.depth, options.panel_layer, options.edges,
             )  # fmt: skip
-            if not (options.controllers or session.bare_hands.there):
-                say(f"{instance.runtime} sees no hands; controllers are taken.")
-            if options.passthrough and not session.sees_through:
-                say(f"{instance.runtime} shows no room behind pictures; the scene has its own.")
-            for profile in session.hands.refused:
-                say(f"{instance.runtime} does not know {profile}.")
+            say_missing(link, options)
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
                 worn, shelf_of(options),
             )  # fmt: skip
             try:
                 with interrupting(xr_app), closing(xr_app):
-                    xr_app.loop(options.frames)
+                    report.ended = link.stay(xr_app, options.frames) or report.ended
             except Lost:
                 report.ended = "runtime lost"
                 raise
             finally:
-                report.write(describe(instance, session) | xr_app.state.pacing.report())
+                report.write(describe(link) | xr_app.state.pacing.report())
     return 0
+
+
+def say_missing(link: "HeadsetLink", options: Options) -> None:
+    """What was asked for and the runtime does not have."""
+    name, session = link.instance.runtime, link.session
+    if not (options.controllers or session.bare_hands.there):
+        say(f"{name} sees no hands; controllers are taken.")
+    if options.passthrough and not session.sees_through:
+        say(f"{name} shows no room behind pictures; the scene has its own.")
+    for profile in session.hands.refused:
+        say(f"{name} does not know {profile}.")
 
 
 def worn_settings(options: Options) -> "KeptSettings":
@@ -220,7 +235,7 @@ def shelf_of(options: Options) -> "SceneShelf":
     return SceneShelf(config_folder(), options, options.scene or DEMO, keeps=not measured)
 
 
-def open_session(instance, ctx, options: Options):
+def open_session(options: Options, instance, ctx):
     """The session that the options ask for.  Raises NoHeadset, Lost."""
     from shapeshift.vr.openxr.session import Session
 
@@ -250,12 +265,14 @@ def interrupting(xr_app) -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-def describe(instance, session) -> dict:
-    """The report without how it ended."""
+def describe(link: "HeadsetLink") -> dict:
+    """The report without how it ended, of the last session."""
+    instance, session = link.instance, link.session
     return {
         "runtime": instance.runtime,
         "headset": instance.headset,
         "states": session.life.states,
+        "reopened": link.reopened,
         "space": session.play.kind,
         "recentrings": session.recentrings,
         "profiles": session.profiles,

@@ -10,6 +10,7 @@ import numpy as np
 
 from shapeshift.app.charts.budget import EXACT, FLOOR_DB, Choice, choose, least_scale
 from shapeshift.app.charts.quick_chart import QUICK, QuickChart, QuickRow
+from shapeshift.app.document import Document
 from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.resolution import Resolution
@@ -17,6 +18,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Background
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
+from shapeshift.vr.pace import FramePace
 
 AUTO = "auto"
 FIXED: dict[str, str] = {  # quality of the panel -> row of the quick chart that it always is
@@ -181,3 +183,17 @@ class StereoChart:
         finally:
             self._renderer.settings = kept
         return tuple(self._chart.rows)
+
+
+def choose_quality(
+    pacing: Pacing, pace: FramePace, renderer: Renderer, scene: Scene, views: Sequence[View],
+    finish: Callable[[], None],
+) -> None:  # fmt: skip
+    """What of the picture can be had within the display's period: once that is known, and when it
+    is another one.
+    """
+    if not (pace.settled and pacing.wants_measure(pace.period_s)):
+        return
+    centre, _ = Document(scene).bounds()
+    pacing.measure(StereoChart(renderer, scene, views, centre, finish), pace.period_s)
+    pace.restart()

@@ -1,14 +1,19 @@
 """Pictures of what the headset sees, by a button: the next frame without the panel, as a PNG."""
 
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
+import moderngl
 import numpy as np
 
+from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.pictures import write_numbered_png
 from shapeshift.app.errors import UsageError
+from shapeshift.app.headset.scene_shelf import SceneShelf
+from shapeshift.vr.openxr.swapchain import read
 
 
 class Shutter:
@@ -41,6 +46,19 @@ class Shutter:
         except OSError as error:
             why = error.strerror or error
             failed(said("The picture cannot be written: {why}.", why=why))
+
+    def keep(
+        self, shelf: SceneShelf, framebuffer: moderngl.Framebuffer, messages: Messages
+    ) -> None:
+        """Of what an eye has just seen, where somebody has asked for a picture."""
+        if self.due:
+            self.expose(read(framebuffer))
+        shelf.saw(lambda: read(framebuffer))
+
+        def say_written(path: Path) -> None:
+            messages.say(said("{name} is written.", name=path.name), time.perf_counter())
+
+        self.poll(say_written, messages.fail)
 
     def close(self) -> None:
         self._threads.shutdown()

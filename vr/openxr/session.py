@@ -34,7 +34,7 @@ from shapeshift.vr.openxr.hands import Hands, pose_of
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.joints import HandTrackers
 from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
-from shapeshift.vr.openxr.life import BEGIN, END, Life
+from shapeshift.vr.openxr.life import BEGIN, END, LOST, Life
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import choose_format
 from shapeshift.vr.pace import FramePace
@@ -65,6 +65,7 @@ class Session:
         self._open: Any | None = None  # the runtime's state of the frame under way
         self._views: tuple = ()  # the runtime's, of the open frame
         self._start_ns: int | None = None
+        self._before_s = self._seen_s = 0.0  # at the first frame; of the last one
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
@@ -159,6 +160,15 @@ class Session:
         else:
             self.life.states.append("EXITING")  # never begun: there is nothing to wait for
 
+    def follow(self, lost: "Session") -> None:
+        """Goes on with the counts, states and clock of one that was lost."""
+        display_s, self.pace = self.pace.display_s, lost.pace
+        self.pace.display_s = display_s
+        self.pace.pause()
+        self.pace.restart()
+        self.recentrings, self._before_s = lost.recentrings, lost._seen_s
+        self.life.states = [*lost.life.states, LOST]
+
     def _poll_events(self) -> None:
         xr = self._xr
         with self._instance.asked("say what is new"):
@@ -194,7 +204,7 @@ class Session:
             now = state.predicted_display_time
             if self._start_ns is None:
                 self._start_ns = now
-            seen_s = (now - self._start_ns) * 1e-9
+            self._seen_s = seen_s = self._before_s + (now - self._start_ns) * 1e-9
             period_s = state.predicted_display_period * 1e-9
             self.pace.start(seen_s, period_s, self._began - asked)
             self._locate_head(now)
