@@ -61,6 +61,8 @@ class Options(ReadingOptions):
     runtime blends pictures by their alpha.  Default: as set last, at first not."""
     floor: bool = True
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
+    visibility: Annotated[bool, EXPERT] = True
+    """Draw no splats where the headset's lenses show nothing, if its runtime says where that is."""
     hints: bool = True
     """Name the buttons beside the gloves for ten seconds, and say when frames are late."""
     depth: bool = True
@@ -189,6 +191,7 @@ def wear(options: Options) -> int:
             rules = Rules(obstacles=options.obstacles)
             wearing = Wearing(
                 options.floor, options.hints, options.depth, options.panel_layer, options.edges,
+                options.visibility,
             )  # fmt: skip
             say_missing(link, options)
             xr_app = XrApp(
@@ -280,6 +283,7 @@ def describe(link: "HeadsetLink") -> dict:
         "pixels": session.pixels.name,
         "eyes": session.sizes,
         "depth": session.layers.depth,
+        "hidden": session.hidden_parts(),
         "passthrough": session.sees_through,
         **session.pace.report(),
     }

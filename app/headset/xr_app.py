@@ -215,7 +215,9 @@ class XrApp:
         records = [] if self._rests(frame, seconds) else self._live(frame, seconds)
         if frame.drawn:
             self._head = frame.head
-            views = [self.state.play_space.view(view) for view in frame.views]
+            views = [state.play_space.view(view) for view in frame.views]
+            if self.shutter.due or not self._wearing.visibility:
+                views = [replace(view, hidden=None) for view in views]
             self._choose_quality(views)
             over = self._over(frame)
             if self.shutter.due:

@@ -33,7 +33,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.tiles.depth import depth_picture, surface_picture
-from shapeshift.renderer.tiles.inputs import behind, camera_of, limits_of
+from shapeshift.renderer.tiles.inputs import behind, bin_view, camera_of, limits_of
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
@@ -293,10 +293,8 @@ class TilesDrawing(Drawing):
                 quantize_keys(self.device, projected.in_tiles)
             self._orders = [sort_order(self.device, p.in_tiles) for p in sorted_by]
         orders = self._orders * (len(views) if len(self._orders) == 1 else 1)
-        return [
-            bin_tiles(self.device, projected, view.size, order=order)
-            for projected, view, order in zip(self._projected, views, orders, strict=True)
-        ]
+        made = zip(self._projected, views, orders, strict=True)
+        return [bin_view(self.device, *each) for each in made]
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:
