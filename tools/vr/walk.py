@@ -28,7 +28,7 @@ TIMES = ("own_ms", "wait_ms", "shown_ms")
 COLUMNS = [
     "quality", "around", "depth", "eye", "seconds", "frames", "period_ms", "in_time", "dropped",
     *(f"{name[:-3]}_{p}" for name in TIMES for p in ("p50", "p95", "p99", "worst")),
-    "exact_ms", "chosen", "scale", "floor_db", "reached", "taken",
+    "target_ms", "exact_ms", "chosen", "scale", "floor_db", "chosen_db", "reached", "taken",
     "rss_minute1_mb", "rss_end_mb", "mb_a_minute",
 ]  # fmt: skip
 
@@ -40,7 +40,9 @@ def main() -> None:
     options.add_argument("--around", type=int, default=0, help="copies of the bundled scene")
     options.add_argument("--eye-part", type=float, default=1.0)
     options.add_argument("--floor-db", type=float, default=35.0)
-    options.add_argument("--quality", nargs="+", default=["best", "auto"])
+    options.add_argument("--target-ms", type=float, default=0.0, help="of --quality auto")
+    options.add_argument("--quality", nargs="+", default=["auto", "best"])
+    options.add_argument("--exact-seconds", type=float, default=0.0, help="of --quality best")
     options.add_argument("--depth", action="store_true", help="depth for the compositor, too")
     asked = options.parse_args()
     command = " ".join(["python3 tools/vr/walk.py", *sys.argv[1:]])
@@ -57,11 +59,13 @@ def measure(asked: argparse.Namespace, quality: str) -> dict:
         stand = Stand(find_runtime(), Path(folder))
         scene = crowded(Path(folder), asked.around)
         words = [str(scene), "--quality", quality, "--eye-part", str(asked.eye_part)]
-        words += ["--floor-db", str(asked.floor_db)] if quality == "auto" else []
+        if quality == "auto":
+            words += ["--floor-db", str(asked.floor_db)]
+            words += ["--target-ms", str(asked.target_ms)] if asked.target_ms else []
         words += [] if asked.depth else ["--no-depth"]
         program = start_program(stand, *words)
         try:
-            return measured(asked, stand, program) | {"quality": quality}
+            return measured(asked, quality, stand, program)
         finally:
             program.close()
             stand.close()
@@ -86,14 +90,14 @@ def crowded(folder: Path, copies: int) -> Path:
     return path
 
 
-def measured(asked: argparse.Namespace, stand: Stand, program: Program) -> dict:
+def measured(asked: argparse.Namespace, quality: str, stand: Stand, program: Program) -> dict:
     memory: list[tuple[float, float]] = []  # seconds of the session, MB
     with program.headset(stand.port) as remote:
         person = Person(program, remote)
         start = person.until(lambda line: line["focused"], "focused")["seen_s"]
         did = walk(
             person,
-            asked.seconds,
+            asked.seconds if quality == "auto" else asked.exact_seconds or asked.seconds,
             lambda line: memory.append((line["seen_s"] - start, rss_mb(program.process.pid))),
         )
         program.interrupt()
@@ -103,7 +107,8 @@ def measured(asked: argparse.Namespace, stand: Stand, program: Program) -> dict:
         **report, **did, "around": asked.around,
         "depth": report["depth"] if asked.depth else "none",
         "eye": "x".join(map(str, report["eyes"][0])),
-        "seconds": round(memory[-1][0]), "floor_db": asked.floor_db,
+        "seconds": round(memory[-1][0]), "floor_db": asked.floor_db if quality == "auto" else "",
+        "target_ms": asked.target_ms if quality == "auto" else "",
         "chosen": f'"{report["chosen"]}"',
         "rss_minute1_mb": round(settled[0, 1]), "rss_end_mb": round(settled[-1, 1]),
         "mb_a_minute": round(slope(settled), 2),
