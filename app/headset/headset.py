@@ -18,6 +18,7 @@ from shapeshift.app.terminal import say
 if TYPE_CHECKING:
     from shapeshift.app.headset.scene_shelf import SceneShelf
     from shapeshift.app.headset.session.headset_link import HeadsetLink
+    from shapeshift.app.headset.shutter import Shutter
     from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
@@ -98,6 +99,11 @@ class Options(ReadingOptions):
     """Format of the runtime's pictures, such as SRGB8_ALPHA8 or RGBA16F.  Default: the best."""
     frames: Annotated[int, EXPERT] = 0
     """End after so many frames, for tests and benchmarks; 0: stay until it is ended."""
+    record: Path | None = None
+    """Folder, new or empty, for what the left eye sees, as numbered PNGs of the whole session; the
+    panel's section Scenes begins and ends recordings too.  Default: none."""
+    record_rate: float = 10.0
+    """Frames a second of a recording, 0.1 to 120."""
     report: Annotated[Path | None, EXPERT] = None
     """File for what the run was like, as JSON, written at its end.  Default: none."""
     lines: Annotated[Path | None, EXPERT] = None
@@ -138,6 +144,8 @@ def check(options: Options) -> None:
     if options.text_size is not None and not LEAST_SIZE <= options.text_size <= MOST_SIZE:
         size = f"{options.text_size:g}, expected {LEAST_SIZE:g} to {MOST_SIZE:g}"
         raise UsageError(f"--text-size is {size}.")
+    if not 0.1 <= options.record_rate <= 120:
+        raise UsageError(f"--record-rate is {options.record_rate:g}, expected 0.1 to 120.")
     if options.frames < 0:
         raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
     if options.every < 1:
@@ -196,7 +204,7 @@ def wear(options: Options) -> int:
             say_missing(link, options)
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
-                worn, shelf_of(options),
+                worn, shelf_of(options), shutter_of(options),
             )  # fmt: skip
             try:
                 with interrupting(xr_app), closing(xr_app):
@@ -227,6 +235,19 @@ def worn_settings(options: Options) -> "KeptSettings":
 
     said = {each.name: getattr(options, each.name) for each in fields(WornSettings)}
     return KeptSettings(config_folder(), **said)
+
+
+def shutter_of(options: Options) -> "Shutter":
+    """What takes pictures, and records from the first frame on where that was asked for."""
+    from shapeshift.app.headset.session.recorder import Recorder
+    from shapeshift.app.headset.shutter import Shutter
+    from shapeshift.app.paths import WorkFolders
+
+    folder = WorkFolders.of().pictures
+    recorder = Recorder(folder, options.record_rate)
+    if options.record is not None:
+        recorder.start(options.record)
+    return Shutter(folder, recorder)
 
 
 def shelf_of(options: Options) -> "SceneShelf":

@@ -121,8 +121,9 @@ class XrApp:
         )
         self._parts_hand = PartsHand(parts)
         actions = MenuActions(
-            self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start
-        )
+            self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start,
+            self.shutter.recorder,
+        )  # fmt: skip
         self.menu = WristMenu(self.state, actions, self.eyes.panel)
         self._outlines = Outlines()
         self._stood = False  # whether the person has been put before the scene
@@ -216,7 +217,7 @@ class XrApp:
         if frame.drawn:
             self._head = frame.head
             views = [state.play_space.view(view) for view in frame.views]
-            if self.shutter.due or not self._wearing.visibility:
+            if self.shutter.wants(frame.seen_s) or not self._wearing.visibility:
                 views = [replace(view, hidden=None) for view in views]
             self._choose_quality(views)
             over = self._over(frame)
@@ -225,7 +226,8 @@ class XrApp:
             self._hand_over(frame.views, over, self.draw(views, frame.views, over))
             self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
-            self.shutter.keep(self.shelf, self.eyes.framebuffers[0], state.editor.messages)
+            left, messages = self.eyes.framebuffers[0], state.editor.messages
+            self.shutter.keep(self.shelf, left, messages, frame.seen_s)
             if frame.seen_s - self._figured_s >= FIGURES_EVERY_S:
                 self._figured_s = frame.seen_s
                 self.state.figures = Figures.of(self.session.pace, self.stats)
