@@ -32,7 +32,7 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
-from shapeshift.renderer.tiles.depth import depth_picture, surface_picture
+from shapeshift.renderer.tiles.depth import depth_picture, in_fewer_pixels, surface_picture
 from shapeshift.renderer.tiles.inputs import behind, bin_view, camera_of, limits_of
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
@@ -224,8 +224,9 @@ class TilesDrawing(Drawing):
         if settings.depth_scale > 0:
             with timer.time("depth", on_gpu=False):
                 for i, view in enumerate(views):
-                    blended = self._blend_depth(self._projected[i], tiles[i], view)
-                    self._depths[first + i] = depth_picture(self.device, blended)
+                    part = settings.depth_scale
+                    seen = in_fewer_pixels(self.device, self._projected[i], tiles[i], view, part)
+                    self._depths[first + i] = depth_picture(self.device, self._blend_depth(*seen))
 
     def _blend_depth(self, projected: Projected, tiles: Tiles, view: View) -> DepthFrame:
         """Depth, and normals in place of colours, which the records lose."""
