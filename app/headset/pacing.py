@@ -116,9 +116,9 @@ class Pacing:
         if not self._rows and not late and self.exact_ms <= EASY * target_ms:
             return
         self._rows = self._rows or chart.rows()
-        self._take(choose(self._rows, target_ms, self.floor_db))
+        self._use_row(choose(self._rows, target_ms, self.floor_db))
 
-    def _take(self, choice: Choice) -> None:
+    def _use_row(self, choice: Choice) -> None:
         """Draws with a row of the chart from the next frame on."""
         self.choice, target_ms = choice, self.target_ms
         if choice.name != EXACT:
@@ -159,7 +159,7 @@ class Pacing:
         quicker = choose(self._rows, self.target_ms / dearer, self.floor_db)
         if quicker.ms < self.choice.ms:
             self._times.clear()
-            self._take(quicker)
+            self._use_row(quicker)
 
     @property
     def _chosen_db(self) -> float | None:

@@ -100,7 +100,7 @@ class HiddenDepths:
 
     def _mesh(self, i: int, mesh: HiddenMesh) -> tuple[moderngl.Program, moderngl.VertexArray]:
         if self._program is None:
-            self._program = self._gpu.program("hidden.vert", "hidden.frag")
+            self._program = self._gpu.program("lenses/hidden.vert", "lenses/hidden.frag")
         kept = self._meshes.get(i)
         if kept is None or kept[0] is not mesh:
             self._forget_mesh(i)

@@ -33,7 +33,7 @@ class Recorder:
         self._start_s: float | None = None
         self._slot = -1  # of the last frame: rate times seconds since the start
         self._threads = ThreadPoolExecutor(1, "recording")
-        self._writing: list[Future[int]] = []
+        self.writing: list[Future[int]] = []
         self._rows: list[str] = []
 
     @property
@@ -76,25 +76,25 @@ class Recorder:
             return
         self._start_s = seen_s if self._start_s is None else self._start_s
         self._slot = self._slot_of(seen_s)
-        if len(self._writing) >= MOST_WAITING:
+        if len(self.writing) >= MOST_WAITING:
             self.left_out += 1
             return
         pixels = (np.clip(read(framebuffer), 0, 1) * 255 + 0.5).astype(np.uint8)
         path = self.folder / f"{self.count:05d}.png"
         self._rows.append(f"{self.count},{seen_s - self._start_s:.3f}")
         self.count += 1
-        self._writing.append(self._threads.submit(_write, pixels, path))
+        self.writing.append(self._threads.submit(write_frame, pixels, path))
 
     def poll(self, messages: Messages, now: float) -> None:
         """Once a frame: what has been written; what fails, or has no more room, ends it."""
-        while self._writing and self._writing[0].done():
+        while self.writing and self.writing[0].done():
             try:
-                self.bytes += self._writing.pop(0).result()
+                self.bytes += self.writing.pop(0).result()
             except (OSError, UsageError) as error:
                 why = getattr(error, "strerror", None) or error
                 messages.fail(said("The recording cannot be written: {why}.", why=why))
                 self.folder = None
-                self._writing.clear()
+                self.writing.clear()
         if self.recording and self.bytes >= self._most_bytes:
             self.stop(messages, now)
 
@@ -114,7 +114,7 @@ class Recorder:
         self._threads.shutdown()
 
 
-def _write(pixels: np.ndarray, path: Path) -> int:
+def write_frame(pixels: np.ndarray, path: Path) -> int:
     write_png(pixels, path)
     return path.stat().st_size
 

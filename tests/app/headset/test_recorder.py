@@ -28,7 +28,7 @@ def picture(shade: float) -> np.ndarray:
 def record(made: Recorder, times: list[float], messages: Messages) -> None:
     for seen_s in times:
         made.saw(seen_s, picture(seen_s))
-        for done in made._writing:
+        for done in made.writing:
             done.exception()  # waits: each is written before the next is seen
         made.poll(messages, 0.0)
 
@@ -61,7 +61,7 @@ def test_late_frames_are_no_reason_to_keep_more_of_them(tmp_path):
 
 def test_a_disk_that_is_too_slow_holds_few_frames_in_memory(tmp_path, monkeypatch):
     goes_on = threading.Event()
-    monkeypatch.setattr(recorder, "_write", lambda pixels, path: goes_on.wait(60) and 1)
+    monkeypatch.setattr(recorder, "write_frame", lambda pixels, path: goes_on.wait(60) and 1)
     made = Recorder(tmp_path, rate=10.0)
     made.start(tmp_path / "new")
     for i in range(MOST_WAITING + 5):
@@ -85,7 +85,7 @@ def test_a_folder_that_cannot_be_written_ends_it_with_a_sentence(tmp_path, monke
     def full(pixels, path):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(recorder, "_write", full)
+    monkeypatch.setattr(recorder, "write_frame", full)
     made, messages = Recorder(tmp_path), Messages()
     made.start(tmp_path / "new")
     record(made, [0.0], messages)
