@@ -48,5 +48,5 @@ def _tiles(
     rows, columns = (-(-n // side) for n in hidden.shape)
     padded = np.ones((rows * side, columns * side), bool)
     padded[: hidden.shape[0], : hidden.shape[1]] = hidden
-    tiles = padded.reshape(rows, side, columns, side).all((1, 3))
+    tiles: np.ndarray = np.all(padded.reshape(rows, side, columns, side), axis=(1, 3))
     return tiles if tiles.any() else None
