@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 
-from shapeshift.renderer.colors.color_cache import ColorCache
+from shapeshift.renderer.colors.color_cache import ColorCache, forget_colors
 from shapeshift.renderer.colors.eye_colors import EyeColors
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
 
+BESIDE_SET = 2  # of colours, behind those of two eyes
 NO_SHADE = Shade(None)  # nothing is decoded yet
 
 
@@ -25,4 +26,14 @@ class DecodedObject:
     grade: Appearance | None = None  # of its colours; None: they are as decoded
     second: tuple[Shade, Appearance | None] | None = None  # the same of a second set of colours
     opacity: float = 1.0  # times that of its splats
+    beside: tuple[Shade, Appearance | None] | None = None  # of the one for `Renderer.draw_beside`
     look: EyeColors | None = None  # made for the first pair of eyes
+
+    def look_beside(self, look: tuple[Shade, Appearance | None]) -> None:
+        """Forgets the colours of `draw_beside` where they are for another look."""
+        while len(self.colored) <= BESIDE_SET:
+            self.colored.append(ColorCache(self.colored[0].centre))
+        before = self.beside
+        if before is None or not before[0].same(look[0]) or before[1] != look[1]:
+            forget_colors([self.colored[BESIDE_SET]])
+        self.beside = look

@@ -1,6 +1,7 @@
 """What a drawing back end does, whichever way: tiles/ by OpenCL, gl/ by quads."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 
 import moderngl
@@ -51,7 +52,7 @@ class Drawing(ABC):
     @abstractmethod
     def color_set(self, which: int, count: int) -> None:
         """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
-        or one a view.
+        or one a view; more where `draw` is told which.
         """
 
     @abstractmethod
@@ -84,9 +85,14 @@ class Drawing(ABC):
 
     @abstractmethod
     def draw(
-        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
-    ) -> None:
-        """Draws every view; view i is then image(first + i)."""
+        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0,
+        sets: Sequence[int] = (), again: bool = False,
+    ) -> None:  # fmt: skip
+        """Draws every view; view i is then image(first + i).
+
+        sets: whose colours each view has; none: its own where there is a set for each, else the
+        one.  again: in the order of the frame before, whose views have seen all that these see.
+        """
 
     @abstractmethod
     def order_set_aside(self) -> AbstractContextManager[None]:
@@ -121,13 +127,13 @@ class Drawing(ABC):
 
     def presentable_bytes(
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
-        as_window: bool = False,
+        heat: bool = False, as_window: bool = False,
     ) -> np.ndarray:  # fmt: skip
         """(H, W, 4) uint8 of view i as a window shows it, opaque: red first and row 0 at the
         bottom, or as a window has it in memory, blue first and row 0 on top.
 
-        view: whose directions a sky is seen in.  palette: of the heat, where the frame has any,
-        else of the picture.  Only where presentable() is an array.
+        view: whose directions a sky is seen in.  palette: of the heat, where the view has any, else
+        of the picture.  Only where presentable() is an array.
         """
         raise TypeError("this drawing's pictures are textures; present them by GL.")
 

@@ -1,6 +1,6 @@
 """Draws scenes: the passes of a frame in order.  The file to read first in renderer/."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -8,12 +8,8 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.backends import choose_backends, open_drawing
-from shapeshift.renderer.colors.color_cache import (
-    ColorCache,
-    centre_of,
-    color_key,
-    forget_colors,
-)
+from shapeshift.renderer.colors.color_cache import ColorCache, centre_of, forget_colors
+from shapeshift.renderer.colors.decode_colors import decode_colors, scale_opacity
 from shapeshift.renderer.colors.eye_colors import drawn_together
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
@@ -29,7 +25,6 @@ from shapeshift.renderer.colors.palette import (
     overlay_heat,
     palette_between,
 )
-from shapeshift.renderer.colors.tint import tinted
 from shapeshift.renderer.colors.two_looks import (
     Look,
     grade_of,
@@ -38,9 +33,9 @@ from shapeshift.renderer.colors.two_looks import (
     same_shape,
     two_false_colors,
 )
-from shapeshift.renderer.colors.wanted import own_colors, wanted_anchors, wanted_of_follower
+from shapeshift.renderer.colors.wanted import own_colors
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
-from shapeshift.renderer.decoded_object import DecodedObject
+from shapeshift.renderer.decoded_object import BESIDE_SET, DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
 from shapeshift.renderer.resample import bilinear, scaled
@@ -52,7 +47,7 @@ from shapeshift.runtime_models.stop_weights import same_controls
 from shapeshift.scene.control import control_key, control_of
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import View
-from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.scene import Scene
 
 HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
 
@@ -92,6 +87,8 @@ class Renderer:
         self._geometry_runs = self._color_runs = 0
         self._views: list[View] = []  # of the last frame, in the size that is shown
         self._ways: list[FalseColors] = []  # how their colours came about
+        self.keeps_beside = False  # a set of colours for `draw_beside`, from the next frame on
+        self._beside_timer = PassTimer(ctx)
         self._debug: list[tuple[np.ndarray, dict[str, float]]] = []  # picture and numbers, a view
 
     @property
@@ -120,7 +117,7 @@ class Renderer:
                     decoded.x = x
                     decoded.version += 1
                 decoded.key = key
-                self._scale_opacity(i, obj, decoded)
+                scale_opacity(self.drawing, i, obj, decoded)
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.seen else HIDDEN for o in scene.objects]
         self.drawing.set_poses(poses)
@@ -144,13 +141,6 @@ class Renderer:
             if (grade := grade_of(obj, self._false_colors)) != decoded.grade:
                 decoded.grade = grade
                 forget_colors(decoded.colored)
-
-    def _scale_opacity(self, i: int, obj: SceneObject, decoded: DecodedObject) -> None:
-        """Its splats as opaque as its appearance says; nothing where they are."""
-        opacity = obj.appearance.opacity
-        if decoded.opacity != opacity:
-            self.drawing.scale_opacity(i, opacity)
-            decoded.opacity = opacity
 
     def _rebuild(self, scene: Scene) -> None:
         """A new arena for another set of objects; an empty one if the set does not fit."""
@@ -186,11 +176,11 @@ class Renderer:
         own, sorts = own_colors(self.settings, self._scene, self._decoded, full), 0
         with self._framebuffer_kept():
             for group in drawn_together(self._scene, len(full), own):
-                self._decode_colors(full[group], own)
+                sets = self._decode_colors(full[group], own)
                 if prepare_debug(self.drawing, views, self._scene, settings.debug):
                     for decoded in self._decoded:
                         forget_colors(decoded.colored)  # their own are to come back
-                self.drawing.draw(views[group], settings, self._timer, group.start)
+                self.drawing.draw(views[group], settings, self._timer, group.start, sets)
                 sorts += self.drawing.sorts
             self._debug = [
                 debug_image(self.drawing, i, view, self._scene, settings)
@@ -220,13 +210,39 @@ class Renderer:
         with self._framebuffer_kept():
             with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
                 for which, scene in enumerate(scenes):
-                    self.drawing.color_set(which, 2)
                     at_once = self._ways[which].way == SPLATS
-                    self._decode_color_set(which, [views[which]], scene, looks[which], at_once)
+                    self._decode_set((which, 2), [views[which]], scene, looks[which], at_once)
                 self.drawing.wait_decoded()
             small = [scaled(view, settings.render_scale) for view in views]
             self.drawing.draw(small, settings, self._timer)
         return self._stats_of(self.drawing.sorts, 2)
+
+    def draw_beside(self, views: Sequence[View], other: Scene, first: int) -> dict[str, float]:
+        """Draws views of a scene that differs in its colours alone from the one just drawn, as
+        pictures `first`..., in that frame's order: its two views have seen all that these see.
+
+        With `keeps_beside`, or its colours are decoded each time.  Milliseconds of the passes.
+        ValueError where more differs.  The counts become those of these views.
+        """
+        if not same_shape(self._scene, other):
+            raise ValueError("draw_beside wants a scene that differs in its colours alone.")
+        colors = false_colors(other, [control_of(obj) for obj in other.objects])
+        looks, timer = looks_of(other, colors), self._beside_timer
+        for decoded, look in zip(self._decoded, looks, strict=True):
+            decoded.look_beside(look)
+        settings = replace(self._settings_of_frame(), debug="", depth_scale=0.0)
+        self._views = [*self._views[:first], *views]
+        self._ways = [*self._ways[:first], *([colors] * len(views))]
+        with self._framebuffer_kept():
+            with timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
+                at_once = colors.way == SPLATS
+                self._decode_set((BESIDE_SET, BESIDE_SET + 1), list(views), other, looks, at_once)
+                self.drawing.wait_decoded()
+            self.drawing.draws_heat = colors.way == BESIDE
+            small = [scaled(view, settings.render_scale) for view in views]
+            sets = (BESIDE_SET,) * len(small)
+            self.drawing.draw(small, settings, timer, first, sets, again=True)
+        return timer.collect()
 
     def _stats_of(self, sorts: int, color_sets: int) -> FrameStats:
         """The counters of the frame that was just drawn; they begin anew."""
@@ -246,66 +262,45 @@ class Renderer:
         target = "rgba32f" if self.settings.debug else self._target or self.settings.target
         return replace(self.settings, target=target)
 
-    def _decode_colors(self, views: list[View], own: bool = False) -> None:
-        """Runs the colours of the visible objects for the middle of the eyes; own: for each eye."""
+    def _decode_colors(self, views: list[View], own: bool = False) -> tuple[int, ...]:
+        """Runs the colours of the visible objects for the middle of the eyes; own: for each eye.
+
+        Returns the sets of the views, where there is another one that is none of theirs.
+        """
         groups = [[view] for view in views] if own else [views]
+        count = BESIDE_SET + 1 if self.keeps_beside else len(groups)
         for decoded in self._decoded:
-            fresh = (ColorCache(decoded.colored[0].centre) for _ in groups[len(decoded.colored) :])
-            decoded.colored = [*decoded.colored[: len(groups)], *fresh]
+            fresh = (ColorCache(decoded.colored[0].centre) for _ in range(count))
+            decoded.colored = [*decoded.colored, *fresh][:count]
+        looks = [(decoded.shade, decoded.grade) for decoded in self._decoded]
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
             for which, group in enumerate(groups):
-                self.drawing.color_set(which, len(groups))
-                looks = [(decoded.shade, decoded.grade) for decoded in self._decoded]
                 at_once = self._false_colors.way == SPLATS
-                self._decode_color_set(which, group, self._scene, looks, at_once)
+                self._decode_set((which, count), group, self._scene, looks, at_once)
             self.drawing.wait_decoded()
+        return tuple(range(len(views)) if own else [0] * len(views)) if self.keeps_beside else ()
 
-    def _decode_color_set(
-        self, which: int, views: list[View], scene: Scene, looks: list[Look], at_once: bool
-    ) -> None:
-        """Runs one set of colours for the middle of some eyes, where it moved.
+    def _decode_set(
+        self, color_set: tuple[int, int], views: list[View], scene: Scene, looks: list[Look],
+        at_once: bool,
+    ) -> None:  # fmt: skip
+        """One set of colours of so many, for the middle of some eyes, where it moved."""
+        self.drawing.color_set(*color_set)
+        what = (color_set[0], views, scene, looks, at_once)
+        ran = decode_colors(self.drawing, self.settings, self._decoded, *what)
+        self._geometry_runs += ran[0]
+        self._color_runs += ran[1]
 
-        And the geometry of those that follow the eye: as often.
-        """
-        eye_world = np.mean([v.world_from_eye.position for v in views], axis=0)
-        degrees = self.settings.recolor_degrees
-        for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
-            if not obj.seen:
-                continue
-            colored = decoded.colored[which]
-            object_from_world = np.linalg.inv(obj.world_from_object.matrix())
-            eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
-            key = color_key(obj.model, decoded.version, eye)
-            stale = colored.is_stale(key, degrees, nearer=follows_eye(obj.model))
-            follows = follows_eye(obj.model)
-            if follows:
-                due, wanted = wanted_of_follower(self.settings, obj, colored, stale, views)
-                if due:
-                    colored.key, colored.anchors = key, wanted
-            else:
-                wanted = wanted_anchors(
-                    self.drawing, self.settings, i, obj, decoded, colored, stale, views
-                )
-                due = colored.mark_colored(key, wanted, stale)  # else all seen have their colours
-            if not due and obj.tint is colored.tint:
-                continue
-            with tinted(self.drawing, i, obj, colored):
-                if due and follows:
-                    self.drawing.decode_geometry(i, decoded.x, eye, wanted)
-                    self._geometry_runs += 1
-                    decoded.opacity = 1.0
-                    self._scale_opacity(i, obj, decoded)
-                if due:
-                    shade, grade = looks[i]
-                    self.drawing.decode_color(i, shade, eye, wanted, at_once, grade)
-                    self._color_runs += 1
+    def _has_heat(self, i: int) -> bool:
+        """Whether heat was drawn beside the colours of view i."""
+        return not self._debug and self._ways[i].way == BESIDE
 
     def image(self, i: int = 0) -> np.ndarray:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
         row 0 on top.  At a pure thermal stop it holds values, else colours.
         """
         colors = self._ways[i]
-        if not (self.drawing.draws_heat and colors.way == BESIDE):
+        if not self._has_heat(i):
             return self.drawing.image(i)
         ends = self.settings.heat_ends
         return overlay_heat(self.drawing.image(i), self.drawing.heat(i), colors.palette, ends)
@@ -318,7 +313,7 @@ class Renderer:
             return bilinear(self._debug[i][0], self._views[i].size)
         colors, view, ends = self._ways[i], self._views[i], self.settings.heat_ends
         rgba = bilinear(self.drawing.image(i), view.size)
-        if self.drawing.draws_heat and colors.way == BESIDE:
+        if self._has_heat(i):
             heat = bilinear(self.drawing.heat(i), view.size)
             rgba = overlay_heat(rgba, heat, colors.palette, ends)
         elif colors.way == PICTURE:
@@ -332,13 +327,13 @@ class Renderer:
         name = "" if self._debug else self._ways[i].palette
         palette = palette_between(name, self.settings.heat_ends) if name else None
         image = opaque(self._debug[i][0]) if self._debug else self.drawing.presentable(i)
-        heat = self.drawing.presentable_heat(i) if self.drawing.draws_heat and name else None
+        heat = self.drawing.presentable_heat(i) if self._has_heat(i) else None
         background, view = self.settings.background, self._views[i]
         as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
             if as_array and self._resolve.takes_bytes(framebuffer, image.shape[1::-1]):
                 as_window = self._resolve.is_window(framebuffer)
-                looks = (background, view, palette, as_window)
+                looks = (background, view, palette, heat is not None, as_window)
                 self._resolve.copy(self.drawing.presentable_bytes(i, *looks), framebuffer)
             else:
                 unit = 1.0 if self._debug else self.drawing.unit_of(i)
@@ -363,7 +358,7 @@ class Renderer:
         Of the worst view; inf where no pixel differs.  The order in use and its age stay as they
         are; image(i) is the picture in that order afterwards.
         """
-        self._decode_colors(views)
+        sets = self._decode_colors(views)
         self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
         settings = replace(self._settings_of_frame(), debug="")
         views = [scaled(view, settings.render_scale) for view in views]
@@ -371,7 +366,7 @@ class Renderer:
         for frames in (1, 0):  # sorted now, then the order that is kept
             once = replace(settings, resort_frames=frames, resort_degrees=0.0)
             with self._framebuffer_kept(), self.drawing.order_set_aside():
-                self.drawing.draw(views, once, PassTimer(self._ctx))
+                self.drawing.draw(views, once, PassTimer(self._ctx), sets=sets)
                 pictures.append([self.image(i)[..., :3].copy() for i in range(len(views))])
         return min(psnr(kept, exact) for exact, kept in zip(*pictures, strict=True))
 

@@ -46,11 +46,15 @@ class SortPolicy:
         settings: RenderSettings,
         changed: bool,
         median_distance: Callable[[np.ndarray], float],
+        again: bool = False,
     ) -> SortPlan:
         """For one frame.  changed: a pose, a control value or the set of objects, since the last.
 
-        median_distance(eye_from_world) is asked only where settings.order is "distance".
+        median_distance(eye_from_world) is asked only where settings.order is "distance".  again:
+        for more views of the frame before.
         """
+        if again:
+            return SortPlan((), True, self._age)
         frames = sort_frames(views, settings)
         may_keep = settings.resort_frames != 1
         asked = (

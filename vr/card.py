@@ -4,6 +4,7 @@ Drawn by Pillow with the letters of the debug legends: a card is a picture of it
 once, and the panel that ImGui draws may be closed while cards hang.  vr/ knows no ImGui.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -27,13 +28,22 @@ class Card:
     play_from_card: Pose
     opacity: float = 1.0
 
+    def picture(self) -> np.ndarray:
+        """(H, W, 4) uint8 premultiplied, row 0 on top."""
+        return card_picture(self.lines)
+
+    @property
+    def key(self) -> Hashable:
+        """Cards of equal keys have the same picture."""
+        return self.lines
+
     @property
     def size_m(self) -> tuple[float, float]:
-        height, width = card_picture(self.lines).shape[:2]
+        height, width = self.picture().shape[:2]
         return width * METRES_PER_PIXEL, height * METRES_PER_PIXEL
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def card_picture(lines: tuple[str, ...]) -> np.ndarray:
     """(H, W, 4) uint8 display sRGB premultiplied by alpha, row 0 on top."""
     from PIL import Image, ImageDraw

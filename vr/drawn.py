@@ -59,8 +59,12 @@ def drawn_of(
     outlines: Sequence[Capsule] = (),
     cards: tuple[Card, ...] = (),
     panel: moderngl.Texture | None = None,
+    gloves: Sequence[str] = SIDES,
 ) -> Drawn:
-    """What a frame shows; `hands` as the runtime has them, before the panel takes its part."""
+    """What a frame shows; `hands` as the runtime has them, before the panel takes its part.
+
+    gloves: the sides that are drawn as such.
+    """
     lines: list[Capsule] = list(outlines)
     beams = {beam.side: beam for beam in touched.beams}
     holds = {side for side, name in touched.held.items() if name is not None}
@@ -70,7 +74,7 @@ def drawn_of(
             lines += ray(side, hands[side], carried, beams.get(side))
     if comfort.arc is not None:
         lines += arc(comfort.arc.points, comfort.arc.landing, comfort.arc.fine)
-    solid = [part for side in SIDES for part in glove(side, hands[side], side in holds)]
+    solid = [part for side in gloves for part in glove(side, hands[side], side in holds)]
     quad = None
     if panel is not None and carried.play_from_panel is not None:
         quad = PanelQuad(panel, carried.play_from_panel, carried.plane.size_m)

@@ -45,7 +45,12 @@ BARE: tuple[str, ...] = (
 
 
 def hint_lines(profile: str, side: str, rules: Rules, panel_hand: str) -> tuple[str, ...]:
-    """ "button: what it does" for each that a hand's controller has."""
+    """The same without their names."""
+    return tuple(hint_rows(profile, side, rules, panel_hand).values())
+
+
+def hint_rows(profile: str, side: str, rules: Rules, panel_hand: str) -> dict[str, str]:
+    """ "button: what it does" for each that a hand's controller has, by the name of its action."""
     kind = profile.removeprefix("/interaction_profiles/")
     simple = kind == "khr/simple_controller"
     names = dict(NAMES.get(kind, {})) if simple else ANY | dict(NAMES.get(kind, {}))
@@ -63,10 +68,13 @@ def hint_lines(profile: str, side: str, rules: Rules, panel_hand: str) -> tuple[
     if rules.one_hand and "stick" in names and kind in WITH_CLICK:
         names["press"] = f"{names['stick']}, pressed"
         does["press"] = "panel"
-    words = [(names[button].split(" "), text) for button, text in does.items() if button in names]
-    lines = [f"{_of_hand(name, side)}: {text}" for name, text in words]
+    rows = {
+        button: f"{_of_hand(names[button].split(' '), side)}: {text}"
+        for button, text in does.items()
+        if button in names
+    }
     opens = side in (panel_hand, rules.one_hand)
-    return (*lines, "Palm up: panel") if opens else tuple(lines)
+    return rows | {"palm": "Palm up: panel"} if opens else rows
 
 
 def stick_text(side: str, rules: Rules) -> str:
@@ -76,11 +84,16 @@ def stick_text(side: str, rules: Rules) -> str:
     return "walk" if side == rules.walks else "turn, fly"
 
 
+def hint_opacity(seconds: float) -> float:
+    """After so many seconds of a session, 0 to 1."""
+    return min(max((SHOWN_S - seconds) / FADES_S, 0.0), 1.0)
+
+
 def hints(
     frame: Frame, seconds: float, profiles: Mapping[str, str], rules: Rules, panel_hand: str
 ) -> tuple[Card, ...]:
     """The cards after so many seconds of a session; none beside a hand that is not there."""
-    opacity = min(max((SHOWN_S - seconds) / FADES_S, 0.0), 1.0)
+    opacity = hint_opacity(seconds)
     cards = []
     for side in SIDES if opacity > 0 else ():
         grip = frame.hands[side].grip

@@ -1,7 +1,6 @@
 """Draws hands, lines, the panel, cards and the vignette over the splats' picture of an eye."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import moderngl
 import numpy as np
@@ -9,7 +8,6 @@ import numpy as np
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.shader import compile_program
 from shapeshift.scene.pose import View
-from shapeshift.vr.card import card_picture
 from shapeshift.vr.drawn import Drawn, PanelQuad
 from shapeshift.vr.flat import Flats
 from shapeshift.vr.glove import Capsule
@@ -185,9 +183,8 @@ class Overlay:
         self._bind_flats(size, depth)
         for number, card in enumerate(drawn.cards):
             clip = clip_from_play @ card.play_from_card.matrix()
-            picture = partial(card_picture, card.lines)
-            slot = f"card {number}"
-            self._flats.draw(slot, card.lines, picture, clip, card.size_m, card.opacity)
+            slot, how = f"card {number}", (clip, card.size_m, card.opacity)
+            self._flats.draw(slot, card.key, card.picture, *how)
 
     def _place_panel(
         self, panel: PanelQuad, size: tuple[int, int], view: View, depth: EyeDepth | None,

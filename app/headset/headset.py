@@ -16,9 +16,11 @@ from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
+    from shapeshift.app.editor.state.editor_state import EditorState
     from shapeshift.app.headset.scene_shelf import SceneShelf
     from shapeshift.app.headset.session.headset_link import HeadsetLink
     from shapeshift.app.headset.shutter import Shutter
+    from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
@@ -51,12 +53,18 @@ class Options(ReadingOptions):
     panel_hand: Literal["left", "right"] | None = None
     """The hand that carries the panel; the other points at it.  Default: as set last, at first
     left."""
+    hand_model: Literal["gloves", "controllers"] | None = None
+    """How hands that hold controllers are drawn; for the first ten seconds, while their buttons are
+    named, as controllers in any case.  Default: as set last, at first gloves."""
     vignette: float | None = None
     """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black.
     Default: as set last, at first 0.8."""
     text_size: float | None = None
     """Size of the panel with its text, 0.75 to 2; 1: capitals a degree high at arm's length.
     Default: as set last, at first 1."""
+    glass: Annotated[str, Opt(metavar="STOP")] = ""
+    """Hold a round glass through which this stop is seen, in the hand that carries the panel.
+    Default: none; the panel has one, too."""
     passthrough: bool | None = None
     """Show the room itself behind the scene, and of a scene of objects these alone, where the
     runtime blends pictures by their alpha.  Default: as set last, at first not."""
@@ -172,7 +180,6 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.open_xr import open_xr
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
     from shapeshift.app.headset.session.headset_link import HeadsetLink
-    from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.xr_app import XrApp
     from shapeshift.app.paths import config_folder
     from shapeshift.renderer.renderer import Renderer
@@ -182,6 +189,7 @@ def wear(options: Options) -> int:
     with HeadsetLink(partial(open_session, options), options.reopen) as link:
         worn = worn_settings(options)
         document, editor = open_xr(options.scene or DEMO, options, options.x)
+        wearing = wearing_of(options, editor)
         speak_first(ProgramSettings.read(config_folder()), editor.messages)
         pacing = Pacing(
             document.background_or(DARK), options.quality, options.floor_db or FLOOR_DB,
@@ -197,10 +205,6 @@ def wear(options: Options) -> int:
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
             rules = Rules(obstacles=options.obstacles)
-            wearing = Wearing(
-                options.floor, options.hints, options.depth, options.panel_layer, options.edges,
-                options.visibility,
-            )  # fmt: skip
             say_missing(link, options)
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
@@ -226,6 +230,17 @@ def say_missing(link: "HeadsetLink", options: Options) -> None:
         say(f"{name} shows no room behind pictures; the scene has its own.")
     for profile in session.hands.refused:
         say(f"{name} does not know {profile}.")
+
+
+def wearing_of(options: Options, editor: "EditorState") -> "Wearing":
+    """What was chosen at the door.  Raises UsageError for a stop that nothing has."""
+    from shapeshift.app.headset.over.glass_state import stop_named
+    from shapeshift.app.headset.wearing import Wearing
+
+    return Wearing(
+        options.floor, options.hints, options.depth, options.panel_layer, options.edges,
+        options.visibility, stop_named(editor, options.glass),
+    )  # fmt: skip
 
 
 def worn_settings(options: Options) -> "KeptSettings":

@@ -18,12 +18,14 @@ HANDS = (BOTH, *SIDES)
 VIGNETTES = (0.0, 0.4, 0.8, 1.0)  # that the panel offers
 LEAST_SIZE, MOST_SIZE = 0.75, 2.0  # of the panel's text
 SIZES = (0.8, 1.0, 1.25, 1.5)  # that the panel offers
+HAND_MODELS = ("gloves", "controllers")  # how a hand is drawn that holds a controller
 WORDS: dict[str, tuple[str, ...]] = {
     "posture": POSTURES,
     "hands": HANDS,
     "panel_hand": SIDES,
     "walking_hand": SIDES,
     "turning": TURNINGS,
+    "hand_model": HAND_MODELS,
 }
 
 
@@ -36,6 +38,7 @@ class WornSettings:
     panel_hand: str = "left"  # that carries the panel
     walking_hand: str = "left"  # whose stick walks
     turning: str = "snap"
+    hand_model: str = "gloves"
     vignette: float = 0.8  # 0: none, 1: black
     text_size: float = 1.0  # of the panel, with all that is on it
     passthrough: bool = False  # the room itself is behind the scene, where the runtime shows it

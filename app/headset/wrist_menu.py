@@ -29,6 +29,7 @@ from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.app.headset.sections.comfort_section import draw_comfort, draw_see_through
+from shapeshift.app.headset.sections.glass_section import draw_glass
 from shapeshift.app.headset.sections.performance_section import draw_figures
 from shapeshift.app.headset.sections.room_section import (
     Foot,
@@ -100,6 +101,10 @@ class WristMenu:
             draw_object_list(objects, scale)
             draw_parts(state.parts, scale)
 
+        def draw_looks(scale: float) -> None:
+            draw_look(editor, scale)
+            draw_glass(state)
+
         return [
             Section("Room", lambda scale: draw_room(state, room), open_first=True),
             Section(
@@ -111,7 +116,7 @@ class WristMenu:
             Section("Touch", lambda scale: draw_touch(state.touch, scale, False), open_first=True),
             Section("Stops", lambda scale: draw_stops(editor, scale)),
             Section("Gallery", self._draw_gallery, shown=lambda: bool(editor.scene.objects)),
-            Section("Look", lambda scale: draw_look(editor, scale)),
+            Section("Look", draw_looks),
             Section("Objects", draw_objects),
             Section("Performance", self._draw_figures),
             Section("Scenes", lambda scale: self._draw_scenes(scenes, scale)),
@@ -189,7 +194,7 @@ class WristMenu:
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
             self._foot.sure_s > 0, editor.messages.note, self.gallery.shown, self.styles.progress,
             state.figures if self._figures_seen else None, state.worn.now,
-            self.shelf.opening, self.shelf.shown, self._recording(),
+            self.shelf.opening, self.shelf.shown, self._recording(), state.glass.stop,
         )  # fmt: skip
 
     def _fill(self) -> None:

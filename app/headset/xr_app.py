@@ -15,7 +15,9 @@ from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
-from shapeshift.app.headset.notices import Late, late_card
+from shapeshift.app.headset.over.glass_state import GlassState, stop_now
+from shapeshift.app.headset.over.hand_glass import HandGlass
+from shapeshift.app.headset.over.over_splats import OverSplats
 from shapeshift.app.headset.pacing import Pacing, choose_quality
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
@@ -34,18 +36,14 @@ from shapeshift.scene.appearance import plain_color
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import IDENTITY
 from shapeshift.scene.world.record import Record
-from shapeshift.vr.area import area_edges
-from shapeshift.vr.card import Card
-from shapeshift.vr.drawn import Drawn, drawn_of
-from shapeshift.vr.floor import REST, Grid, clearness
+from shapeshift.vr.drawn import Drawn
+from shapeshift.vr.floor import REST, Floor, Grid, clearness
 from shapeshift.vr.frame import Frame
-from shapeshift.vr.glove import Capsule
-from shapeshift.vr.hints import hints
 from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.openxr.session import Session
-from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
 from shapeshift.vr.scene_depth import EyeDepth
+from shapeshift.vr.see_through import SeeThrough
 from shapeshift.vr.touching import strongest
 
 ANY_SIZE = (640, 360)  # of a view that only says where to stand
@@ -80,10 +78,11 @@ class XrApp:
         self._obstacles = rules.obstacles  # the picture darkens in them
         self._closing = ExitStack()
         self._closing.callback(self.shutter.close)
+        self._hand_glass = HandGlass(mirror.ctx, renderer)
+        self._closing.callback(self._hand_glass.close)
         self._scene = ExitStack()  # what ends with the scene that is open
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
-        self._late = Late()
         self._worn_s = 0.0  # since the hands were there for the first time
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
@@ -118,6 +117,7 @@ class XrApp:
             floor_shown=floor,
             worn=self._worn,
             sees_through=self.session.sees_through,
+            glass=GlassState(stop_now(editor, self._wearing.glass)),
         )
         self._parts_hand = PartsHand(parts)
         actions = MenuActions(
@@ -125,7 +125,7 @@ class XrApp:
             self.shutter.recorder,
         )  # fmt: skip
         self.menu = WristMenu(self.state, actions, self.eyes.panel)
-        self._outlines = Outlines()
+        self._over = OverSplats(self._wearing, self.eyes.panel, self._hand_glass)
         self._stood = False  # whether the person has been put before the scene
 
     def _change_scene(self) -> None:
@@ -219,8 +219,9 @@ class XrApp:
             views = [state.play_space.view(view) for view in frame.views]
             if self.shutter.wants(frame.seen_s) or not self._wearing.visibility:
                 views = [replace(view, hidden=None) for view in views]
+            state.shown = state.editor.shown(views[0])
             self._choose_quality(views)
-            over = self._over(frame)
+            over = self._over.of(frame, state, self.menu.carried, self.session, self._worn_s)
             if self.shutter.due:
                 over = replace(over, panel=None, lines=(), cards=())
             self._hand_over(frame.views, over, self.draw(views, frame.views, over))
@@ -280,44 +281,6 @@ class XrApp:
         poll_bodies(editor)
         return touch.advance(seconds)
 
-    def _over(self, frame: Frame) -> Drawn:
-        """What is in the room over the splats."""
-        person, carried = self.state.user, self.menu.carried
-        outlines, cards = self._outlined(frame), self._cards(frame)
-        panel = self.eyes.panel.texture
-        touched, hands = person.touched, frame.hands
-        over = drawn_of(hands, carried, person.comfort, touched, outlines, cards, panel)
-        if self._wearing.edges:
-            over = replace(over, edges=area_edges(frame))
-        if over.panel is None or not self._wearing.panel_layer:
-            return over
-        apart = replace(over.panel, version=self.eyes.panel.version, apart=True)
-        return replace(over, panel=apart)
-
-    def _outlined(self, frame: Frame) -> list[Capsule]:
-        """Around what hands would take, or their rays act on, that do not point at the panel."""
-        lines: list[Capsule] = []
-        carried = self.menu.carried
-        for offer in self.state.user.touched.offers:
-            obj = self.state.world.objects[offer.object]
-            hull = self._outlines.hull(obj.collider)
-            points = carried.on_panel and offer.side == carried.pointer
-            if hull is None or points:
-                continue
-            pose, ink = obj.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
-            lines += outline(hull, pose, self.state.play_space, frame.head.position, ink)
-        return lines
-
-    def _cards(self, frame: Frame) -> tuple[Card, ...]:
-        """What buttons do, at first; and that frames are late."""
-        if not self._wearing.hints:
-            return ()
-        side, rules = self.menu.carried.home, self.state.user.rules
-        cards = hints(frame, self._worn_s, self.session.profiles, rules, side)
-        if self._late.watch(frame.seen_s, self.session.pace.dropped):
-            cards += (late_card(frame.head, self.state.pacing.quality),)
-        return cards
-
     def draw(
         self, views: list[View], play_views: Sequence[View], over: Drawn
     ) -> list[EyeDepth] | None:
@@ -332,25 +295,37 @@ class XrApp:
         settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0)
         self.renderer.settings = replace(settings, background=self.background)
         start = time.perf_counter()
-        self.renderer.update(self.state.editor.shown(views[0]))
+        glass = self._hand_glass
+        looking = glass.look(self.state, views, play_views)
+        self.renderer.update(self.state.shown)
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
+        looking = glass.draw(looking, self.state)
         taken_ms = (time.perf_counter() - start) * 1e3
         # Depth is no part of what the chart of shortcuts has prices for.
         self._drawing_ms = max(taken_ms - self.stats.ms.get("depth", 0.0), 0.0)
         self.session.pace.drew(self._drawing_ms)
         depths = self.eyes.depths(self.renderer, self.state.play_space.scale) if deep else None
-        for i, framebuffer in enumerate(self.eyes.framebuffers):
-            self.renderer.present(framebuffer, i)
-            if through:
-                self.eyes.see_through.draw(framebuffer, self.renderer.coverage(i))
-            elif self.state.floor_shown:
-                grid = Grid(self._level_m, self._clearness)
-                behind = plain_color(self.background)
-                hidden = self.renderer.coverage(i)
-                floor = self.eyes.floor
-                floor.draw(framebuffer, play_views[i], self.state.play_space, hidden, grid, behind)
-            self.eyes.overlay.draw(framebuffer, play_views[i], over, depths[i] if depths else None)
+        eyes = self.eyes
+        for i, framebuffer in enumerate(eyes.framebuffers):
+            view, depth = play_views[i], depths[i] if depths else None
+            self._show(self.renderer, i, framebuffer, view, eyes.floor, eyes.see_through)
+            if looking is not None:
+                glass.lay(looking, i, framebuffer, view, depth, self._show)
+            eyes.overlay.draw(framebuffer, view, over, depth)
         return depths
+
+    def _show(
+        self, renderer: Renderer, i: int, framebuffer: moderngl.Framebuffer, play_view: View,
+        floor: Floor, see_through: SeeThrough,
+    ) -> None:  # fmt: skip
+        """Picture i of a renderer, and behind its splats the room itself or the floor."""
+        renderer.present(framebuffer, i)
+        if self.state.through:
+            see_through.draw(framebuffer, renderer.coverage(i))
+        elif self.state.floor_shown:
+            grid, behind = Grid(self._level_m, self._clearness), plain_color(self.background)
+            where = (play_view, self.state.play_space, renderer.coverage(i))
+            floor.draw(framebuffer, *where, grid, behind)
 
     def _hand_over(
         self, play_views: Sequence[View], over: Drawn, depths: list[EyeDepth] | None

@@ -7,11 +7,13 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.fitting import Fitting
+from shapeshift.app.headset.over.glass_state import GlassState
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.scene.four_views import ALONE, FULL, has_objects
 from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
 from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, move
@@ -91,6 +93,8 @@ class XrState:
     figures: Figures | None = None  # of the last second
     sees_through: bool = False  # the runtime can show the room behind pictures
     worn: KeptSettings = field(default_factory=KeptSettings)
+    glass: GlassState = field(default_factory=GlassState)
+    shown: Scene = field(default_factory=lambda: Scene(()))  # of this frame, as it is drawn
     fit: Fitting = field(init=False)
     _was_through: bool = False  # the room itself was behind the scene
 

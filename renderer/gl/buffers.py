@@ -23,6 +23,9 @@ Every class has release() and works with `with`; nothing is allocated after the 
 (Splatter: after the first frame of a size).
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import moderngl
 import numpy as np
 
@@ -79,6 +82,7 @@ class Arena:
         sort_groups = groups_for(n, layout.WORKGROUP * layout.SORT_BLOCKS)
         self.histogram = gpu.reserve(4 * layout.RADIX * sort_groups)
         self.counts = gpu.reserve(4 * layout.COUNTS_SIZE)
+        self._sorted = gpu.reserve(4)  # of counts, while others are counted
         self.command = gpu.upload(np.array([0, 1, 0, 0, 0], np.uint32))
         fit = min(STAGED_SPLATS, gpu.max_block // (4 * STAGED_FLOATS))
         self.staged = min(max(counts, default=0), fit)
@@ -120,6 +124,18 @@ class Arena:
     def holds_views(self, views: int) -> bool:
         """Whether the records of so many views at once fit this driver's storage blocks."""
         return 16 * layout.RECORD_VECS * self.count * views <= self.gpu.max_block
+
+    @contextmanager
+    def sorted_kept(self, kept: bool) -> Iterator[None]:
+        """kept: however many splats the body would sort, the order is of those that it was made of;
+        it is read from its end.
+        """
+        place = 4 * layout.COUNTS["SORTED"]
+        if kept:
+            self.gpu.ctx.copy_buffer(self._sorted, self.counts, 4, read_offset=place)
+        yield
+        if kept:
+            self.gpu.ctx.copy_buffer(self.counts, self._sorted, 4, write_offset=place)
 
     def make_room(self, views: int) -> None:
         """Records of so many views from now on; what they held is gone when they had to grow."""
@@ -231,7 +247,7 @@ class Arena:
         for buffer in (
             self.mean_opacity, self.covariance, *self.colors, self.records,
             self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
-            self.command, self.staging,
+            self.command, self.staging, self._sorted,
         ):  # fmt: skip
             buffer.release()
         for buffer in self._heats.values():

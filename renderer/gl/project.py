@@ -1,9 +1,10 @@
 """project: splats -> screen ellipses and keys to sort by; the only culling gate."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
+import moderngl
 import numpy as np
-from moderngl import ComputeShader
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
@@ -25,7 +26,7 @@ class Projector:
     def _variant(
         self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False,
         own_colors: bool = False,
-    ) -> ComputeShader:  # fmt: skip
+    ) -> moderngl.ComputeShader:  # fmt: skip
         return self._gpu.compute(
             "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
             KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
@@ -40,6 +41,7 @@ class Projector:
         sort_from_world: np.ndarray | None = None,
         keep_outside: bool = False,
         first_view: int = 0,
+        sets: Sequence[int] = (),
     ) -> None:
         """Projects all objects with their poses, under the limits of the settings.
 
@@ -47,7 +49,7 @@ class Projector:
         settings.order) in the frame sort_from_world (4, 4), by default the first view's eye.
         keep_outside: the order is to outlive this frame, or did outlive another: every splat that
         is not absent has a key, and every record is written; those of culled ones have no area.
-        first_view: number of the first of the views in its frame, where each has its own colours.
+        first_view, sets: as colors_of takes them.
         """
         if not 1 <= len(views) <= layout.MOST_VIEWS:
             raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
@@ -67,7 +69,7 @@ class Projector:
             mean_opacity=arena.mean_opacity, covariance=arena.covariance,
             records=arena.records, keys=arena.keys, counts=arena.counts,
         )  # fmt: skip
-        mine = arena.colors[first_view:] if len(arena.colors) > 1 else arena.colors
+        mine = colors_of(arena, first_view, sets)
         bind(color=mine[0])
         if own_colors := len(views) > 1 < len(mine):
             bind(second_color=mine[1])
@@ -111,6 +113,15 @@ class Projector:
         self.release()
 
 
+def colors_of(arena: Arena, first_view: int, sets: Sequence[int]) -> list[moderngl.Buffer]:
+    """Those of sets, one a view; else where each view has its own, from `first_view`, the number of
+    the first of them in its frame; else one for all.
+    """
+    if sets:
+        return [arena.colors[which] for which in dict.fromkeys(sets)]
+    return arena.colors[first_view:] if len(arena.colors) > 1 else arena.colors
+
+
 def jacobian_clamp(view: View) -> tuple[float, float]:
     """Largest |x/z| and |y/z| at which the projection's slope is that of the place itself."""
     x, y = view.widest_tangents()
@@ -137,7 +148,7 @@ def limits(settings: RenderSettings) -> dict[str, object]:
     return numbers
 
 
-def set_uniforms(program: ComputeShader, **values: object) -> None:
+def set_uniforms(program: moderngl.ComputeShader, **values: object) -> None:
     for name, value in values.items():
         program[name].value = value
 

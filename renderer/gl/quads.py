@@ -3,7 +3,7 @@
 What its methods mean: renderer/drawing.py.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
@@ -125,8 +125,9 @@ class QuadsDrawing(Drawing):
             self.arena.set_poses(poses)
 
     def draw(
-        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
-    ) -> None:
+        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0,
+        sets: Sequence[int] = (), again: bool = False,
+    ) -> None:  # fmt: skip
         arena = self.arena
         target, unit = choose_target(self._gpu, settings.target, self._brightest())
         self._splatter.target, self._splatter.unit = target, unit
@@ -134,7 +135,9 @@ class QuadsDrawing(Drawing):
         canted = len(sort_frames(views, settings)) > 1
         if canted:  # an order a view, and room for one: none is kept
             settings = replace(settings, resort_frames=1, resort_degrees=0.0)
-        plan = self._sort_policy.plan(views, settings, self._changed, self._median_distance)
+        again &= not canted  # else the order is that of one view alone
+        asked = (self._changed, self._median_distance, again)
+        plan = self._sort_policy.plan(views, settings, *asked)
         self._changed = False
         self.sorts, self.order_age = plan.sorts, plan.age
         at_once = len(views) <= MOST_VIEWS and arena.holds_views(len(views)) and not canted
@@ -148,12 +151,13 @@ class QuadsDrawing(Drawing):
                 own = frame is None or canted or len(views) == 1  # its own eye: one frame less
                 sort_from_world = None if own else frame
                 how = (settings, sort_from_world, keep_outside, i)
-                self._projector.project(arena, group, *how)
+                with arena.sorted_kept(again):
+                    self._projector.project(arena, group, *how, sets=sets[i : i + len(group)])
             if frame is not None:
                 with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
                     self._sorter.sort(arena, settings.key_bits)
             with timer.time("splat"):
-                self._splat(group, first + i, settings)
+                self._splat(group, first + i, settings, sets[i : i + len(group)])
             if settings.depth_scale > 0:
                 with timer.time("depth"):
                     for row, view in enumerate(group):
@@ -161,7 +165,9 @@ class QuadsDrawing(Drawing):
             i += len(group)
         self._last = len(groups[-1]) - 1
 
-    def _splat(self, group: list[View], i: int, settings: RenderSettings) -> None:
+    def _splat(
+        self, group: list[View], i: int, settings: RenderSettings, sets: Sequence[int] = ()
+    ) -> None:
         """Draws views that were projected together, from image i on; two at once where it pays."""
         arena, pair, disparity = self.arena, self.stereo_pair, None
         alike = len(group) == 2 and group[0].size == group[1].size and arena.count
@@ -175,7 +181,7 @@ class QuadsDrawing(Drawing):
         for row, view in enumerate(group):
             heat = None
             if self.draws_heat:
-                heat = arena.heat_of(min(i + row, len(arena.colors) - 1))
+                heat = arena.heat_of(sets[row] if sets else min(i + row, len(arena.colors) - 1))
             self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row, heat, view)
 
     @contextmanager

@@ -3,7 +3,7 @@
 What its methods mean: renderer/drawing.py.  No GL here.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
@@ -196,16 +196,18 @@ class TilesDrawing(Drawing):
             self._world_from_objects, self._changed = poses, True
 
     def draw(
-        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
-    ) -> None:
+        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0,
+        sets: Sequence[int] = (), again: bool = False,
+    ) -> None:  # fmt: skip
         if not self.splats:
-            for i, view in enumerate(views):
-                self._images[first + i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
-                self._heat_images[first + i] = np.zeros((*view.size[::-1], 2), np.float32)
-                self._depths[first + i] = np.zeros((*view.size[::-1], 4), np.float32)
+            for i, view in enumerate(views, first):
+                nothing = np.zeros((*view.size[::-1], 4), np.float32)
+                self._images[i] = self._depths[i] = nothing
+                self._heat_images[i] = nothing[..., :2]
             return
+        sets = sets or [first + i if len(self._colors) > 1 else 0 for i in range(len(views))]
         with timer.time("project", on_gpu=False):
-            self._project(views, settings)
+            self._project(views, settings, sets, again)
             self.device.queue.finish()
         with timer.time("bin", on_gpu=False):
             tiles = self._bin(views, settings.key_bits)
@@ -214,7 +216,7 @@ class TilesDrawing(Drawing):
             for size in {view.size for view in views}:
                 same = [i for i, view in enumerate(views) if view.size == size]
                 drawn = [(self._projected[i], tiles[i]) for i in same]
-                heats = self._heats_of(first, same) if self.draws_heat else []
+                heats = self._heats_of([sets[i] for i in same]) if self.draws_heat else []
                 images, heats = rasterize_with_heat(
                     self.device, drawn, heats, size, min_transmittance=settings.min_transmittance
                 )
@@ -236,17 +238,19 @@ class TilesDrawing(Drawing):
         )  # fmt: skip
         return rasterize_depth(self.device, projected, tiles, surfaces, view.size)
 
-    def _heats_of(self, first: int, views: list[int]) -> list:
-        """(N, 4) for each of the views: its own, or that of all; made where there is none yet."""
-        own = len(self._heats) > 1
+    def _heats_of(self, sets: Sequence[int]) -> list:
+        """(N, 4) of each of these sets; made where there is none yet."""
         for which, heat in enumerate(self._heats):
             if heat is None:
                 self._heats[which] = self.device.zeros((self.splats, 4))
-        return [self._heats[first + i if own else 0] for i in views]
+        return [self._heats[which] for which in sets]
 
-    def _project(self, views: list[View], settings: RenderSettings) -> None:
+    def _project(
+        self, views: list[View], settings: RenderSettings, sets: Sequence[int], again: bool
+    ) -> None:
         """Ellipses of all views, two in each launch: a splat is read once for both eyes."""
-        plan = self._sort_policy.plan(views, settings, self._changed, self._median_distance)
+        asked = (self._changed, self._median_distance, again)
+        plan = self._sort_policy.plan(views, settings, *asked)
         self._changed = False
         frames = [OPENCV_FROM_EYE @ frame for frame in plan.frames]
         shared = len(frames) <= 1 < len(views)
@@ -257,7 +261,7 @@ class TilesDrawing(Drawing):
             pair = views[first : first + 2]
             mine = frames[first : first + (1 if shared else 2)]
             sort = SortFrames(tuple(mine), settings.order == "distance", keep_outside)
-            colors = self._colors[first : first + 2] if len(self._colors) > 1 else self._colors
+            colors = [self._colors[which] for which in dict.fromkeys(sets[first : first + 2])]
             projected = self._launch(pair, settings, sort, self._rooms.get(first), colors)
             self._rooms[first] = projected
             self._projected += projected
@@ -273,19 +277,10 @@ class TilesDrawing(Drawing):
     ) -> list[Projected]:
         first, *second = colors or self._colors
         return project_arena(
-            self.device,
-            self._mean_opacity,
-            self._covariance,
-            first,
-            self._object_index,
-            self._world_from_objects,
-            [camera_of(view) for view in views],
-            limits_of(settings),
-            sort,
-            into,
-            self._antialiased,
-            second[0] if second else None,
-        )
+            self.device, self._mean_opacity, self._covariance, first, self._object_index,
+            self._world_from_objects, [camera_of(view) for view in views], limits_of(settings),
+            sort, into, self._antialiased, second[0] if second else None,
+        )  # fmt: skip
 
     def _bin(self, views: list[View], key_bits: int) -> list[Tiles]:
         if self.sorts:
@@ -332,11 +327,11 @@ class TilesDrawing(Drawing):
 
     def presentable_bytes(
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
-        as_window: bool = False,
+        heat: bool = False, as_window: bool = False,
     ) -> np.ndarray:  # fmt: skip
-        image, heat = self._images[i], self._heat_images[i] if self.draws_heat else None
+        image, values = self._images[i], self._heat_images[i] if heat else None
         seen = behind(background, view)
-        return resolve(self.device, image, seen, palette, heat, as_window=as_window)
+        return resolve(self.device, image, seen, palette, values, as_window=as_window)
 
     def presentable_depth(self, i: int) -> np.ndarray:
         return self._depths[i]

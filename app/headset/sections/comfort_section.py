@@ -15,6 +15,7 @@ POSTURE_NAMES = {"standing": "Standing", "seated": "Seated"}
 HAND_NAMES = {"both": "Both hands", "left": "Left alone", "right": "Right alone"}
 PANEL_NAMES = {"left": "Panel: left", "right": "Panel: right"}
 WALK_NAMES = {"left": "Walk: left", "right": "Walk: right"}
+MODEL_NAMES = {"gloves": "Gloves", "controllers": "Controllers"}
 TURN_NAMES = {"snap": "Snap turns", "smooth": "Smooth", "none": "By body"}
 ROOM, NO_ROOM = "the room behind the scene", "The runtime shows no room behind pictures."
 EDGE, TEXT = "dark edge while moving", "size of this panel"
@@ -28,6 +29,7 @@ def draw_comfort(settings: WornSettings, choose: Callable[..., None]) -> None:
         _words("panel_hand", PANEL_NAMES, settings, choose)
         _words("walking_hand", WALK_NAMES, settings, choose)
     _words("turning", TURN_NAMES, settings, choose)
+    _words("hand_model", MODEL_NAMES, settings, choose)
     for name, title, offered in (("vignette", EDGE, VIGNETTES), ("text_size", TEXT, SIZES)):
         imgui.text_disabled(said(title))
         labels = [f"{100 * value:.0f} %" for value in offered]

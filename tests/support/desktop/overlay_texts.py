@@ -49,8 +49,10 @@ TABLES = {
 HEADSET_TABLES = {
     "sections.comfort_section": {
         "POSTURE_NAMES": VALUES, "HAND_NAMES": VALUES, "PANEL_NAMES": VALUES, "WALK_NAMES": VALUES,
-        "TURN_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL, "ROOM": ALL, "NO_ROOM": ALL,
+        "TURN_NAMES": VALUES, "MODEL_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL, "ROOM": ALL,
+        "NO_ROOM": ALL,
     },
+    "sections.glass_section": {"NONE": ALL, "HELP": ALL},
     "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL}, "wrist_menu": {"SURE": ALL},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called

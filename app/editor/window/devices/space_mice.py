@@ -170,7 +170,8 @@ def read_joysticks() -> CapState | None:
     for number in range(glfw.JOYSTICK_LAST + 1):
         if not glfw.joystick_present(number):
             continue
-        name = (glfw.get_joystick_name(number) or b"").decode("utf-8", "replace").lower()
+        raw: bytes | None = glfw.get_joystick_name(number)
+        name = (raw or b"").decode("utf-8", "replace").lower()
         if not any(known in name for known in NAMES):
             continue
         axes, count = glfw.get_joystick_axes(number)

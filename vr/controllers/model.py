@@ -1,0 +1,230 @@
+"""A controller as capsules, of our own making: what one holds, with its buttons where they are.
+
+One shape for each family of profiles, not the makers' own.  In the grip's own frame, as OpenXR has
+it: the fist holds a tube along Z with the thumb at -Z, open fingers point to -Y, and the right
+hand's back is at +X.  Below, places are (out, ahead, up) of a right hand whose thumb is up: out of
+the back of the hand, to where its fingers point, to its thumb.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from shapeshift.vr.frame import Hand
+from shapeshift.vr.glove import LIT, MIRROR, Capsule
+
+SHELL, KEY = (0.74, 0.75, 0.79), (0.34, 0.36, 0.43)  # display sRGB
+HEAD = (0.0, 0.012, 0.046)  # the middle of what the thumb lies on
+FACE_UP, FACE_ALONG = np.array([0.0, -0.40, 0.917]), np.array([0.0, 0.917, 0.40])
+FACE_M = 0.020  # from the head's middle to its face
+PRESSED_M = 0.0025  # a button goes down by
+PULLED_M, SQUEEZED_M = 0.007, 0.003  # a trigger and a grip go in by
+TILT_M = 0.007  # the tip of a stick goes aside by
+FROM_RIGHT = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, -1.0]])  # grip frame of (out, ahead, up)
+
+# What of a hand says how far a button is pressed, 0 to 1.
+HOW_FAR: Mapping[str, Callable[[Hand], float]] = {
+    "trigger": lambda hand: hand.trigger,
+    "squeeze": lambda hand: hand.squeeze,
+    "stick": lambda hand: max(float(np.hypot(*hand.stick)), float(hand.stick_click)),
+    "primary": lambda hand: float(hand.primary),
+    "secondary": lambda hand: float(hand.secondary),
+    "menu": lambda hand: float(hand.menu),
+}
+
+
+@dataclass
+class Model:
+    """A right hand's controller while it is put together."""
+
+    hand: Hand
+    sign: float  # of the side: 1 right, -1 left
+    parts: list[Capsule] = field(default_factory=list)
+    places: dict[str, np.ndarray] = field(default_factory=dict)  # of buttons, to point at
+
+    def add(self, a, b, radii: float | tuple[float, float], color=SHELL) -> None:
+        """A piece from a to b."""
+        both = radii if isinstance(radii, tuple) else (radii, radii)
+        self.parts.append(Capsule(np.array(a, float), np.array(b, float), both, color))
+
+    def how_far(self, button: str) -> float:
+        return min(max(HOW_FAR[button](self.hand), 0.0), 1.0)
+
+    def key(self, button: str, a, b, radii, pressed=(0.0, 0.0, 0.0)) -> None:
+        """A button from a to b, that goes by `pressed` when it is down, and is lit then."""
+        part = self.how_far(button)
+        moved = np.array(pressed) * part
+        self.add(np.add(a, moved), np.add(b, moved), radii, mixed(KEY, LIT, part))
+        self.places.setdefault(button, np.add(b, moved))
+
+    def dome(self, button: str, out: float, along: float, radius: float = 0.0052) -> None:
+        """A round button on the face."""
+        base, top = face(out, along), face(out, along, 0.003)
+        self.key(button, base, top, radius, -FACE_UP * PRESSED_M)
+
+    def stick(self, out: float, along: float) -> None:
+        x, y = self.hand.stick
+        aside = np.array([self.sign * x, 0, 0]) + FACE_ALONG * y
+        down = PRESSED_M if self.hand.stick_click else 0.0
+        base, tip = face(out, along), face(out, along, 0.013 - down) + aside * TILT_M
+        color = mixed(KEY, LIT, self.how_far("stick"))
+        self.add(base, tip, 0.0042, KEY)
+        self.add(tip, tip, 0.0088, color)
+        self.places["stick"] = tip
+
+    def disc(self, out: float, along: float, radius: float, color, width: int = 2) -> None:
+        """A flat round pad on the face, of rings."""
+        middle = face(out, along, -0.0015)
+        for ring in range(1, width + 1):
+            at = radius * (ring - 0.5) / width
+            circle(
+                self, middle, at, (np.array([1.0, 0, 0]), FACE_ALONG), radius / width * 0.62, color
+            )
+
+    def trigger(self) -> None:
+        top, tip = (0.0, 0.030, 0.040), (0.0, 0.038, 0.020)
+        self.key("trigger", top, tip, (0.0095, 0.0062), (0.0, -PULLED_M, 0.0))
+
+    def grip(self, out: float = -0.0125) -> None:
+        """A button on the handle where the middle finger lies, and with it the ring finger."""
+        goes = (SQUEEZED_M if out < 0 else -SQUEEZED_M, 0.0, 0.0)
+        self.key("squeeze", (out, 0.008, 0.008), (out, 0.005, -0.016), 0.0066, goes)
+
+    def handle(self, foot: float = -0.055, color=SHELL) -> None:
+        self.add((0.0, -0.010, foot), (0.0, 0.004, 0.030), (0.0155, 0.0160), color)
+
+    def head(self, wide: float = 0.008) -> None:
+        out, ahead, up = HEAD
+        self.add((out - wide, ahead, up), (out + wide, ahead, up), 0.0205)
+
+
+def circle(model: Model, middle, radius: float, axes, thick: float, color=SHELL) -> None:
+    """A ring of capsules around a middle, across two axes."""
+    count = 10 if radius < 0.02 else 20
+    turns = np.linspace(0, 2 * np.pi, count + 1)
+    points = [middle + radius * (np.cos(t) * axes[0] + np.sin(t) * axes[1]) for t in turns]
+    for a, b in pairwise(points):
+        model.add(a, b, thick, color)
+
+
+def touch_like(model: Model) -> None:
+    """A stick and two buttons on a round face."""
+    model.handle()
+    model.head()
+    model.trigger()
+    model.grip()
+    model.stick(-0.009, 0.006)
+    model.dome("primary", 0.009, -0.006)
+    model.dome("secondary", 0.013, 0.007)
+    model.dome("menu", -0.006, -0.013, 0.0032)
+
+
+def index_like(model: Model) -> None:
+    """A strap over the back of the hand; the handle itself feels how it is squeezed."""
+    squeezed = model.how_far("squeeze")
+    model.handle(-0.060, mixed(SHELL, LIT, squeezed))
+    model.places["squeeze"] = np.array([-0.014, 0.006, -0.012])
+    model.head(0.010)
+    model.trigger()
+    strap = [(0.014, 0.0, 0.055), (0.038, -0.002, 0.040), (0.050, -0.006, 0.0),
+             (0.038, -0.010, -0.045), (0.006, -0.012, -0.062)]  # fmt: skip
+    for a, b in pairwise(strap):
+        model.add(a, b, 0.0065, KEY)
+    model.stick(-0.011, 0.004)
+    model.add(face(0.002, -0.008, -0.003), face(0.002, 0.010, -0.003), 0.0060, KEY)
+    model.dome("primary", 0.013, -0.008)
+    # The upper one is B in both hands: the panel's in the left, true size in the right one.
+    model.dome("secondary", 0.014, 0.005)
+    if model.sign < 0:
+        model.dome("menu", 0.014, 0.005, 0.0054)
+
+
+def wand_like(model: Model) -> None:
+    """A long handle with a ring at its head and a trackpad under the thumb."""
+    model.handle(-0.105)
+    model.head(0.006)
+    pressed = max(model.how_far("stick"), model.how_far("primary"))
+    model.disc(0.0, 0.0, 0.018, mixed(KEY, LIT, pressed))
+    model.places |= {"stick": face(0.0, 0.015, 0.002), "primary": face(0.0, 0.0, 0.002)}
+    model.trigger()
+    model.grip(-0.014)
+    model.grip(0.014)
+    model.dome("menu", 0.0, 0.024, 0.0036)
+    axes = np.array([1.0, 0, 0]), FACE_ALONG
+    circle(model, np.array([0.0, 0.052, 0.088]), 0.040, axes, 0.0095)
+
+
+def motion_like(model: Model) -> None:
+    """A stick and a small trackpad, and a ring of lights above them."""
+    model.handle()
+    model.head(0.012)
+    model.trigger()
+    model.grip()
+    model.stick(-0.012, 0.004)
+    model.disc(0.012, 0.002, 0.010, mixed(KEY, LIT, model.how_far("primary")))
+    model.places["primary"] = face(0.012, 0.002, 0.003)
+    model.dome("menu", 0.0, -0.014, 0.0034)
+    axes = np.array([1.0, 0, 0]), FACE_ALONG
+    circle(model, np.array([0.0, 0.046, 0.082]), 0.045, axes, 0.0060)
+
+
+def simple(model: Model) -> None:
+    """One button, and one for the menu."""
+    model.handle(-0.045)
+    model.head(0.004)
+    model.dome("trigger", 0.0, 0.004, 0.0085)
+    model.places["squeeze"] = model.places["trigger"]
+    model.dome("menu", 0.0, -0.013, 0.0036)
+
+
+FAMILIES: Mapping[str, Callable[[Model], None]] = {
+    "valve/index_controller": index_like,
+    "oculus/touch_controller": touch_like,
+    "htc/vive_controller": wand_like,
+    "microsoft/motion_controller": motion_like,
+    "khr/simple_controller": simple,
+}
+
+
+@dataclass(frozen=True)
+class HeldController:
+    """Of a hand in the room: metres."""
+
+    parts: tuple[Capsule, ...]
+    buttons: Mapping[str, np.ndarray]  # (3,) of each button's top
+
+
+def controller(side: str, hand: Hand, profile: str, holds: bool = False) -> HeldController | None:
+    """The controller that a hand holds; None where it holds none, or is lost.
+
+    profile: of OpenXR; of one that is not known the commonest is drawn.  holds: an object, too.
+    """
+    if hand.grip is None or hand.joints is not None:
+        return None
+    model = Model(hand, 1.0 if side == "right" else -1.0)
+    FAMILIES.get(profile.removeprefix("/interaction_profiles/"), touch_like)(model)
+    if holds:
+        model.add((0.0, -0.009, -0.046), (0.0, -0.008, -0.040), 0.0175, LIT)
+    if "stick" in model.places:
+        model.places["press"] = model.places["stick"]  # of a stick that can be pressed
+    # Columns: of the right hand's grip, as glove.py has it.
+    to_play = hand.grip.matrix()[:3, :3] * MIRROR[side] @ FROM_RIGHT
+    at = hand.grip.position
+    parts = tuple(
+        Capsule(to_play @ p.a + at, to_play @ p.b + at, p.radii, p.color) for p in model.parts
+    )
+    return HeldController(
+        parts, {name: to_play @ place + at for name, place in model.places.items()}
+    )
+
+
+def face(out: float, along: float, over: float = 0.0) -> np.ndarray:
+    """(3,) a place on the face: out, up along it, and over it."""
+    return np.array(HEAD) + FACE_UP * (FACE_M + over) + FACE_ALONG * along + np.array([out, 0, 0])
+
+
+def mixed(color, other, part: float) -> tuple[float, ...]:
+    """A colour on its way to another one."""
+    return tuple(a + (b - a) * part for a, b in zip(color, other, strict=True))
