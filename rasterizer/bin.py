@@ -54,16 +54,21 @@ def bin_tiles(
     size: tuple[int, int],
     form: str | None = None,
     order: "Array | None" = None,
+    hidden: np.ndarray | None = None,
 ) -> Tiles:
     """The intersection lists of an image of `size` (width, height) pixels; order by depth, stable.
 
     form: "cpu" or "gpu", by default the device's kind.  Both give the same lists.
     order: (n,) int32 splats near to far, as sort_order gives it for another view or an earlier
     frame: it is not sorted again, and splats that this view does not show take no part.
+    hidden: (tiles down, tiles across) bool of tiles whose lists stay empty: nothing is drawn there.
+    Only with an order, and not for backward passes.
     """
     grid = grid_of(size)
     if order is not None:
-        return _bin_chunks(device, projected, grid, order)
+        return _bin_chunks(device, projected, grid, order, hidden)
+    if hidden is not None:
+        raise ValueError("tiles are hidden from lists of a given order alone.")
     bin_form = {"cpu": _bin_chunks, "gpu": _bin_groups}[form or device.kind]
     return bin_form(device, projected, grid)
 
@@ -116,8 +121,9 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
 
 
 def _bin_chunks(
-    device: Device, projected: Projected, grid: tuple[int, int], order: "Array | None" = None
-) -> Tiles:
+    device: Device, projected: Projected, grid: tuple[int, int], order: "Array | None" = None,
+    hidden: np.ndarray | None = None,
+) -> Tiles:  # fmt: skip
     """The CPU form: a work-item owns a chunk of splats and a table of counts."""
     kernels = device.program(KERNELS / "bin.cl")
     scratch = projected.scratch
@@ -130,7 +136,8 @@ def _bin_chunks(
         )  # fmt: skip
     total = int(device.view(scratch.status)[:, 1].sum(dtype=np.int64))
     order = sort_order(device, scratch) if order is None else order
-    starts, intersections = _scatter_tiles(device, kernels, order, projected.record, scratch, total)
+    made = (order, projected.record, scratch, total, hidden)
+    starts, intersections = _scatter_tiles(device, *made)
     return Tiles(grid, starts, intersections, scratch.tile_bounds, order, total)
 
 
@@ -178,8 +185,12 @@ def _sort(device: Device, kernels: dict, scratch: TileScratch, visible: int, lea
     return order
 
 
-def _scatter_tiles(device, kernels, order, record, scratch: TileScratch, total: int) -> tuple:
+def _scatter_tiles(
+    device: Device, order: "Array", record: "Array", scratch: TileScratch, total: int,
+    hidden: np.ndarray | None = None,
+) -> tuple:  # fmt: skip
     """(tiles + 1,) starts and at most (total,) intersections from the splats in depth order."""
+    kernels = device.program(KERNELS / "bin.cl", **({} if hidden is None else {"HIDDEN": 1}))
     grid, tiles, visible = scratch.grid, scratch.grid[0] * scratch.grid[1], order.shape[0]
     chunks = chunks_of(device, visible)
     chunk = -(-visible // chunks)
@@ -189,13 +200,18 @@ def _scatter_tiles(device, kernels, order, record, scratch: TileScratch, total: 
     intersections = device.empty(total + SPARE * chunks, np.int32)
     near_to_far = device.empty((visible, 2), np.uint32)  # tile bounds
     shared = (visible, chunk, grid[0], bins)
+    shown = []
+    if hidden is not None:
+        among = np.zeros(bins, np.uint8)
+        among[:tiles] = ~hidden.reshape(-1)
+        shown = [device.constants(among)]
     device.launch(
         kernels["count_tiles"], chunks, 1,
-        *shared, order, record, scratch.tile_bounds, near_to_far, table,
+        *shared, order, record, scratch.tile_bounds, near_to_far, table, *shown,
     )  # fmt: skip
     device.launch(kernels["scan_table"], 1, 1, bins, chunks, table, starts)
     device.launch(
         kernels["scatter_tiles"], chunks, 1,
-        *shared, total, order, record, near_to_far, table, intersections,
+        *shared, total, order, record, near_to_far, table, intersections, *shown,
     )  # fmt: skip
     return starts, intersections

@@ -4,7 +4,7 @@ Depth is where a ray is halfway through a splat's ellipsoid, not the depth of it
 flat splats is a wall from the side, too.  kernels/common/surface.cl has the formula.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,6 +60,18 @@ def surface_backward(
         count, float(camera.near), device.constants(camera.packed()), means, scales, wxyz,
         projected.record, surfaces, grad_surface, *grads,
     )  # fmt: skip
+
+
+def resized_records(
+    device: Device, projected: Projected, size: tuple[int, int], new: tuple[int, int]
+) -> Projected:
+    """What was projected into a picture of `size` (width, height) pixels, in one of `new`."""
+    count = projected.record.shape[0]
+    record = device.empty((count, RECORD))
+    kernel = device.program(KERNELS / "resize_records.cl")["resize_records"]
+    across, along = new[0] / size[0], new[1] / size[1]
+    device.launch(kernel, count, GROUP, count, across, along, projected.record, record)
+    return replace(projected, record=record, scratch=None)
 
 
 def surface_arena(

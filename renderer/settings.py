@@ -32,8 +32,8 @@ class RenderSettings:
     target: str = "auto"
     render_scale: float = 1.0  # of the view's width and height, then shown at full size
     min_transmittance: float = 1e-4  # tiles: a pixel with less left is done (3DGS)
-    # Depth beside the colours, expected along each ray: quads draw it at this part of the picture's
-    # width and height, tiles at all of it; 0: none.
+    # Depth beside the colours, expected along each ray, at this part of the picture's width and
+    # height; 0: none.
     depth_scale: float = 0.0
 
     # Culls

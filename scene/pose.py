@@ -53,6 +53,18 @@ class Pose:
         return Pose(m[:3, 3].copy(), q / np.linalg.norm(q))
 
 
+class HiddenMesh:
+    """Triangles of an eye's picture that its lens does not show; two of them are never equal.
+
+    triangles: (T, 3, 2) tangents to the right and up.  Raises ValueError.
+    """
+
+    def __init__(self, triangles: np.ndarray) -> None:
+        self.triangles = np.asarray(triangles, np.float64)
+        if self.triangles.shape[1:] != (3, 2) or not np.isfinite(self.triangles).all():
+            raise ValueError("a hidden mesh has triangles (T, 3, 2) of finite tangents.")
+
+
 @dataclass(frozen=True)
 class View:
     """One eye.  Desktop is a list of one, stereo a list of two."""
@@ -64,6 +76,8 @@ class View:
     size: tuple[int, int]  # width, height, pixels
     # Tangents of the picture that this is a part of, where it is one: see widest_tangents.
     whole: tuple[float, float, float, float] | None = None
+    # Where nobody looks, through a headset's lens: what is drawn there is nobody's loss.
+    hidden: HiddenMesh | None = None
 
     def __post_init__(self) -> None:
         """Refuses what has no picture: ValueError with a sentence."""

@@ -1,14 +1,23 @@
 """Frame pacing: our own time against the runtime's period, and how many frames were dropped."""
 
+from array import array
 from collections import deque
+from collections.abc import MutableSequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-KEPT = 20_000  # frames whose times are kept: a few minutes
+KEPT = 120_000  # frames whose times are kept: sixteen minutes of 120 a second, a megabyte each
 SETTLED = 10  # frames after which what the runtime tells of its period is believed
 RECOVER = 4  # frames
 RECENT = 30  # frames: the shortest of their periods is the display's
+
+
+Times = MutableSequence[float]
+
+
+def no_times() -> Times:
+    return array("d")  # eight bytes each: a list of ten minutes would be seen to grow
 
 
 @dataclass
@@ -23,9 +32,11 @@ class FramePace:
     frames: int = 0
     dropped: int = 0  # the runtime showed an older one in their place
     over: int = 0  # frames whose own time was longer than the period
-    own_ms: list[float] = field(default_factory=list)  # from the runtime's go to our hand-over
-    drawing_ms: list[float] = field(default_factory=list)  # of own_ms, the splats of both eyes
-    wait_ms: list[float] = field(default_factory=list)  # the runtime let us wait
+    late: int = 0  # frames that were seen more than a period after the one before
+    own_ms: Times = field(default_factory=no_times)  # from the runtime's go to our hand-over
+    drawing_ms: Times = field(default_factory=no_times)  # of own_ms, the splats of both eyes
+    wait_ms: Times = field(default_factory=no_times)  # the runtime let us wait
+    shown_ms: Times = field(default_factory=no_times)  # from a frame that is seen to the next
     _periods: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))  # periods, seconds
     _seen_s: float | None = None  # when the last frame was to be seen
     _unfair: int = 0  # frames whose times and gaps do not count
@@ -47,7 +58,10 @@ class FramePace:
         if period_s > 0:
             self._periods.append(period_s)
         if self._seen_s is not None and self.period_s > 0 and self.settled and not self._unfair:
-            self.dropped += max(round((seen_s - self._seen_s) / self.period_s) - 1, 0)
+            missed = max(round((seen_s - self._seen_s) / self.period_s) - 1, 0)
+            self.dropped += missed
+            self.late += missed > 0
+            _keep(self.shown_ms, (seen_s - self._seen_s) * 1e3)
         self._seen_s = seen_s
         self.frames += 1
         _keep(self.wait_ms, wait_s * 1e3)
@@ -85,21 +99,23 @@ class FramePace:
         return {
             "frames": self.frames,
             "dropped": self.dropped,
+            "in_time": round(1 - self.late / len(self.shown_ms), 5) if self.shown_ms else None,
             "over_period": int(self.over),
             "period_ms": round(self.period_s * 1e3, 3),
             "own_ms": _percentiles(self.own_ms),
             "drawing_ms": _percentiles(self.drawing_ms),
             "wait_ms": _percentiles(self.wait_ms),
+            "shown_ms": _percentiles(self.shown_ms),
         }
 
 
-def _keep(times: list[float], ms: float) -> None:
+def _keep(times: Times, ms: float) -> None:
     times.append(ms)
     if len(times) > KEPT:
         del times[: KEPT // 2]
 
 
-def _percentiles(times: list[float]) -> dict:
+def _percentiles(times: Times) -> dict:
     if not times:
         return {}
     found = np.percentile(times, [50, 95, 99, 100])

@@ -24,8 +24,23 @@ class Eyes:
     def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
         self.floor, self.overlay, self.panel = Floor(ctx), Overlay(ctx), PanelPicture(ctx)
         self.see_through = SeeThrough(ctx)
-        self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
+        self._ctx = ctx
+        self.framebuffers: list[moderngl.Framebuffer] = []
+        self.fit(sizes)
         self._depths = [SceneDepth(ctx) for _ in sizes]
+
+    def fit(self, sizes: Sequence[tuple[int, int]]) -> None:
+        """Pictures of (width, height) pixels, one an eye; those there are stay where they fit."""
+        if [framebuffer.size for framebuffer in self.framebuffers] == [*sizes]:
+            return
+        old = list(zip(self.framebuffers, self.textures, strict=True))
+        ctx = self._ctx
+        self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
+        if old:
+            self.framebuffers[0].use()  # one of the old ones may be bound
+        for framebuffer, texture in old:
+            framebuffer.release()
+            texture.release()
 
     @property
     def textures(self) -> list[moderngl.Texture]:

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -17,10 +18,13 @@ from shapeshift.app.terminal import say
 if TYPE_CHECKING:
     from shapeshift.app.editor.state.editor_state import EditorState
     from shapeshift.app.headset.scene_shelf import SceneShelf
+    from shapeshift.app.headset.session.headset_link import HeadsetLink
+    from shapeshift.app.headset.shutter import Shutter
     from shapeshift.app.headset.wearing import Wearing
     from shapeshift.app.headset.worn_settings import KeptSettings
 
 NO_HEADSET = 4  # exit code
+MOST_WAIT_S = 3600.0  # for a runtime that went away
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class Options(ReadingOptions):
     runtime blends pictures by their alpha.  Default: as set last, at first not."""
     floor: bool = True
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
+    visibility: Annotated[bool, EXPERT] = True
+    """Draw no splats where the headset's lenses show nothing, if its runtime says where that is."""
     hints: bool = True
     """Name the buttons beside the gloves for ten seconds, and say when frames are late."""
     depth: bool = True
@@ -81,6 +87,9 @@ class Options(ReadingOptions):
     where the runtime knows them."""
     obstacles: bool = True
     """Darken the picture where the head goes into what stands in the scene."""
+    reopen: Annotated[float, Opt(metavar="SECONDS")] = 10.0
+    """Where the runtime goes away, try so long to go on in a new session, with all as it is; 0:
+    not at all."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     target_ms: Annotated[float | None, EXPERT] = None
@@ -98,6 +107,11 @@ class Options(ReadingOptions):
     """Format of the runtime's pictures, such as SRGB8_ALPHA8 or RGBA16F.  Default: the best."""
     frames: Annotated[int, EXPERT] = 0
     """End after so many frames, for tests and benchmarks; 0: stay until it is ended."""
+    record: Path | None = None
+    """Folder, new or empty, for what the left eye sees, as numbered PNGs of the whole session; the
+    panel's section Scenes begins and ends recordings too.  Default: none."""
+    record_rate: float = 10.0
+    """Frames a second of a recording, 0.1 to 120."""
     report: Annotated[Path | None, EXPERT] = None
     """File for what the run was like, as JSON, written at its end.  Default: none."""
     lines: Annotated[Path | None, EXPERT] = None
@@ -133,9 +147,13 @@ def check(options: Options) -> None:
             raise UsageError(f"{name} is for --quality auto; leave one of the two out.")
     if options.vignette is not None and not 0 <= options.vignette <= 1:
         raise UsageError(f"--vignette is {options.vignette:g}, expected 0 to 1.")
+    if not 0 <= options.reopen <= MOST_WAIT_S:
+        raise UsageError(f"--reopen is {options.reopen:g}, expected 0 to {MOST_WAIT_S:g} seconds.")
     if options.text_size is not None and not LEAST_SIZE <= options.text_size <= MOST_SIZE:
         size = f"{options.text_size:g}, expected {LEAST_SIZE:g} to {MOST_SIZE:g}"
         raise UsageError(f"--text-size is {size}.")
+    if not 0.1 <= options.record_rate <= 120:
+        raise UsageError(f"--record-rate is {options.record_rate:g}, expected 0.1 to 120.")
     if options.frames < 0:
         raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
     if options.every < 1:
@@ -161,13 +179,14 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.mirror import open_mirror
     from shapeshift.app.headset.open_xr import open_xr
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
+    from shapeshift.app.headset.session.headset_link import HeadsetLink
     from shapeshift.app.headset.xr_app import XrApp
     from shapeshift.app.paths import config_folder
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
-    from shapeshift.vr.openxr.instance import Instance, Lost
+    from shapeshift.vr.openxr.instance import Lost
 
-    with Instance() as instance:
+    with HeadsetLink(partial(open_session, options), options.reopen) as link:
         worn = worn_settings(options)
         document, editor = open_xr(options.scene or DEMO, options, options.x)
         wearing = wearing_of(options, editor)
@@ -181,30 +200,36 @@ def wear(options: Options) -> int:
         with (
             Report(options.report, options.lines, options.pictures, options.every) as report,
             open_mirror(has_display(), options.mirror) as mirror,
-            open_session(instance, mirror.ctx, options) as session,
+            link.opened_on(mirror.ctx) as session,
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
             rules = Rules(obstacles=options.obstacles)
-            if not (options.controllers or session.bare_hands.there):
-                say(f"{instance.runtime} sees no hands; controllers are taken.")
-            if options.passthrough and not session.sees_through:
-                say(f"{instance.runtime} shows no room behind pictures; the scene has its own.")
-            for profile in session.hands.refused:
-                say(f"{instance.runtime} does not know {profile}.")
+            say_missing(link, options)
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
-                worn, shelf_of(options),
+                worn, shelf_of(options), shutter_of(options),
             )  # fmt: skip
             try:
                 with interrupting(xr_app), closing(xr_app):
-                    xr_app.loop(options.frames)
+                    report.ended = link.stay(xr_app, options.frames) or report.ended
             except Lost:
                 report.ended = "runtime lost"
                 raise
             finally:
-                report.write(describe(instance, session) | xr_app.state.pacing.report())
+                report.write(describe(link) | xr_app.state.pacing.report())
     return 0
+
+
+def say_missing(link: "HeadsetLink", options: Options) -> None:
+    """What was asked for and the runtime does not have."""
+    name, session = link.instance.runtime, link.session
+    if not (options.controllers or session.bare_hands.there):
+        say(f"{name} sees no hands; controllers are taken.")
+    if options.passthrough and not session.sees_through:
+        say(f"{name} shows no room behind pictures; the scene has its own.")
+    for profile in session.hands.refused:
+        say(f"{name} does not know {profile}.")
 
 
 def wearing_of(options: Options, editor: "EditorState") -> "Wearing":
@@ -214,7 +239,7 @@ def wearing_of(options: Options, editor: "EditorState") -> "Wearing":
 
     return Wearing(
         options.floor, options.hints, options.depth, options.panel_layer, options.edges,
-        stop_named(editor, options.glass),
+        options.visibility, stop_named(editor, options.glass),
     )  # fmt: skip
 
 
@@ -227,6 +252,19 @@ def worn_settings(options: Options) -> "KeptSettings":
     return KeptSettings(config_folder(), **said)
 
 
+def shutter_of(options: Options) -> "Shutter":
+    """What takes pictures, and records from the first frame on where that was asked for."""
+    from shapeshift.app.headset.session.recorder import Recorder
+    from shapeshift.app.headset.shutter import Shutter
+    from shapeshift.app.paths import WorkFolders
+
+    folder = WorkFolders.of().pictures
+    recorder = Recorder(folder, options.record_rate)
+    if options.record is not None:
+        recorder.start(options.record)
+    return Shutter(folder, recorder)
+
+
 def shelf_of(options: Options) -> "SceneShelf":
     """Scenes for the panel; a run that is measured puts none into the list."""
     from shapeshift.app.headset.scene_shelf import SceneShelf
@@ -236,7 +274,7 @@ def shelf_of(options: Options) -> "SceneShelf":
     return SceneShelf(config_folder(), options, options.scene or DEMO, keeps=not measured)
 
 
-def open_session(instance, ctx, options: Options):
+def open_session(options: Options, instance, ctx):
     """The session that the options ask for.  Raises NoHeadset, Lost."""
     from shapeshift.vr.openxr.session import Session
 
@@ -266,12 +304,14 @@ def interrupting(xr_app) -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-def describe(instance, session) -> dict:
-    """The report without how it ended."""
+def describe(link: "HeadsetLink") -> dict:
+    """The report without how it ended, of the last session."""
+    instance, session = link.instance, link.session
     return {
         "runtime": instance.runtime,
         "headset": instance.headset,
         "states": session.life.states,
+        "reopened": link.reopened,
         "space": session.play.kind,
         "recentrings": session.recentrings,
         "profiles": session.profiles,
@@ -279,6 +319,7 @@ def describe(instance, session) -> dict:
         "pixels": session.pixels.name,
         "eyes": session.sizes,
         "depth": session.layers.depth,
+        "hidden": session.hidden_parts(),
         "passthrough": session.sees_through,
         **session.pace.report(),
     }

@@ -10,6 +10,7 @@ import numpy as np
 
 from shapeshift.app.charts.budget import EXACT, FLOOR_DB, Choice, choose, least_scale
 from shapeshift.app.charts.quick_chart import QUICK, QuickChart, QuickRow
+from shapeshift.app.document import Document
 from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.resolution import Resolution
@@ -17,6 +18,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Background
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
+from shapeshift.vr.pace import FramePace
 
 AUTO = "auto"
 FIXED: dict[str, str] = {  # quality of the panel -> row of the quick chart that it always is
@@ -114,11 +116,15 @@ class Pacing:
         if not self._rows and not late and self.exact_ms <= EASY * target_ms:
             return
         self._rows = self._rows or chart.rows()
-        self.choice = choose(self._rows, target_ms, self.floor_db)
-        if self.choice.name != EXACT:
-            say(self.choice.sentence)
+        self._use_row(choose(self._rows, target_ms, self.floor_db))
+
+    def _use_row(self, choice: Choice) -> None:
+        """Draws with a row of the chart from the next frame on."""
+        self.choice, target_ms = choice, self.target_ms
+        if choice.name != EXACT:
+            say(choice.sentence)
         # Fewer pixels are priced alone: on top of other shortcuts nobody knows what they cost.
-        chosen = self.choice.settings
+        chosen = choice.settings
         priced = least_scale(self._rows, self.floor_db)
         plain = RenderSettings()
         alone = replace(chosen, render_scale=1.0, target=plain.target, background=plain.background)
@@ -137,12 +143,42 @@ class Pacing:
         if self._resolution is not None:
             self._resolution.target_ms = self.target_ms
             self._resolution.seen(drawing_ms)
+            self._choose_again()
+
+    def _choose_again(self) -> None:
+        """Where frames stay late though all was measured: another place is dearer than the one of
+        the chart, and fewer pixels do not make up for it.  The prices are taken for as much
+        dearer as the frames are, and a quicker row for the one in use.
+        """
+        if self.choice is None or len(self._times) < LATE:
+            return
+        now_ms = median(self._times)
+        if not now_ms > OVER * self.target_ms:
+            return
+        dearer = max(now_ms / self.choice.ms, 1.0)
+        quicker = choose(self._rows, self.target_ms / dearer, self.floor_db)
+        if quicker.ms < self.choice.ms:
+            self._times.clear()
+            self._use_row(quicker)
+
+    @property
+    def _chosen_db(self) -> float | None:
+        """What the worst view was priced at with what was chosen, or the fewest pixels that may
+        follow; None for the exact picture, and where nothing was measured.
+        """
+        if self.choice is None or self._resolution is None:
+            return None
+        fewest = [r.db for r in self._rows if r.settings.render_scale == self._resolution.least]
+        shown = [self.choice.db, *(fewest if self.settings().render_scale < 1 else [])]
+        least = min(db for db in shown if db >= self.floor_db or db == self.choice.db)
+        return round(least, 2) if least < np.inf else None
 
     def report(self) -> dict:
         return {
             "quality": self.quality,
             "exact_ms": round(self.exact_ms, 3),
             "chosen": self.chosen,
+            "chosen_db": self._chosen_db,
             "scale": self.settings().render_scale,
             "stereo_colors": self.settings().stereo_colors,
         }
@@ -181,3 +217,17 @@ class StereoChart:
         finally:
             self._renderer.settings = kept
         return tuple(self._chart.rows)
+
+
+def choose_quality(
+    pacing: Pacing, pace: FramePace, renderer: Renderer, scene: Scene, views: Sequence[View],
+    finish: Callable[[], None],
+) -> None:  # fmt: skip
+    """What of the picture can be had within the display's period: once that is known, and when it
+    is another one.
+    """
+    if not (pace.settled and pacing.wants_measure(pace.period_s)):
+        return
+    centre, _ = Document(scene).bounds()
+    pacing.measure(StereoChart(renderer, scene, views, centre, finish), pace.period_s)
+    pace.restart()

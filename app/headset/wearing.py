@@ -12,6 +12,7 @@ class Wearing:
     depth: bool = True  # of the splats: hides hands behind them, and goes to the compositor
     panel_layer: bool = True  # the panel is a layer of the compositor's
     edges: bool = True  # of the room that is free to walk in
+    visibility: bool = True  # nothing is drawn where lenses show nothing
     glass: str = ""  # the stop that a glass in the hand shows; "": there is none
 
 

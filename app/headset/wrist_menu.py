@@ -40,6 +40,7 @@ from shapeshift.app.headset.sections.room_section import (
     draw_scale,
 )
 from shapeshift.app.headset.sections.scenes_section import SceneActions, draw_scenes
+from shapeshift.app.headset.session.recorder import Recorder
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
 from shapeshift.vr.frame import Frame
@@ -65,6 +66,7 @@ class MenuActions:
     shelf: SceneShelf = field(default_factory=SceneShelf)
     picture: Callable[[], None] = lambda: None  # the next frame is one
     start_here: Callable[[Frame], None] = lambda frame: None
+    recorder: Recorder | None = None
 
 
 class WristMenu:
@@ -91,7 +93,9 @@ class WristMenu:
         """The headset's own, and those of the desktop's panel that need no keys and no window."""
         state, editor = self._state, self._state.editor
         objects = ObjectEdits(editor, None, lambda: None)
-        scenes = SceneActions(self._open, self._start_here, self._actions.picture)
+        scenes = SceneActions(
+            self._open, self._start_here, self._actions.picture, self._record, self._recording
+        )
 
         def draw_objects(scale: float) -> None:
             draw_object_list(objects, scale)
@@ -190,7 +194,7 @@ class WristMenu:
             state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
             self._foot.sure_s > 0, editor.messages.note, self.gallery.shown, self.styles.progress,
             state.figures if self._figures_seen else None, state.worn.now,
-            self.shelf.opening, self.shelf.shown, state.glass.stop,
+            self.shelf.opening, self.shelf.shown, self._recording(), state.glass.stop,
         )  # fmt: skip
 
     def _fill(self) -> None:
@@ -237,6 +241,13 @@ class WristMenu:
     def _start_here(self) -> None:
         if self._frame is not None:
             self._actions.start_here(self._frame)
+
+    def _record(self) -> None:
+        if self._actions.recorder is not None:
+            self._actions.recorder.toggle(self._state.editor.messages, time.perf_counter())
+
+    def _recording(self) -> bool:
+        return self._actions.recorder is not None and self._actions.recorder.recording
 
     def _draw_figures(self, _: float) -> None:
         self._figures_seen = True

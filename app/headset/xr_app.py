@@ -4,7 +4,6 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 
 import moderngl
 
@@ -13,18 +12,18 @@ from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
-from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.over.glass_state import GlassState, stop_now
 from shapeshift.app.headset.over.hand_glass import HandGlass
 from shapeshift.app.headset.over.over_splats import OverSplats
-from shapeshift.app.headset.pacing import Pacing, StereoChart
+from shapeshift.app.headset.pacing import Pacing, choose_quality
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.app.headset.sections.performance_section import Figures
+from shapeshift.app.headset.session.comeback import Comeback
 from shapeshift.app.headset.shutter import Shutter
 from shapeshift.app.headset.wearing import WEARING, Wearing
 from shapeshift.app.headset.worn_settings import KeptSettings
@@ -34,8 +33,8 @@ from shapeshift.app.paths import WorkFolders
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.appearance import plain_color
-from shapeshift.scene.four_views import ALONE, FULL, has_objects
 from shapeshift.scene.pose import View
+from shapeshift.scene.scene import IDENTITY
 from shapeshift.scene.world.record import Record
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import REST, Floor, Grid, clearness
@@ -43,13 +42,13 @@ from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.openxr.session import Session
-from shapeshift.vr.openxr.swapchain import read
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.see_through import SeeThrough
 from shapeshift.vr.touching import strongest
 
 ANY_SIZE = (640, 360)  # of a view that only says where to stand
 FIGURES_EVERY_S = 1.0  # of the section Performance
+ROOMS_OWN = "STAGE"  # play space whose origin is a place of the room's
 LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on the table
 
 
@@ -91,7 +90,9 @@ class XrApp:
         self._figured_s = 0.0  # when the panel's figures were made
         self._drawing_ms = 0.0  # of the splats of both eyes, last
         self.interrupted = False  # by Ctrl-C: no frame is left half done
-        self._leaving = False
+        self.leaving = False
+        self._head = IDENTITY  # of the last frame, room
+        self._comeback: Comeback | None = None
         self._enter(document, editor, pacing, rules, wearing.floor)
 
     def _enter(
@@ -120,11 +121,11 @@ class XrApp:
         )
         self._parts_hand = PartsHand(parts)
         actions = MenuActions(
-            self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start
-        )
+            self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start,
+            self.shutter.recorder,
+        )  # fmt: skip
         self.menu = WristMenu(self.state, actions, self.eyes.panel)
         self._over = OverSplats(self._wearing, self.eyes.panel, self._hand_glass)
-        self._was_through = False  # whether the room itself was behind the scene
         self._stood = False  # whether the person has been put before the scene
 
     def _change_scene(self) -> None:
@@ -162,17 +163,30 @@ class XrApp:
             self.frame(frame)
             self._change_scene()
             done = 0 < frames <= self.session.pace.frames
-            if done or self._ends:
-                self.leave("frames" if done else self._ends)
+            if done or self.ends:
+                self.leave("frames" if done else self.ends)
+
+    def go_on(self, session: Session) -> None:
+        """In another session, where the one before was lost."""
+        same_room = self.session.play.kind == session.play.kind == ROOMS_OWN
+        if self._comeback is None or self._comeback.placed:
+            self._comeback = Comeback(self.state, self._head, same_room)
+        self.session, self.state.sees_through = session, session.sees_through
+        self.eyes.fit(session.sizes)
+
+    def rest_at_desk(self) -> None:
+        """While there is no session; nothing of it stays bound."""
+        self.eyes.framebuffers[0].use()
+        self.mirror.rest()
 
     def _rest(self) -> None:
         """While the headset lies on the table: the window can be closed all the same."""
         self.mirror.rest()
-        if self._ends:
-            self.leave(self._ends)
+        if self.ends:
+            self.leave(self.ends)
 
     @property
-    def _ends(self) -> str:
+    def ends(self) -> str:
         """Why the person at the desk wants it to end; "" for not at all."""
         if self.interrupted:
             return "interrupted"
@@ -180,8 +194,8 @@ class XrApp:
 
     def leave(self, why: str) -> None:
         """Asks the runtime for the end; a few frames later it comes."""
-        if not self._leaving:
-            self._leaving, self.report.ended = True, why
+        if not self.leaving:
+            self.leaving, self.report.ended = True, why
             self.session.leave()
 
     def frame(self, frame: Frame) -> None:
@@ -189,28 +203,22 @@ class XrApp:
         seconds = self._time_passed(frame)
         self.pulses.clear()
         state = self.state
-        self._see_objects_alone(state.through)
+        state.see_objects_alone()
         frame, moves = state.fit.worn(frame, seconds)
         stops = self._obstacles and not state.through  # the room's own are seen
         state.user.rules = replace(state.worn.now.rules(state.user.rules), obstacles=stops)
         if moves:
             self._stand(frame)
-        elif not self._stood or frame.recentred:
+        elif not self._stood or (frame.recentred and self._comeback is None):
             self.recentre(frame)
         self._stood |= frame.drawn  # before, nobody knows where the head is
         self._seen_s = frame.seen_s
-        before = self.state.play_space
-        left_over = self.menu.act(frame, seconds)
-        left_over = self._parts_hand.act(left_over, self.state.play_space, self.menu.carried)
-        self.state.play_space = self.state.user.act(left_over, self.state.play_space, seconds)
-        self._clearness = clearness(self._clearness, before, self.state.play_space, seconds)
-        if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
-            self._worn_s += seconds
-        records = self._pass(seconds)
-        for pulse in strongest(self.state.user.felt(records)):
-            self.pulse(pulse.side, pulse.strength, pulse.seconds)
+        records = [] if self._rests(frame, seconds) else self._live(frame, seconds)
         if frame.drawn:
-            views = [self.state.play_space.view(view) for view in frame.views]
+            self._head = frame.head
+            views = [state.play_space.view(view) for view in frame.views]
+            if self.shutter.wants(frame.seen_s) or not self._wearing.visibility:
+                views = [replace(view, hidden=None) for view in views]
             state.shown = state.editor.shown(views[0])
             self._choose_quality(views)
             over = self._over.of(frame, state, self.menu.carried, self.session, self._worn_s)
@@ -219,7 +227,8 @@ class XrApp:
             self._hand_over(frame.views, over, self.draw(views, frame.views, over))
             self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
-            self._keep_pictures()
+            left, messages = self.eyes.framebuffers[0], state.editor.messages
+            self.shutter.keep(self.shelf, left, messages, frame.seen_s)
             if frame.seen_s - self._figured_s >= FIGURES_EVERY_S:
                 self._figured_s = frame.seen_s
                 self.state.figures = Figures.of(self.session.pace, self.stats)
@@ -238,26 +247,31 @@ class XrApp:
         )
         self.report.note(done, self.eyes.framebuffers)
 
-    def _see_objects_alone(self, through: bool) -> None:
-        """Over the room a scene that has objects is seen without what was captured around them."""
-        shown, was = self.state.editor.shown_scene, self._was_through
-        self._was_through = through
-        if through and not was and shown.show == FULL and has_objects(self.state.editor.scene):
-            shown.show = ALONE
-        elif was and not through and shown.show == ALONE:
-            shown.show = FULL
+    def _rests(self, frame: Frame, seconds: float) -> bool:
+        """Whether the world stands still, until a session that was lost is what it was."""
+        if self._comeback is None:
+            return False
+        if (placed := self._comeback.place(frame)) is not None:
+            self.state.play_space = placed
+            self.state.user.jumped()  # what is held comes along
+        rests = self._comeback.rests(frame, seconds)
+        if self._comeback.over:
+            self._comeback = None
+        return rests
 
-    def _keep_pictures(self) -> None:
-        """Of what the left eye has just seen, where somebody has asked for one."""
-        messages = self.state.editor.messages
-        if self.shutter.due:
-            self.shutter.expose(read(self.eyes.framebuffers[0]))
-        self.shelf.saw(lambda: read(self.eyes.framebuffers[0]))
-
-        def say_written(path: Path) -> None:
-            messages.say(said("{name} is written.", name=path.name), time.perf_counter())
-
-        self.shutter.poll(say_written, messages.fail)
+    def _live(self, frame: Frame, seconds: float) -> list[Record]:
+        """What the person and their hands do, and the world after it."""
+        before = self.state.play_space
+        left_over = self.menu.act(frame, seconds)
+        left_over = self._parts_hand.act(left_over, self.state.play_space, self.menu.carried)
+        self.state.play_space = self.state.user.act(left_over, self.state.play_space, seconds)
+        self._clearness = clearness(self._clearness, before, self.state.play_space, seconds)
+        if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
+            self._worn_s += seconds
+        records = self._pass(seconds)
+        for pulse in strongest(self.state.user.felt(records)):
+            self.pulse(pulse.side, pulse.strength, pulse.seconds)
+        return records
 
     def _pass(self, seconds: float) -> list[Record]:
         """Lets time pass: what plays, edits that the world has to follow, then the world."""
@@ -328,17 +342,12 @@ class XrApp:
         eyes.fill_panel(play_views, over)
 
     def _choose_quality(self, views: list[View]) -> None:
-        """What of the picture can be had within the display's period: once that is known, and
-        when it is another one.
-        """
-        pace = self.session.pace
-        if not (pace.settled and self.state.pacing.wants_measure(pace.period_s)):
-            return
-        scene, finish = self.state.editor.scene, self.mirror.ctx.finish
-        centre, _ = Document(scene).bounds()
-        chart = StereoChart(self.renderer, scene, views, centre, finish)
-        self.state.pacing.measure(chart, pace.period_s)
-        pace.restart()
+        scene, pacing = self.state.editor.scene, self.state.pacing
+
+        def finish() -> None:
+            self.mirror.ctx.finish()
+
+        choose_quality(pacing, self.session.pace, self.renderer, scene, views, finish)
 
     def recentre(self, frame: Frame) -> None:
         """Back to where the scene is looked at first, at the size it has now; who sits is raised

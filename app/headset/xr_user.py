@@ -11,6 +11,7 @@ from shapeshift.app.headset.over.glass_state import GlassState
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.worn_settings import KeptSettings
+from shapeshift.scene.four_views import ALONE, FULL, has_objects
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.world import World
@@ -95,6 +96,7 @@ class XrState:
     glass: GlassState = field(default_factory=GlassState)
     shown: Scene = field(default_factory=lambda: Scene(()))  # of this frame, as it is drawn
     fit: Fitting = field(init=False)
+    _was_through: bool = False  # the room itself was behind the scene
 
     def __post_init__(self) -> None:
         self.fit = Fitting(self.worn)
@@ -103,6 +105,15 @@ class XrState:
     def through(self) -> bool:
         """Whether the room itself is behind the scene."""
         return self.sees_through and self.worn.now.passthrough
+
+    def see_objects_alone(self) -> None:
+        """Over the room a scene that has objects is seen without what was captured around them."""
+        shown, was, through = self.editor.shown_scene, self._was_through, self.through
+        self._was_through = through
+        if through and not was and shown.show == FULL and has_objects(self.editor.scene):
+            shown.show = ALONE
+        elif was and not through and shown.show == ALONE:
+            shown.show = FULL
 
     @property
     def world(self) -> World:

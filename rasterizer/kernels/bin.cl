@@ -127,10 +127,19 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
     }                                                                                      \
   }
 
+// HIDDEN = 1: tiles whose `shown` (bins,) is 0 get empty lists, whatever touches them.
+#ifdef HIDDEN
+#define AND_SHOWN , __global const uchar* shown
+#define IF_SHOWN(tile, touched) ((touched) & shown[tile])
+#else
+#define AND_SHOWN
+#define IF_SHOWN(tile, touched) (touched)
+#endif
+
 // table (chunks, bins): how often each tile is touched; a row of tiles and more lies beyond them.
 __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global const int* order,
                           __global const float* record, __global const uint2* tile_bounds,
-                          __global uint2* sorted_bounds, __global int* table) {
+                          __global uint2* sorted_bounds, __global int* table AND_SHOWN) {
   const int c = get_global_id(0);
   __global int* mine = table + c * bins;
   for (int t = 0; t < bins; t++) mine[t] = 0;
@@ -142,7 +151,7 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
     const int splat = order[i];
     const uint2 bounds = tile_bounds[splat];
     sorted_bounds[i] = bounds;  // side by side for the next pass
-#define VISIT(tile, touched) mine[tile] += touched
+#define VISIT(tile, touched) mine[tile] += IF_SHOWN(tile, touched)
     FOR_EACH_TILE(bounds, tiles_x, splat)
 #undef VISIT
   }
@@ -154,18 +163,18 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
 __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int total,
                             __global const int* order, __global const float* record,
                             __global const uint2* sorted_bounds, __global int* table,
-                            __global int* intersections) {
+                            __global int* intersections AND_SHOWN) {
   const int c = get_global_id(0);
   __global int* next = table + c * bins;
   const int spare = total + SPARE * c;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
     const int splat = order[i];
-#define VISIT(tile, touched)                        \
-  {                                                 \
-    const int to = next[tile];                      \
-    intersections[(touched) ? to : spare] = splat;  \
-    next[tile] = to + (touched);                    \
+#define VISIT(tile, touched)                                 \
+  {                                                          \
+    const int to = next[tile], in = IF_SHOWN(tile, touched); \
+    intersections[in ? to : spare] = splat;                  \
+    next[tile] = to + in;                                    \
   }
     FOR_EACH_TILE(sorted_bounds[i], tiles_x, splat)
 #undef VISIT

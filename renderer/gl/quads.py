@@ -181,7 +181,7 @@ class QuadsDrawing(Drawing):
             heat = None
             if self.draws_heat:
                 heat = arena.heat_of(sets[row] if sets else min(i + row, len(arena.colors) - 1))
-            self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row, heat)
+            self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row, heat, view)
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:

@@ -5,7 +5,8 @@ import numpy as np
 
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.target import DTYPES
+from shapeshift.renderer.gl.target import DTYPES, HiddenDepths
+from shapeshift.scene.pose import View
 
 FULL = {np.dtype(np.uint8): 255, np.dtype(np.uint16): 65535}  # what stands for 1
 
@@ -23,6 +24,7 @@ class Splatter:
         self.program_for(heat=False)
         self._targets: dict[int, moderngl.Framebuffer] = {}
         self._units: dict[int, float] = {}  # of the images
+        self._hidden = HiddenDepths(gpu)
 
     def program_for(self, heat: bool) -> tuple[moderngl.Program, moderngl.VertexArray]:
         """What draws pictures with heat, or without; compiled at the first call."""
@@ -40,27 +42,32 @@ class Splatter:
         min_alpha: float,
         row: int = 0,
         heat: moderngl.Buffer | None = None,
+        view: View | None = None,
     ) -> None:
         """Draws the arena as it was last projected and sorted, into the image of view i.
 
         row: which of the views that were projected together.  heat: what is drawn into a second
-        image in addition.
+        image in addition.  view: whose hidden mesh stays empty.
         """
         target = self.target_of(i, size, heat is not None)
+        hides = view is not None and view.hidden is not None
+        if view is not None and hides:
+            target = self._hidden.around(i, target, view)
         with self._gpu.drawing_into(target):
-            target.clear(0.0, 0.0, 0.0, 0.0)
+            if not hides:
+                target.clear(0.0, 0.0, 0.0, 0.0)
             if arena.count:
-                self._draw_triangles(arena, size, min_alpha, row * arena.count, heat)
+                self._draw_triangles(arena, size, min_alpha, row * arena.count, heat, hides)
 
     def _draw_triangles(
         self, arena: Arena, size: tuple[int, int], min_alpha: float, first: int,
-        heat: moderngl.Buffer | None,
+        heat: moderngl.Buffer | None, hides: bool,
     ) -> None:  # fmt: skip
         ctx = self._gpu.ctx
         program, triangles = self.program_for(heat is not None)
         if heat is not None:
             bind(heat=heat)
-        ctx.enable_only(moderngl.BLEND)
+        ctx.enable_only(moderngl.BLEND | (moderngl.DEPTH_TEST if hides else 0))
         ctx.blend_func = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
         bind(order=arena.order, records=arena.records, counts=arena.counts)
         program["size"].value = size
@@ -109,6 +116,7 @@ class Splatter:
         return made
 
     def release(self) -> None:
+        self._hidden.release()
         for target in self._targets.values():
             _release_target(target)
         self._targets.clear()

@@ -11,10 +11,12 @@ import math
 from functools import cache
 
 import moderngl
+import numpy as np
 
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.runtime_models.colors.color_range import color_range
 from shapeshift.runtime_models.model import Model
+from shapeshift.scene.pose import HiddenMesh, View
 
 DTYPES = {"rgba8": "f1", "rgba16": "nu2", "rgba16f": "f2", "rgba32f": "f4"}  # moderngl's
 # There 100,000 faint layers and a leg are still 5 to 8 dB better than in half floats; twice that
@@ -68,3 +70,66 @@ def draws_into(gpu: Gpu, name: str) -> bool:
 @cache
 def warn_once(sentence: str) -> None:
     logging.getLogger("renderer").warning(sentence)
+
+
+class HiddenDepths:
+    """Depth beside the pictures of views that have a hidden mesh: what nobody sees is drawn first,
+    nearest, so that no splat is shaded there.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._program: moderngl.Program | None = None
+        self._meshes: dict[int, tuple[HiddenMesh, moderngl.VertexArray, moderngl.Buffer]] = {}
+        self._targets: dict[int, moderngl.Framebuffer] = {}
+
+    def around(self, i: int, picture: moderngl.Framebuffer, view: View) -> moderngl.Framebuffer:
+        """The picture of view i with depth 0 where it is hidden and 1 elsewhere, and no colours."""
+        assert view.hidden is not None
+        target, ctx = self._target(i, picture), self._gpu.ctx
+        program, triangles = self._mesh(i, view.hidden)
+        left, right, down, up = view.tangents
+        program["low"].value, program["high"].value = (left, down), (right, up)
+        with self._gpu.drawing_into(target):
+            target.depth_mask = True
+            target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+            ctx.enable_only(moderngl.DEPTH_TEST)
+            triangles.render(moderngl.TRIANGLES)
+            target.depth_mask = False
+        return target
+
+    def _mesh(self, i: int, mesh: HiddenMesh) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        if self._program is None:
+            self._program = self._gpu.program("lenses/hidden.vert", "lenses/hidden.frag")
+        kept = self._meshes.get(i)
+        if kept is None or kept[0] is not mesh:
+            self._forget_mesh(i)
+            buffer = self._gpu.ctx.buffer(np.ascontiguousarray(mesh.triangles, np.float32))
+            drawn = self._gpu.ctx.vertex_array(self._program, [(buffer, "2f", "tangents")])
+            self._meshes[i] = mesh, drawn, buffer
+        return self._program, self._meshes[i][1]
+
+    def _target(self, i: int, picture: moderngl.Framebuffer) -> moderngl.Framebuffer:
+        old, ctx = self._targets.get(i), self._gpu.ctx
+        if old is not None and old.color_attachments == picture.color_attachments:
+            return old
+        self._forget_target(i)
+        depth = ctx.depth_renderbuffer(picture.size)
+        self._targets[i] = ctx.framebuffer(picture.color_attachments, depth)
+        return self._targets[i]
+
+    def _forget_mesh(self, i: int) -> None:
+        if (old := self._meshes.pop(i, None)) is not None:
+            old[1].release()
+            old[2].release()
+
+    def _forget_target(self, i: int) -> None:
+        if (old := self._targets.pop(i, None)) is not None:
+            old.depth_attachment.release()
+            old.release()
+
+    def release(self) -> None:
+        for i in [*self._meshes]:
+            self._forget_mesh(i)
+        for i in [*self._targets]:
+            self._forget_target(i)

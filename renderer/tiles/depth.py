@@ -2,9 +2,27 @@
 
 import numpy as np
 
+from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.surface import DepthFrame
+from shapeshift.rasterizer.project import Projected
+from shapeshift.rasterizer.surface import DepthFrame, resized_records
+from shapeshift.renderer.resample import scaled
 from shapeshift.renderer.surface import Surface
+from shapeshift.renderer.tiles.inputs import bin_view
+from shapeshift.scene.pose import View
+
+
+def in_fewer_pixels(
+    device: Device, projected: Projected, tiles: Tiles, view: View, part: float
+) -> tuple[Projected, Tiles, View]:
+    """What was projected and put into lists, in `part` of the view's width and height: the same
+    splats in the same order.
+    """
+    small = scaled(view, part)
+    if small is view:
+        return projected, tiles, view
+    projected = resized_records(device, projected, view.size, small.size)
+    return projected, bin_view(device, projected, small, tiles.order), small
 
 
 def depth_picture(device: Device, blended: DepthFrame) -> np.ndarray:

@@ -4,10 +4,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shapeshift.rasterizer.bin import Tiles, bin_tiles
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.project import Camera
+from shapeshift.rasterizer.project import TILE, Camera, Projected
 from shapeshift.rasterizer.project_arena import Limits
 from shapeshift.rasterizer.resolve import Behind
+from shapeshift.renderer.hidden import hidden_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Background, Color, Sky, up_of_eye
 from shapeshift.scene.pose import View
@@ -27,6 +29,12 @@ def behind(background: Background, view: View) -> Behind | Color:
 def camera_of(view: View) -> Camera:
     """The view as rasterizer/ takes it."""
     return Camera(*view.pinhole(), view.size, view.near, view.widest_tangents())
+
+
+def bin_view(device: Device, projected: Projected, view: View, order: "Array") -> Tiles:
+    """The lists of a view in a given order; those of tiles that nobody sees are empty."""
+    hidden = hidden_tiles(view, TILE)
+    return bin_tiles(device, projected, view.size, order=order, hidden=hidden)
 
 
 def limits_of(settings: RenderSettings) -> Limits:

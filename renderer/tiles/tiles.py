@@ -32,8 +32,15 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
-from shapeshift.renderer.tiles.depth import depth_picture, surface_picture
-from shapeshift.renderer.tiles.inputs import behind, camera_of, limits_of, read_rows, write_rows
+from shapeshift.renderer.tiles.depth import depth_picture, in_fewer_pixels, surface_picture
+from shapeshift.renderer.tiles.inputs import (
+    behind,
+    bin_view,
+    camera_of,
+    limits_of,
+    read_rows,
+    write_rows,
+)
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
@@ -230,8 +237,9 @@ class TilesDrawing(Drawing):
         if settings.depth_scale > 0:
             with timer.time("depth", on_gpu=False):
                 for i, view in enumerate(views):
-                    blended = self._blend_depth(self._projected[i], tiles[i], view)
-                    self._depths[first + i] = depth_picture(self.device, blended)
+                    part = settings.depth_scale
+                    seen = in_fewer_pixels(self.device, self._projected[i], tiles[i], view, part)
+                    self._depths[first + i] = depth_picture(self.device, self._blend_depth(*seen))
 
     def _blend_depth(self, projected: Projected, tiles: Tiles, view: View) -> DepthFrame:
         """Depth, and normals in place of colours, which the records lose."""
@@ -292,10 +300,8 @@ class TilesDrawing(Drawing):
                 quantize_keys(self.device, projected.in_tiles)
             self._orders = [sort_order(self.device, p.in_tiles) for p in sorted_by]
         orders = self._orders * (len(views) if len(self._orders) == 1 else 1)
-        return [
-            bin_tiles(self.device, projected, view.size, order=order)
-            for projected, view, order in zip(self._projected, views, orders, strict=True)
-        ]
+        made = zip(self._projected, views, orders, strict=True)
+        return [bin_view(self.device, *each) for each in made]
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:
@@ -334,9 +340,8 @@ class TilesDrawing(Drawing):
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
         heat: bool = False, as_window: bool = False,
     ) -> np.ndarray:  # fmt: skip
-        image, values = self._images[i], self._heat_images[i] if heat else None
-        seen = behind(background, view)
-        return resolve(self.device, image, seen, palette, values, as_window=as_window)
+        values, seen = self._heat_images[i] if heat else None, behind(background, view)
+        return resolve(self.device, self._images[i], seen, palette, values, as_window=as_window)
 
     def presentable_depth(self, i: int) -> np.ndarray:
         return self._depths[i]

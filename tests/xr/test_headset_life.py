@@ -104,7 +104,7 @@ def eye_in_world(line: dict) -> np.ndarray:
 
 @pytest.mark.slow
 def test_a_runtime_that_goes_away_is_one_sentence(served, start):
-    program = start(served, "--frames", "1000000")
+    program = start(served, "--frames", "1000000", "--reopen", "0")
     with program.headset(served.port) as remote:
         remote.send()
         program.until(lambda line: line["focused"], "focused")

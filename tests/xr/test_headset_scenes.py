@@ -53,7 +53,10 @@ def test_another_scene_a_start_and_a_picture(stand, start):
         remote.head = Pose(np.array([0.3, 1.6, 0.1]), np.array([1.0, 0, 0, 0]))
         open_panel(person)
         person.frames(8)
-        for label in ("Touch", "Room", "Scenes", "Take a picture", "Start from here"):
+        for label in ("Touch", "Room", "Scenes", "Record frames"):
+            press(person, label)
+        person.frames(12)
+        for label in ("Stop recording", "Take a picture", "Start from here"):
             press(person, label)
         eye = person.line["standing"], person.line["head"]
         saved = documents / "Shapeshift" / "scenes" / "touch.scene.json"
@@ -75,6 +78,10 @@ def test_another_scene_a_start_and_a_picture(stand, start):
     seen = np.asarray(Image.open(taken)).astype(int)
     last = sorted(pictures.glob("left-*.png"))[-1]
     assert seen.shape == np.asarray(Image.open(last)).shape and np.ptp(seen) > 100
+    recorded = documents / "Shapeshift" / "pictures" / "recording-001"
+    frames = sorted(recorded.glob("*.png"))
+    assert len(frames) >= 5 and (recorded / "frames.csv").exists()
+    assert np.asarray(Image.open(frames[-1])).shape == seen.shape
     assert RecentFiles.read(config).paths == (other,), "a measured run keeps no list"
     assert not complaints(stand.folder)
     assert "Traceback" not in program.told()

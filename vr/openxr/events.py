@@ -24,11 +24,16 @@ class ControllersChanged:
 
 
 @dataclass(frozen=True)
+class MaskChanged:
+    """What an eye's lens does not show is another part of its picture."""
+
+
+@dataclass(frozen=True)
 class GoingAway:
     """The runtime itself ends soon."""
 
 
-Event = StateChanged | Recentred | ControllersChanged | GoingAway
+Event = StateChanged | Recentred | ControllersChanged | MaskChanged | GoingAway
 
 
 def poll_events(xr, instance: Any) -> list[Event]:
@@ -59,6 +64,8 @@ def read_event(xr, buffer) -> Event | None:
         return Recentred(space, int(pending.change_time))
     if kind == int(kinds.EVENT_DATA_INTERACTION_PROFILE_CHANGED):
         return ControllersChanged()
+    if kind == int(kinds.EVENT_DATA_VISIBILITY_MASK_CHANGED_KHR):
+        return MaskChanged()
     if kind == int(kinds.EVENT_DATA_INSTANCE_LOSS_PENDING):
         return GoingAway()
     return None

@@ -17,6 +17,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.hidden import hidden_pixels
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
 from shapeshift.vr.frame import FAR_M, NEAR_M, Frame, Hand
@@ -25,6 +26,7 @@ from shapeshift.vr.openxr.display import display_period
 from shapeshift.vr.openxr.events import (
     ControllersChanged,
     GoingAway,
+    MaskChanged,
     Recentred,
     StateChanged,
     poll_events,
@@ -34,9 +36,10 @@ from shapeshift.vr.openxr.hands import Hands, pose_of
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.joints import HandTrackers
 from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
-from shapeshift.vr.openxr.life import BEGIN, END, Life
+from shapeshift.vr.openxr.life import BEGIN, END, LOST, Life
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import choose_format
+from shapeshift.vr.openxr.visibility import VisibilityMasks
 from shapeshift.vr.pace import FramePace
 
 REST_S = 0.01  # between two looks at what the runtime says while there is nothing to draw
@@ -64,7 +67,9 @@ class Session:
         self._pending: list[Recentred] = []
         self._open: Any | None = None  # the runtime's state of the frame under way
         self._views: tuple = ()  # the runtime's, of the open frame
+        self._shown: list[View] = []  # the same, ours
         self._start_ns: int | None = None
+        self._before_s = self._seen_s = 0.0  # at the first frame; of the last one
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
@@ -77,6 +82,7 @@ class Session:
         self._controllers, self.bare_hands = controllers, HandTrackers(instance, self._handle)
         self.pace.display_s = display_period(instance, self._handle)
         self.layers = self._make_layers(part, pixels)
+        self.masks = VisibilityMasks(instance, self._handle, len(self.layers.sizes))
 
     def _create(self) -> Any:
         xr, instance = self._xr, self._instance
@@ -151,6 +157,10 @@ class Session:
         )
         self._end([ctypes.byref(layer) for layer in made], through)
 
+    def hidden_parts(self) -> list[float]:
+        """Of each eye's picture the share that its lens does not show, as the runtime tells it."""
+        return [round(float(hidden_pixels(view).mean()), 4) for view in self._shown]
+
     def leave(self) -> None:
         """Asks the runtime to end the session; frames() goes on until it has."""
         if self.life.running:
@@ -158,6 +168,15 @@ class Session:
                 self._xr.request_exit_session(self._handle)
         else:
             self.life.states.append("EXITING")  # never begun: there is nothing to wait for
+
+    def follow(self, lost: "Session") -> None:
+        """Goes on with the counts, states and clock of one that was lost."""
+        display_s, self.pace = self.pace.display_s, lost.pace
+        self.pace.display_s = display_s
+        self.pace.pause()
+        self.pace.restart()
+        self.recentrings, self._before_s = lost.recentrings, lost._seen_s
+        self.life.states = [*lost.life.states, LOST]
 
     def _poll_events(self) -> None:
         xr = self._xr
@@ -171,6 +190,8 @@ class Session:
                         self._bounds.ask()
                     case ControllersChanged():
                         self.profiles = self.hands.profiles()
+                    case MaskChanged():
+                        self.masks.ask()
                     case GoingAway():
                         self.life.lost = True
 
@@ -194,7 +215,7 @@ class Session:
             now = state.predicted_display_time
             if self._start_ns is None:
                 self._start_ns = now
-            seen_s = (now - self._start_ns) * 1e-9
+            self._seen_s = seen_s = self._before_s + (now - self._start_ns) * 1e-9
             period_s = state.predicted_display_period * 1e-9
             self.pace.start(seen_s, period_s, self._began - asked)
             self._locate_head(now)
@@ -234,9 +255,12 @@ class Session:
         )
         self._eyes = left, right
         views = [
-            View(pose, tangents_of(view.fov), NEAR_M, FAR_M, size)
-            for pose, view, size in zip(self._eyes, self._views, self.sizes, strict=True)
+            View(pose, tangents_of(view.fov), NEAR_M, FAR_M, size, hidden=self.masks.of(i))
+            for i, (pose, view, size) in enumerate(
+                zip(self._eyes, self._views, self.sizes, strict=True)
+            )
         ]
+        self._shown = views
         return tuple(views), turned
 
     def _recentred(self, now: int) -> bool:

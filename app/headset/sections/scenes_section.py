@@ -23,18 +23,25 @@ class SceneActions:
     open: Callable[[Path], None]
     start_here: Callable[[], None]
     picture: Callable[[], None]
+    record: Callable[[], None] = lambda: None
+    recording: Callable[[], bool] = lambda: False
 
 
 def draw_scenes(
     shelf: SceneShelf, actions: SceneActions, textures: Textures, ui_scale: float
 ) -> None:
-    """Two buttons, and a row a scene."""
+    """Three buttons, and a row a scene."""
     width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
     if imgui.button(item_label("Take a picture"), Vec(width, 0)):
         actions.picture()
     imgui.same_line()
     if imgui.button(item_label("Start from here"), Vec(width, 0)):
         actions.start_here()
+    label = item_label("Record frames")
+    if actions.recording():
+        label = item_label("Stop recording")
+    if imgui.button(label, Vec(2 * width + imgui.get_style().item_spacing.x, 0)):
+        actions.record()
     if shelf.opening is not None:
         imgui.text_disabled(said("Opening {names} \u2026", names=shelf.opening.name))
     for row, (name, path) in enumerate(shelf.rows):

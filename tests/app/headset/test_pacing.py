@@ -84,6 +84,29 @@ def test_late_frames_have_fewer_pixels_but_never_below_what_the_floor_was_priced
     assert pacing.settings().render_scale == 1.0
 
 
+def test_frames_that_stay_late_are_drawn_with_a_quicker_row_at_the_floor_or_better(capsys):
+    """Exact was priced as quick enough where one began; here all takes half as long again."""
+    pacing = Pacing(BACKGROUND)
+    rows = {
+        "75 % scale": (0.9 * TARGET, 40.0), "1 px footprint": (0.65 * TARGET, 45.0),
+        "2 px footprint": (0.5 * TARGET, 37.0), "50 % scale": (0.2 * TARGET, 33.0),
+    }  # fmt: skip
+    pacing.measure(FakeChart(0.95 * TARGET, rows), PERIOD)
+    assert pacing.chosen == "exact"
+    for _ in range(LATE - 1):
+        pacing.seen(1.42 * TARGET, 1.42 * TARGET)
+    assert pacing.chosen == "exact", "a few late ones are no reason"
+    pacing.seen(1.42 * TARGET, 1.42 * TARGET)
+    assert pacing.chosen == "1 px footprint" and pacing.settings().render_scale == 1.0
+    assert "45.0 dB" in capsys.readouterr().err and pacing.report()["chosen_db"] == 45.0
+    for _ in range(10 * LATE):
+        pacing.seen(0.97 * TARGET, 0.97 * TARGET)
+    assert pacing.chosen == "1 px footprint"
+    for _ in range(20 * LATE):
+        pacing.seen(3 * TARGET, 3 * TARGET)
+    assert pacing.chosen == "2 px footprint", "what is below the floor is never taken"
+
+
 def test_a_chosen_scale_is_where_fewer_pixels_begin():
     pacing = Pacing(BACKGROUND)
     rows = {"75 % scale": (1.2 * TARGET, 40.0), "50 % scale": (0.8 * TARGET, 36.0)}

@@ -53,16 +53,13 @@ def test_both_eyes_have_the_depth_of_rays_through_ellipsoids(renderer, colors):
 
 
 def test_fewer_pixels_have_the_depth_of_the_middle_of_those_they_stand_for(renderer):
-    """Of quads; tiles keep them all.  At an even part a pixel's middle is a corner of four."""
+    """At an even part a pixel's middle is a corner of four."""
     scene, view = alone(shell(900)), front_view(SIZE)
     renderer.settings = RenderSettings(depth_scale=0.5)
     renderer.update(scene)
     renderer.draw([view])
     got = depth_of(renderer, 0)
     whole = renderer.surface(view)
-    if "tiles" in renderer.backends["drawing"]:
-        np.testing.assert_array_equal(got[..., 0], whole.metres)
-        return
     assert got.shape == (40, 48, 4)
     four = [whole.metres, whole.coverage]
     metres, coverage = (a.reshape(40, 2, 48, 2).mean(axis=(1, 3)) for a in four)
@@ -71,6 +68,31 @@ def test_fewer_pixels_have_the_depth_of_the_middle_of_those_they_stand_for(rende
     assert solid.mean() > 0.1
     depth = got[solid, 0] / got[solid, 3]
     np.testing.assert_allclose(depth, metres[solid] / coverage[solid], rtol=0.02)
+
+
+def test_all_pixels_are_those_of_a_surface(renderer):
+    scene, view = alone(shell(900)), front_view(SIZE)
+    renderer.settings = RenderSettings(depth_scale=1.0)
+    renderer.update(scene)
+    renderer.draw([view])
+    np.testing.assert_array_equal(depth_of(renderer, 0)[..., 0], renderer.surface(view).metres)
+
+
+@pytest.mark.parametrize("part", [0.5, 0.3, 0.125])
+def test_fewer_pixels_have_the_depth_of_rays_through_their_own_middles(renderer, part):
+    """Against the float64 reference of a picture of so many pixels, blurred as the whole one is."""
+    scene, view = alone(shell(900)), front_view(SIZE)
+    renderer.settings = RenderSettings(depth_scale=part)
+    renderer.update(scene)
+    renderer.draw([view])
+    got = depth_of(renderer, 0)
+    size = tuple(max(1, round(part * side)) for side in SIZE)
+    assert got.shape == (*size[::-1], 4)
+    blur = RenderSettings(low_pass=0.3 * part**2)  # of the whole one, in pixels of this one
+    want = reference_surface(scene, view.resized(size), blur)
+    solid = want.coverage > 0.6
+    assert solid.mean() > 0.1
+    np.testing.assert_allclose(got[solid, 0] / got[solid, 3], want.depth()[solid], 5e-3)
 
 
 def test_a_picture_is_the_same_with_depth_beside_it(renderer):

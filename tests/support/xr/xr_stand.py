@@ -113,6 +113,11 @@ class Stand:
         self.service.kill()
         self.service.wait()
 
+    def revive_runtime(self) -> None:
+        """Another service in the place of the one that was killed."""
+        (self._run / "monado_comp_ipc").unlink(missing_ok=True)
+        self.service = self._serve()
+
     def tell(self, program: Path, *words: str) -> dict:
         """Runs a program of ours to its end: what its one line of JSON says."""
         done = subprocess.run(

@@ -7,6 +7,7 @@ import pytest
 from shapeshift.vr.openxr.events import (
     ControllersChanged,
     GoingAway,
+    MaskChanged,
     Recentred,
     StateChanged,
     poll_events,
@@ -39,6 +40,7 @@ def recentring(kind: object) -> object:
         (recentring(xr.ReferenceSpaceType.STAGE), Recentred("STAGE", 1234567890123)),
         (recentring(xr.ReferenceSpaceType.VIEW), Recentred("", 1234567890123)),
         (xr.EventDataInteractionProfileChanged(), ControllersChanged()),
+        (xr.EventDataVisibilityMaskChangedKHR(), MaskChanged()),
         (xr.EventDataInstanceLossPending(), GoingAway()),
         (xr.EventDataEventsLost(), None),
     ],

@@ -57,7 +57,10 @@ def run(pace: FramePace, gaps: list[int], own_s: float = 0.004, told_s: float = 
 def test_every_period_without_a_frame_of_ours_is_a_dropped_one():
     pace = FramePace(display_s=PERIOD)
     run(pace, [1, 1, 2, 1, 4, 1])
-    assert (pace.frames, pace.dropped, pace.over) == (6, 1 + 3, 0)
+    assert (pace.frames, pace.dropped, pace.late, pace.over) == (6, 1 + 3, 2, 0)
+    shown = pace.report()["shown_ms"]
+    assert (shown["p50"], shown["worst"]) == (round(PERIOD * 1e3, 3), round(4 * PERIOD * 1e3, 3))
+    assert pace.report()["in_time"] == 1 - 2 / 5  # of five gaps between six frames
     assert pace.report()["own_ms"] == dict.fromkeys(("p50", "p95", "p99", "worst"), 4.0)
     run(pace, [1] * 3, own_s=0.02)
     assert pace.over == 3 and pace.report()["own_ms"]["worst"] == 20.0
@@ -100,9 +103,19 @@ def test_the_shortest_period_told_lately_is_the_displays_once_guesses_are_over()
     assert pace.settled and pace.period_s == pytest.approx(PERIOD)
 
 
+def test_ten_minutes_at_120_hertz_are_kept_to_the_first_frame():
+    pace = FramePace(display_s=1 / 120)
+    pace.start(0.0, 1 / 120, 0.0)
+    pace.end(0.5)  # the worst of all, at the very start
+    for i in range(1, 72_000):
+        pace.start(i / 120, 1 / 120, 0.0)
+        pace.end(0.004)
+    assert pace.report()["own_ms"]["worst"] == 500.0 and len(pace.own_ms) == 72_000
+
+
 def test_a_pace_without_frames_has_a_report():
-    nothing = {name: {} for name in ("own_ms", "drawing_ms", "wait_ms")}
-    counts = {"frames": 0, "dropped": 0, "over_period": 0, "period_ms": 0.0}
+    nothing = {name: {} for name in ("own_ms", "drawing_ms", "wait_ms", "shown_ms")}
+    counts = {"frames": 0, "dropped": 0, "over_period": 0, "period_ms": 0.0, "in_time": None}
     assert FramePace().report() == counts | nothing
 
 
