@@ -31,8 +31,7 @@ def read_section(text: str, stops: Sequence[Stop] = ()) -> SceneSection:
     said = f"'{line}'" if len(line) <= LONGEST else f"'{line[:LONGEST]}\u2026'"
     kind, *parts = text.split(":")
     if kind not in FORMS:
-        raise ValueError(f"{said} begins with '{one_line(kind)[:LONGEST]}'; {' or '.join(FORMS)} "
-                         "is known.")  # fmt: skip
+        raise ValueError(f"{said} is no section; {' or '.join(FORMS.values())} is wanted.")
     beyond = None
     joined = ":".join(parts)
     if "beyond=" in joined:
