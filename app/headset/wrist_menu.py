@@ -102,8 +102,8 @@ class WristMenu:
             draw_parts(state.parts, scale)
 
         def draw_looks(scale: float) -> None:
+            draw_glass(state)  # first: looks are long, and it is the headset's own
             draw_look(editor, scale)
-            draw_glass(state)
 
         return [
             Section("Room", lambda scale: draw_room(state, room), open_first=True),

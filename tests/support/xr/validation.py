@@ -19,5 +19,5 @@ def complaints(folder: Path) -> list[str]:
     """What the layer told, but for its own beginning and end, which prove that it ran."""
     told = (folder / "validation.txt").read_text().splitlines()
     own = [line for line in told if "Core Validation Layer " in line]
-    assert len(own) == 2, told
+    assert own and len(own) % 2 == 0, told  # a lost session is tried anew, each time from its start
     return [line for line in told if line and line not in own]
