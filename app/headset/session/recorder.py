@@ -12,6 +12,7 @@ from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.pictures import write_png
 from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.vr.openxr.swapchain import read
 
 RATE = 10.0  # frames a second of the session's clock
@@ -120,4 +121,4 @@ def write_frame(pixels: np.ndarray, path: Path) -> int:
 
 
 def _write_times(path: Path, text: str) -> None:
-    path.write_text(text)
+    write_whole(path, text.encode())
