@@ -7,6 +7,8 @@ from statistics import median
 STEP = 1 / 16  # scales are multiples of this, so that few sizes of images are ever made
 SEEN = 8  # frames at one scale before it may change: their median hides a single slow frame
 OVER, UNDER = 1.05, 0.85  # times the target: in between nothing changes
+FAR_OVER = 1.15  # times the target: what lies below it may be noise, and is watched longer
+WATCHED = 4 * SEEN  # frames: their median has half the noise
 AIM = 0.95  # of the target, where a change wants to land
 LONGEST_WAIT = 16 * SEEN  # frames, after growing has failed again and again
 
@@ -14,9 +16,10 @@ LONGEST_WAIT = 16 * SEEN  # frames, after growing has failed again and again
 class Resolution:
     """Moves `scale` within [least, 1] so that frames take `target_ms`.
 
-    Shrinks by what the median asks for, at the least one step; grows one step at a time, and only
-    where the time would hold if it all grew with the pixels.  Growth that has to be taken back
-    makes the next try wait twice as long.
+    Shrinks by what the median asks for, at the least one step, and where it is little over the
+    target only after a longer look, so that noise does not make it swing; grows one step at a time,
+    and only where the time would hold if it all grew with the pixels.  Growth that has to be taken
+    back makes the next try wait twice as long.
     """
 
     def __init__(self, target_ms: float, least: float = 0.5, scale: float = 1.0) -> None:
@@ -27,7 +30,7 @@ class Resolution:
         self.target_ms = target_ms
         self.least = min(math.ceil(least / STEP) * STEP, 1.0)
         self.scale = self._rounded(scale)
-        self._times: deque[float] = deque(maxlen=SEEN)
+        self._times: deque[float] = deque(maxlen=WATCHED)
         self._age = 0  # frames at this scale
         self._wait = SEEN  # frames before growing
         self._grew = False  # whether this scale was reached by growing
@@ -43,9 +46,11 @@ class Resolution:
         self._age += 1
         if self._age < SEEN:
             return self.scale
-        ms = median(self._times)
-        if ms > OVER * self.target_ms:
+        ms, watched = median(list(self._times)[-SEEN:]), median(self._times)
+        if ms > FAR_OVER * self.target_ms:
             self._shrink(ms)
+        elif self._age >= WATCHED and min(ms, watched) > OVER * self.target_ms:
+            self._shrink(watched)
         elif ms < UNDER * self.target_ms and self._age >= self._wait:
             self._grow(ms)
         elif self._grew and self._age > 2 * self._wait:
