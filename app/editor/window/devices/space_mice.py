@@ -170,9 +170,9 @@ def read_joysticks() -> CapState | None:
     for number in range(glfw.JOYSTICK_LAST + 1):
         if not glfw.joystick_present(number):
             continue
-        raw: bytes | None = glfw.get_joystick_name(number)
-        name = (raw or b"").decode("utf-8", "replace").lower()
-        if not any(known in name for known in NAMES):
+        told: object = glfw.get_joystick_name(number)  # bytes, whatever its types say
+        name = told.decode("utf-8", "replace") if isinstance(told, bytes) else str(told)
+        if not any(known in name.lower() for known in NAMES):
             continue
         axes, count = glfw.get_joystick_axes(number)
         if count >= 6:
