@@ -232,6 +232,7 @@ def test_sections_of_the_desktop_do_here_what_they_do_there(wearer):
     wearer.press("Objects")
     wearer.scroll(1.0)
     wearer.unfold("Look")
+    wearer.scroll_to("debug")
     wearer.press("debug")
     left, top, right, _ = wearer.menu.picture.boxes["debug"]
     # Its list has opened above it, where there is room: rows of 23 mm, the last 19 mm above it.
