@@ -43,5 +43,5 @@ def _crossings(picture: ValuePicture, level: float, every: int) -> np.ndarray:
     beyond, to = np.roll(v, -1, axis=-1), np.roll(p, -1, axis=-2)
     with np.errstate(divide="ignore", invalid="ignore"):
         part = (level - v) / (beyond - v)
-    meets = p + part[..., None] * (to - p)  # where it is not crossed, nonsense
+        meets = p + part[..., None] * (to - p)  # where it is not crossed, nonsense
     return meets[crossed].reshape(-1, 2, 3)
