@@ -6,10 +6,10 @@ from shapeshift.scene.inspection.marks import Isotherm
 from shapeshift.scene.inspection.value_picture import ValuePicture
 
 TORN = 0.05  # of the depth: neighbours farther apart lie on two surfaces, with no line between
-MOST_LINES = 600  # of a picture; more are made coarser
+MOST_LINES = 800  # of a picture; more are made coarser
 
 
-def contour_lines(picture: ValuePicture, isotherm: Isotherm, every: int = 4) -> np.ndarray:
+def contour_lines(picture: ValuePicture, isotherm: Isotherm, every: int = 3) -> np.ndarray:
     """(S, 2, 3) metres of the world; every: pixels between the samples that they are made of.
 
     Marching squares, straight between samples; a cell that four sides of are crossed has none.

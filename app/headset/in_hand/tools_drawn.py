@@ -14,7 +14,7 @@ from shapeshift.scene.inspection.lengths import length
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.vr.card import Card
 from shapeshift.vr.drawn import DOT_M, FINE, PALE, WRONG, Drawn
-from shapeshift.vr.frame import Frame
+from shapeshift.vr.frame import SIDES, Frame
 from shapeshift.vr.glove import Capsule
 from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.panel.carried import Carried
@@ -25,7 +25,7 @@ HANDLE_M = 0.014  # radius of a handle's ball
 SPOT_DEG = 0.25  # radius of a spot's ball, as the head sees it
 LABEL_M, LABEL_DEG = 0.45, 1.2  # from there on labels grow, so that they are read; above their mark
 MOST_LABELS = 24  # the nearest ones
-BESIDE_M = np.array([0.0, 0.055, -0.03])  # of the room, from the hand: what its ray meets
+ASIDE_M, ABOVE_M = 0.10, 0.05  # of the room, outwards of the hand: what its ray meets
 ToRoom = Callable[[np.ndarray], np.ndarray]
 
 
@@ -156,7 +156,8 @@ def _pointed(tools: HandTools, frame: Frame, carried: Carried) -> Card | None:
     texts = (far,)
     if tools.inspecting.thermal is not None:
         texts = (words_of(pointed.value, pointed.picture, tools.unit), far)
-    place = hand.aim.position + BESIDE_M
+    right = frame.head.matrix()[:3, 0] * (1.0 if carried.pointer == SIDES[1] else -1.0)
+    place = hand.aim.position + ASIDE_M * right + np.array([0.0, ABOVE_M, 0.0])
     return Card(texts, facing(place, frame.head))
 
 

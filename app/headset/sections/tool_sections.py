@@ -36,7 +36,7 @@ def tool_sections(tools: HandTools, save: Callable[[], None]) -> list[Section]:
 
 def _draw_sections(tools: HandTools, save: Callable[[], None], scale: float) -> None:
     tool = tools.sections
-    draw_cuts(tool, tools.editor, scale)
+    _undo_save(tools, save)
     if tool.current is not None:
         changed, on = imgui.checkbox(item_label("in reach of hands"), tool.on)
         if changed:
@@ -45,11 +45,12 @@ def _draw_sections(tools: HandTools, save: Callable[[], None], scale: float) -> 
             if imgui.button(item_label("Bring it here"), Vec(-1, 0)):
                 tools.bring()
             _hint("cut")
-    _undo_save(tools, save)
+    draw_cuts(tool, tools.editor, scale)
 
 
 def _draw_regions(tools: HandTools, save: Callable[[], None], scale: float) -> None:
     brush = tools.brush
+    _undo_save(tools, save)
     changed, on = imgui.checkbox(item_label("paint with a finger"), brush.on)
     if changed:
         brush.on = on
@@ -64,7 +65,6 @@ def _draw_regions(tools: HandTools, save: Callable[[], None], scale: float) -> N
             brush.radius_m = radius / 1000
         _hint("paint")
     draw_regions(tools.editor, scale)
-    _undo_save(tools, save)
 
 
 def _draw_inspect(tools: HandTools, scale: float) -> None:
