@@ -81,7 +81,7 @@ class XrApp:
         self._closing.callback(self.shutter.close)
         self._hand_glass = HandGlass(mirror.ctx, renderer)
         self._closing.callback(self._hand_glass.close)
-        self._probe = Probe(mirror.ctx, renderer.backends["drawing"].split(" ")[0])
+        self._probe = Probe(mirror.ctx, renderer)
         self._closing.callback(self._probe.close)
         self._scene = ExitStack()  # what ends with the scene that is open
         self._level_m = 0.0  # of the floor in the world

@@ -22,10 +22,10 @@ WIDE_PX, WIDE_TANGENT = 480, 1.0  # of what the head sees: 90 degrees
 
 @dataclass
 class Probe:
-    """Of one context; `drawing` as the eyes' renderer has it."""
+    """Of one context; it draws as the eyes' renderer does."""
 
     ctx: moderngl.Context
-    drawing: str
+    eyes: Renderer | None = None
     _renderer: Renderer | None = None
 
     def measure(self, thermal: ThermalScene | None, scene: Scene, view: View) -> ValuePicture:
@@ -33,7 +33,8 @@ class Probe:
         is no room for it.
         """
         if self._renderer is None:
-            self._renderer = Renderer(self.ctx, self.drawing)
+            drawing = self.eyes.backends["drawing"].split(" ")[0] if self.eyes else "auto"
+            self._renderer = Renderer(self.ctx, drawing)
         bound = self.ctx.fbo
         try:
             if thermal is None:

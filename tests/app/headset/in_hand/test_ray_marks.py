@@ -42,7 +42,7 @@ class Inspector:
     def __init__(self, ctx) -> None:
         _, editor = open_xr(DEMO, Options())
         self.state, self.editor, self.seconds = a_state(editor), editor, 0.0
-        self.probe = Probe(ctx, "tiles")
+        self.probe = Probe(ctx)
         self.tools, self.tool, self.marks = (
             self.state.tools, self.state.tools.inspecting, self.state.tools.marks,
         )  # fmt: skip
