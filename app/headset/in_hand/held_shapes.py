@@ -58,7 +58,11 @@ class HeldShapes:
         if not self.side:
             for side in SIDES:
                 busy = carried.taken and side == carried.pointer
-                if side in self._shut - before and not busy and self._take(hands[side], play_space):
+                if (
+                    side in self._shut - before
+                    and not busy
+                    and self._grasp(hands[side], play_space)
+                ):
                     self.side = side
                     break
         if not self.side:
@@ -80,7 +84,7 @@ class HeldShapes:
             return self.shown is None
         return not self.sections.on or self.sections.number != self._number
 
-    def _take(self, hand: Hand, play_space: PlaySpace) -> bool:
+    def _grasp(self, hand: Hand, play_space: PlaySpace) -> bool:
         if hand.grip is None:
             return False
         palm = play_space.pose(hand.grip)

@@ -2,7 +2,9 @@
 level and span, isotherms as lines; no runtime.
 """
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,8 +41,8 @@ MOTOR, TABLE, NOTHING = (0.1, 0.2, 0.0), (0.1, 0.0, 0.2), (0.0, 2.0, 0.0)  # of 
 class Inspector:
     """Somebody whose right hand has the tool; each `act` is a frame of a quarter of a second."""
 
-    def __init__(self, ctx) -> None:
-        _, editor = open_xr(DEMO, Options())
+    def __init__(self, ctx, path: Path = DEMO) -> None:
+        _, editor = open_xr(path, Options())
         self.state, self.editor, self.seconds = a_state(editor), editor, 0.0
         self.probe = Probe(ctx)
         self.tools, self.tool, self.marks = (
@@ -270,12 +272,21 @@ def test_contours_leave_out_what_is_not_known_torn_or_never_crossed():
     assert contour_lines(a_plane(np.ones((3, 3))), Isotherm("above", low=0.5)).shape == (0, 2, 3)
 
 
-def test_marks_are_kept_beside_the_scene_as_on_the_desktop(inspector, tmp_path):
+def test_marks_are_kept_beside_the_scene_as_on_the_desktop(inspector, ctx, tmp_path):
     inspector.pull(TABLE)
     inspector.tool.keep()
     assert "came with the program" in inspector.editor.problem
-    inspector.tool._path = tmp_path / "mine.marks.json"
-    inspector.tool.keep()
+    mine = Inspector(ctx, Path(shutil.copy(DEMO, tmp_path / "mine.shift")))
+    mine.pull(TABLE)
+    assert mine.tool.unsaved
+    mine.tool.keep()
+    assert not mine.editor.problem and not mine.tool.unsaved
     (mark,) = read_marks_file(tmp_path / "mine.marks.json").marks
-    wanted = inspector.tool.file.marks[0].place + inspector.tool.document.origin
+    wanted = mine.tool.file.marks[0].place + mine.tool.document.origin
     np.testing.assert_allclose(mark.place, wanted, atol=1e-5)
+    again = Inspector(ctx, tmp_path / "mine.shift")
+    assert again.names() == ["Sp1"]
+    again.act(mine.tool.file.marks[0].place)
+    assert again.marks.under == "Sp1", "found again in another session"
+    for each in (mine, again):
+        each.probe.close()
