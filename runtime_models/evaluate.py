@@ -190,7 +190,9 @@ class Evaluator:
         if self._kept is not None and name in self._lasting:
             return self._kept[name]
         changed = self._changed(name, x)
-        if changed is not None:  # a border that moves: anchors that it has not met stay
+        if changed is not None and is_each(
+            x
+        ):  # a border that moves: anchors that it has not met stay
             before = self._mixed[name][1]
             if changed.size:
                 room = np.empty((changed.size, before.shape[1]), np.float32)

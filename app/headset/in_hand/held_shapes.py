@@ -45,8 +45,9 @@ class HeldShapes:
     def shown(self) -> Region | None:
         """The region that hands can take: chosen on the panel, and one that has a place."""
         region = self.editor.regions.current
-        here = region is not None and region.is_placed
-        return region if here and region.index < len(self.editor.scene.objects) else None
+        if region is None or not region.is_placed:
+            return None
+        return region if region.index < len(self.editor.scene.objects) else None
 
     def act(self, frame: Frame, play_space: PlaySpace, carried: Carried) -> Frame:
         """Takes, carries, lets go; the frame with what it leaves of the hands."""
@@ -145,7 +146,7 @@ class HeldShapes:
             normal, to = np.array(shape.normal), place - self.sections.pivot
             across = float(normal @ to)
             aside = np.linalg.norm(to - across * normal) - GRID_PART * self.editor.radius
-            return float(np.hypot(across, max(aside, 0.0)))
+            return float(np.hypot(across, max(float(aside), 0.0)))
         beyond = np.abs(shape.axes.T @ (place - np.array(shape.centre))) - np.array(shape.half)
         if (beyond <= 0).all():
             return float(-beyond.max())

@@ -153,12 +153,12 @@ def _pointed(tools: HandTools, frame: Frame, carried: Carried) -> Card | None:
         return None
     metres = pointed.metres * tools.inspecting.file.metres_per_unit
     far = f"{metres:.2f} m" if np.isfinite(metres) else "--"
-    texts = (far,)
+    texts = [far]
     if tools.inspecting.thermal is not None:
-        texts = (words_of(pointed.value, pointed.picture, tools.unit), far)
+        texts.insert(0, words_of(pointed.value, pointed.picture, tools.unit))
     right = frame.head.matrix()[:3, 0] * (1.0 if carried.pointer == SIDES[1] else -1.0)
     place = hand.aim.position + ASIDE_M * right + np.array([0.0, ABOVE_M, 0.0])
-    return Card(texts, facing(place, frame.head))
+    return Card(tuple(texts), facing(place, frame.head))
 
 
 def capsules(
