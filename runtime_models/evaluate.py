@@ -1,7 +1,5 @@
 """Splats of a model at one x and one eye, by onnxruntime: the check of every faster path."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
@@ -10,17 +8,18 @@ from shapeshift.runtime_models.model import (
     SIZE_PER_SPLAT,
     AnchorFrames,
     AnchorModel,
-    Mlp,
     Model,
     ScaffoldModel,
     SplatLayers,
     Splats,
 )
-from shapeshift.runtime_models.package.write_onnx import write_onnx
+from shapeshift.runtime_models.network_sessions import FoldedNetwork, WholeNetwork
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.runtime_models.scaffold.evaluate_scaffold import ScaffoldEvaluator
-from shapeshift.runtime_models.session import BATCH, open_session
+from shapeshift.runtime_models.session import BATCH
 from shapeshift.runtime_models.stop_weights import Controls, is_each
+
+MOST_CHANGED = 0.5  # of the anchors: from there on all of them are run
 
 
 def follows_eye(model: Model) -> bool:
@@ -69,8 +68,9 @@ class Evaluator:
     that looks at the eye, what the features give the first layer is kept: a colour run is a seventh
     faster, for one float an anchor and hidden unit (128 bytes an anchor of the demo).
     keep: geometry() writes into the same arrays again: no fresh memory, a quarter faster, but what
-    it gave before is gone.  A network that does not see x then runs once; its caller must not write
-    into what it is given.
+    it gave before is gone.  A network that does not see x then runs once, and where each anchor has
+    a control of its own, it runs for those alone whose control has changed; its caller must not
+    write into what it is given.
     """
 
     def __init__(
@@ -84,6 +84,8 @@ class Evaluator:
         self._networks: dict[str, FoldedNetwork | WholeNetwork] = {}
         self._kept: dict[str, np.ndarray] | None = {} if keep else None  # outputs of networks
         self._lasting: set[str] = set()  # of these, which hold for every x
+        # Of a control value an anchor: what it was last, and what a network of the shape gave.
+        self._mixed: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._whole: dict[str, WholeNetwork] = {}  # for a control value an anchor
         self._threads = threads
         self._own: tuple[np.ndarray, np.ndarray] | None = None  # x of anchors, Psi (A, d)
@@ -187,15 +189,46 @@ class Evaluator:
         """
         if self._kept is not None and name in self._lasting:
             return self._kept[name]
-        values = self._run(name, x)
-        if self._frames is not None:
-            values = self._frames.apply(name, values)
-        if name == "offset":
-            values += self._centres
+        changed = self._changed(name, x)
+        if changed is not None and is_each(
+            x
+        ):  # a border that moves: anchors that it has not met stay
+            before = self._mixed[name][1]
+            if changed.size:
+                room = np.empty((changed.size, before.shape[1]), np.float32)
+                before[changed] = self._placed(
+                    name, self._run(name, x[changed], rows=changed, out=room), changed
+                )
+            self._mixed[name] = np.array(x), before
+            return before
+        values = self._placed(name, self._run(name, x), slice(None))
         if self._kept is not None and "control" not in self._anchored.networks[name].inputs:
             self._lasting.add(name)
             self._kept[name] = values
+        self._mixed.pop(name, None)  # its array may have been written over
+        if self._kept is not None and is_each(x):
+            self._mixed[name] = np.array(x), values
         return values
+
+    def _placed(self, name: str, values: np.ndarray, rows: np.ndarray | slice) -> np.ndarray:
+        """Outputs of a network of the shape, of some rows of anchors, in the object's frame."""
+        if self._frames is not None:
+            values = self._frames.apply(name, values, rows)
+        if name == "offset":
+            values += self._centres[rows]  # type: ignore[index]  # geometry has made them
+        return values
+
+    def _changed(self, name: str, x: Controls) -> np.ndarray | None:
+        """With `keep`, the rows of anchors whose control is another than the last time; None: all
+        of them are to be run.
+        """
+        if self._kept is None or name not in self._mixed or not is_each(x):
+            return None
+        before = self._mixed[name][0]
+        if before.shape != x.shape:
+            return None
+        rows = np.flatnonzero(~alike(x, before))
+        return rows if rows.size <= MOST_CHANGED * len(x) else None
 
     def _run(
         self,
@@ -252,7 +285,7 @@ class Evaluator:
                 out[part] = network.run(parts, None if base is None else base[numbers[part]])
         return out
 
-    def _network(self, name: str, one_control: bool) -> "FoldedNetwork | WholeNetwork":
+    def _network(self, name: str, one_control: bool) -> FoldedNetwork | WholeNetwork:
         """The network for one control value, or for one an anchor, which is made at first use."""
         if one_control or isinstance(self._networks[name], WholeNetwork):
             return self._networks[name]
@@ -294,16 +327,19 @@ class FrameColumns:
         self._scales = np.tile(frames.scales, k)  # (A, k * 3)
         self._wxyz = np.repeat(frames.wxyz, k, axis=0)  # (A * k, 4)
 
-    def apply(self, name: str, values: np.ndarray) -> np.ndarray:
-        """(A, k * size) in the object's frame of such in each anchor's own; may be `values`."""
-        count = len(self._axes)
+    def apply(self, name: str, values: np.ndarray, rows: np.ndarray | slice) -> np.ndarray:
+        """(n, k * size) in the object's frame of such in each anchor's own; may be `values`.  rows:
+        of the anchors.
+        """
+        count = len(values)
         if name == "offset":
-            own = values.reshape(count, -1, 3)  # (A, k, 3)
-            return np.matmul(own, self._axes.transpose(0, 2, 1)).reshape(count, -1)
+            own = values.reshape(count, -1, 3)  # (n, k, 3)
+            return np.matmul(own, self._axes[rows].transpose(0, 2, 1)).reshape(count, -1)
         if name == "scale":
-            values *= self._scales
+            values *= self._scales[rows]
         elif name == "rotation":
-            values = product(self._wxyz, values.reshape(-1, 4)).reshape(count, -1)
+            turns = self._wxyz.reshape(len(self._axes), -1, 4)[rows].reshape(-1, 4)
+            values = product(turns, values.reshape(-1, 4)).reshape(count, -1)
         return values
 
 
@@ -316,63 +352,3 @@ def alike(x: np.ndarray, one: np.ndarray) -> np.ndarray:
 def _own(weights: np.ndarray, layer: np.ndarray) -> np.ndarray:
     """(N,) of weights (stops, N): each splat's weight of its own layer."""
     return weights[layer, np.arange(len(layer))]
-
-
-class WholeNetwork:
-    """One network as its ONNX file holds it: every input for every anchor."""
-
-    def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
-        self._inputs = mlp.inputs
-        self._session = open_session(write_onnx(mlp, name), threads)
-
-    def feature_part(self, features: np.ndarray) -> None:
-        """Nothing is kept."""
-
-    def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:
-        """(n, k * size) of features (n, F), directions (n, 3) and Psi, (1, d) or (n, d).
-
-        base: None, as feature_part gives it.
-        """
-        count = len(parts["feature"])
-        columns = [np.broadcast_to(parts[p], (count, parts[p].shape[1])) for p in self._inputs]
-        return self._session.run(["output"], {"input": np.concatenate(columns, axis=1)})[0]
-
-
-class FoldedNetwork:
-    """The same network with Psi(x) in its first bias: only what differs from anchor to anchor."""
-
-    def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
-        widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
-        part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
-        first = mlp.weights[0]  # (hidden, inputs)
-        self._keeps = {"feature", "direction"} <= set(mlp.inputs)
-        outside = ("control", "feature") if self._keeps else ("control",)
-        self._inputs = [part for part in mlp.inputs if part not in outside]
-        self._bias = mlp.biases[0].astype(np.float64)
-        self._control = first[:, part_of == "control"].astype(np.float64)  # (hidden, d or 0)
-        self._feature = first[:, part_of == "feature"]
-        self._base: np.ndarray | None = None  # (A, hidden)
-        rest = replace(mlp, weights=(first[:, ~np.isin(part_of, outside)], *mlp.weights[1:]))
-        kind = "input and rows" if self._keeps else "input"
-        self._session = open_session(write_onnx(rest, name, first_bias=kind), threads)
-
-    def feature_part(self, features: np.ndarray) -> np.ndarray | None:
-        """(A, hidden) what the first layer makes of all features, from the first use on."""
-        if self._keeps and self._base is None:
-            # By a session as well: numpy's matrix product leaves threads spinning for milliseconds.
-            layer = Mlp((self._feature,), (np.zeros(len(self._feature), np.float32),))
-            session = open_session(write_onnx(layer, "features"), threads=1)
-            self._base = session.run(["output"], {"input": features})[0]
-        return self._base
-
-    def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:
-        """The same of one Psi (1, d) for all; base (n, hidden): their feature part, if kept."""
-        bias = self._bias[None]
-        if self._control.shape[1]:
-            bias = bias + parts["control"].astype(np.float64) @ self._control.T
-        columns = [parts[part] for part in self._inputs] or [parts["feature"][:, :0]]
-        rows = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=1)
-        given = {"input": rows, "bias": bias.astype(np.float32)}
-        if base is not None:
-            given["rows"] = base
-        return self._session.run(["output"], given)[0]

@@ -27,6 +27,7 @@ class Card:
     lines: tuple[str, ...]
     play_from_card: Pose
     opacity: float = 1.0
+    larger: float = 1.0  # than METRES_PER_PIXEL makes it: for what hangs far away
 
     def picture(self) -> np.ndarray:
         """(H, W, 4) uint8 premultiplied, row 0 on top."""
@@ -40,7 +41,8 @@ class Card:
     @property
     def size_m(self) -> tuple[float, float]:
         height, width = self.picture().shape[:2]
-        return width * METRES_PER_PIXEL, height * METRES_PER_PIXEL
+        per_pixel = METRES_PER_PIXEL * self.larger
+        return width * per_pixel, height * per_pixel
 
 
 @lru_cache(maxsize=32)

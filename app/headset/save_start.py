@@ -1,4 +1,4 @@
-"""Saves the scene with the place of who wears the headset as its first look."""
+"""Saves the scene, with the place of who wears the headset as its first look or without."""
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.saving import Saving, free_path
@@ -22,6 +22,11 @@ def save_start(editor: EditorState, eye: Pose) -> bool:
     view = edits.rounded(view)
     if not ObjectEdits(editor, None, lambda: None).edit(edits.look_from, view, what="first look"):
         return False
+    return save_scene(editor)
+
+
+def save_scene(editor: EditorState) -> bool:
+    """The same with the first look that it has."""
     folder = WorkFolders.of().scenes
     saving = Saving(editor, OwnFiles(config_folder()), folder, lambda path: None)
     if saving.in_place and saving.save():

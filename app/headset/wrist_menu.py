@@ -27,6 +27,7 @@ from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.track import ON_STOP, shown_words
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
+from shapeshift.app.headset.save_start import save_scene
 from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.app.headset.sections.comfort_section import draw_comfort, draw_see_through
 from shapeshift.app.headset.sections.glass_section import draw_glass
@@ -40,6 +41,7 @@ from shapeshift.app.headset.sections.room_section import (
     draw_scale,
 )
 from shapeshift.app.headset.sections.scenes_section import SceneActions, draw_scenes
+from shapeshift.app.headset.sections.tool_sections import tool_sections
 from shapeshift.app.headset.session.recorder import Recorder
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
@@ -122,6 +124,7 @@ class WristMenu:
             Section("Scenes", lambda scale: self._draw_scenes(scenes, scale)),
             Section("Comfort", self._draw_comfort),
             Section("Help", lambda scale: draw_help()),
+            *tool_sections(state.tools, self._save),
         ]
 
     def act(self, frame: Frame, seconds: float) -> Frame:
@@ -195,6 +198,7 @@ class WristMenu:
             self._foot.sure_s > 0, editor.messages.note, self.gallery.shown, self.styles.progress,
             state.figures if self._figures_seen else None, state.worn.now,
             self.shelf.opening, self.shelf.shown, self._recording(), state.glass.stop,
+            state.tools.key(),
         )  # fmt: skip
 
     def _fill(self) -> None:
@@ -231,8 +235,8 @@ class WristMenu:
 
     def _open(self, path: Path) -> None:
         """Another scene; where work would be lost, once it has been chosen twice."""
-        messages = self._state.editor.messages
-        if unsaved(self._state.editor) and path != self._sure_of:
+        messages, marks = self._state.editor.messages, self._state.tools.inspecting
+        if (unsaved(self._state.editor) or marks.unsaved) and path != self._sure_of:
             self._sure_of = path
             messages.say(said(SURE), time.perf_counter())
             return
@@ -241,6 +245,10 @@ class WristMenu:
     def _start_here(self) -> None:
         if self._frame is not None:
             self._actions.start_here(self._frame)
+
+    def _save(self) -> None:
+        if save_scene(self._state.editor):
+            self.shelf.remember(self._state.editor.edited.path)
 
     def _record(self) -> None:
         if self._actions.recorder is not None:

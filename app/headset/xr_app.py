@@ -14,6 +14,7 @@ from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
+from shapeshift.app.headset.in_hand.probe import Probe
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.over.glass_state import GlassState, stop_now
 from shapeshift.app.headset.over.hand_glass import HandGlass
@@ -80,6 +81,8 @@ class XrApp:
         self._closing.callback(self.shutter.close)
         self._hand_glass = HandGlass(mirror.ctx, renderer)
         self._closing.callback(self._hand_glass.close)
+        self._probe = Probe(mirror.ctx, renderer)
+        self._closing.callback(self._probe.close)
         self._scene = ExitStack()  # what ends with the scene that is open
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
@@ -120,6 +123,7 @@ class XrApp:
             glass=GlassState(stop_now(editor, self._wearing.glass)),
         )
         self._parts_hand = PartsHand(parts)
+        self.state.tools.open(self._probe.measure)
         actions = MenuActions(
             self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start,
             self.shutter.recorder,
@@ -263,8 +267,10 @@ class XrApp:
         """What the person and their hands do, and the world after it."""
         before = self.state.play_space
         left_over = self.menu.act(frame, seconds)
-        left_over = self._parts_hand.act(left_over, self.state.play_space, self.menu.carried)
-        self.state.play_space = self.state.user.act(left_over, self.state.play_space, seconds)
+        room, carried = self.state.play_space, self.menu.carried
+        left_over = self._parts_hand.act(left_over, room, carried)
+        left_over = self.state.tools.act(left_over, room, carried, self.state.shown, seconds)
+        self.state.play_space = self.state.user.act(left_over, room, seconds)
         self._clearness = clearness(self._clearness, before, self.state.play_space, seconds)
         if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
             self._worn_s += seconds
@@ -293,6 +299,7 @@ class XrApp:
         self.background = BLACK if through else look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
         settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0)
+        settings = replace(settings, heat_ends=look.heat_ends)
         self.renderer.settings = replace(settings, background=self.background)
         start = time.perf_counter()
         glass = self._hand_glass

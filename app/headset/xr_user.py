@@ -7,6 +7,7 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.fitting import Fitting
+from shapeshift.app.headset.in_hand.hand_tools import HandTools
 from shapeshift.app.headset.over.glass_state import GlassState
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.sections.performance_section import Figures
@@ -96,10 +97,12 @@ class XrState:
     glass: GlassState = field(default_factory=GlassState)
     shown: Scene = field(default_factory=lambda: Scene(()))  # of this frame, as it is drawn
     fit: Fitting = field(init=False)
+    tools: HandTools = field(init=False)
     _was_through: bool = False  # the room itself was behind the scene
 
     def __post_init__(self) -> None:
         self.fit = Fitting(self.worn)
+        self.tools = HandTools(self.editor, self.parts)
 
     @property
     def through(self) -> bool:

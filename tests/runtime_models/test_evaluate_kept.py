@@ -10,8 +10,9 @@ from shapeshift.runtime_models.evaluate import (
     shape_follows_control,
 )
 from shapeshift.runtime_models.model import HEADS, ControlEncoding
+from shapeshift.runtime_models.network_sessions import FoldedNetwork, WholeNetwork
 from shapeshift.runtime_models.stop_weights import encode_rows
-from tests.support.models import make_random_model, without_control
+from tests.support.models import make_random_model, with_frames, without_control
 
 EYE = np.array([0.3, -0.2, 2.0])
 
@@ -97,3 +98,36 @@ def test_directions_are_unit_or_nothing():
     assert not some[[3, 5]].any()
     rest = np.setdiff1d(np.arange(100), [3, 5])
     np.testing.assert_allclose(some[rest], towards[rest], atol=1e-6)
+
+
+@pytest.mark.parametrize("frames", [False, True])
+@pytest.mark.parametrize("sides", [True, False], ids=["two controls", "all between"])
+def test_a_border_that_moves_runs_what_it_has_met_alone(frames, sides, monkeypatch):
+    """From none to half of the anchors, one more than half, one value for all, and back."""
+    count = 64
+    model = make_random_model(count, k=3)
+    model = with_frames(model) if frames else model
+    fresh, kept, rows = Evaluator(model), Evaluator(model, keep=True), []
+    for kind in (FoldedNetwork, WholeNetwork):
+
+        def counted(self, parts, base, run=kind.run):
+            rows.append(len(parts["feature"]))
+            return run(self, parts, base)
+
+        monkeypatch.setattr(kind, "run", counted)
+    place = np.random.default_rng(0).permutation(count)
+    between = np.random.default_rng(1).uniform(0.2, 0.8, count).astype(np.float32)
+
+    def x_at(border: int) -> np.ndarray:
+        here = np.float32(0.25) if sides else between
+        return np.where(place < border, here, np.float32(0.75)).astype(np.float32)
+
+    steps = [(x_at(10), 64), (x_at(10), 0), (x_at(11), 1), (x_at(42), 31), (x_at(10), 32)]
+    steps += [(x_at(43), 64), (0.4, 64), (x_at(43), 64), (x_at(40), 3)]
+    for x, ran in steps:
+        rows.clear()
+        found = kept.geometry(x)
+        assert sum(rows) == len(GEOMETRY) * ran
+        for ours, wanted in zip(found, fresh.geometry(x), strict=True):
+            # A few rows have other sums in a matrix product than many: half a step of float32.
+            np.testing.assert_allclose(ours, wanted, rtol=2e-6, atol=1e-6)

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.evaluate import FoldedNetwork, directions
+from shapeshift.runtime_models.evaluate import directions
 from shapeshift.runtime_models.model import HEADS, AnchorModel
+from shapeshift.runtime_models.network_sessions import FoldedNetwork
 from shapeshift.runtime_models.session import BATCH
 from shapeshift.training.heads.networks import HeadLayout
 

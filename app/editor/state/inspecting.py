@@ -144,9 +144,14 @@ class Inspecting:
         self.read()
         return True
 
-    def lay(self, kind: Kind, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """A mark where the picture shows something; start, end: its pixels (column, row)."""
-        picture, names = self.picture, [mark.name for mark in self.file.marks]
+    def lay(
+        self, kind: Kind, start: tuple[float, float], end: tuple[float, float],
+        seen: ValuePicture | None = None,
+    ) -> None:  # fmt: skip
+        """A mark where the picture shows something; start, end: its pixels (column, row).  seen:
+        another one than the view's, such as around a hand's ray.
+        """
+        picture, names = seen or self.picture, [mark.name for mark in self.file.marks]
         if picture is None:
             return
         name = free_name(kind, names)
@@ -214,14 +219,22 @@ class Inspecting:
         else:
             self.edit(file)
 
+    def note(self, sentence: str) -> None:
+        """Says for a moment what a hand cannot do."""
+        self._state.say(sentence)
+
+    def fail(self, sentence: str) -> None:
+        """Says what is wrong, until it is taken away."""
+        self._state.problem = sentence
+
     # ---- what is read
 
     def saw(self, picture: ValuePicture) -> None:
         """What the view has, measured just now."""
-        self.picture, self.is_current = self._corrected(picture), True
+        self.picture, self.is_current = self.corrected(picture), True
         self.read()
 
-    def _corrected(self, picture: ValuePicture) -> ValuePicture:
+    def corrected(self, picture: ValuePicture) -> ValuePicture:
         """As the file of marks has the emissivity; values that are no temperatures stay."""
         emission = self.file.emission
         if emission is not None and picture.is_temperature:
@@ -231,7 +244,7 @@ class Inspecting:
     def read(self) -> None:
         """All marks anew in the picture that is there."""
         if self.picture is not None and self.picture.emission != self.file.emission:
-            self.picture = self._corrected(self.picture)
+            self.picture = self.corrected(self.picture)
         picture = self.picture
         marks: tuple[Mark, ...] = self.file.marks if picture is not None else ()
         self.readings = {mark.name: read_mark(mark, picture) for mark in marks if picture}

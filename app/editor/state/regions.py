@@ -200,9 +200,18 @@ class Regions:
 
         cursor and radius are in pixels of the view, from its top left.
         """
+        return self._paint(brushed(view, anchor_places(obj.model), obj, cursor, radius), erase)
+
+    def paint_balls(
+        self, centres: np.ndarray, radius_m: float, obj: SceneObject, erase: bool
+    ) -> int:
+        """The same of the anchors within balls about centres (n, 3); metres of the world."""
+        return self._paint(np.flatnonzero(within_balls(obj, centres, radius_m)), erase)
+
+    def _paint(self, under: np.ndarray, erase: bool) -> int:
+        """Paints or erases rows of anchors of the chosen region; returns how many changed."""
         before = self.items[self.chosen].painted
         assert before is not None  # a painted region has a mask from `add` on
-        under = brushed(view, anchor_places(obj.model), obj, cursor, radius)
         painted = before.copy()
         painted[under] = not erase
         changed = int(np.count_nonzero(painted != before))
@@ -257,6 +266,16 @@ def farthest_stop(obj: SceneObject) -> float:
     """x of the stop that differs most from what the object shows."""
     xs = [stop.x for stop in obj.model.stops] or [0.0, 1.0]
     return max(xs, key=lambda x: abs(x - obj.slider_x))
+
+
+def within_balls(obj: SceneObject, centres: np.ndarray, radius_m: float) -> np.ndarray:
+    """(A,) bool: which anchors of an object lie within balls about centres (n, 3), world."""
+    matrix = obj.world_from_object.matrix()
+    places = anchor_places(obj.model) @ matrix[:3, :3].T + matrix[:3, 3]  # (A, 3) metres
+    inside = np.zeros(len(places), bool)
+    for centre in centres:
+        inside |= ((places - centre) ** 2).sum(axis=1) <= radius_m * radius_m
+    return inside
 
 
 def brushed(

@@ -190,6 +190,11 @@ class SectionTool:
             moved = self._with_face(shape, handle, place)
         self.put_shape(moved, f"section {self.number}")
 
+    def put_face(self, handle: SectionHandle, place: np.ndarray, together: str = "") -> None:
+        """A face as it was when it was taken hold of goes through a place (3,) of the world."""
+        if self.shape is not None:
+            self.put_shape(self._with_face(self.shape, handle, place), together)
+
     def put_shape(self, shape: PlaneShape | BoxShape, together: str = "") -> None:
         """Another shape of the current section, of the world."""
         frame_from_world = Pose.from_matrix(np.linalg.inv(self._world_from_frame.matrix()))

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from shapeshift.app.headset.in_hand.tools_drawn import with_tools
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.over.hand_glass import HandGlass
 from shapeshift.app.headset.panel_picture import PanelPicture
@@ -45,6 +46,7 @@ class OverSplats:
         solid = [part for each in held.values() for part in each.parts]
         over = replace(over, hands=(*over.hands, *solid), lines=(*over.lines, *lines))
         over = self._glass.added(over, state)
+        over = with_tools(over, state.tools, frame, state.play_space, carried)
         if self._wearing.edges:
             over = replace(over, edges=area_edges(frame))
         if over.panel is None or not self._wearing.panel_layer:

@@ -15,6 +15,7 @@ from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.pacing import QUALITIES
 from shapeshift.app.headset.sections.comfort_section import lit_button
 from shapeshift.app.headset.xr_user import XrState
+from shapeshift.renderer.colors.palette import ALL_VALUES
 
 Vec = imgui.ImVec2
 SIZES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
@@ -115,7 +116,8 @@ def draw_scale(state: EditorState, ui_scale: float) -> None:
     """The palette of the thermal stop with its values."""
     corner = imgui.get_cursor_screen_pos()
     box = (corner.x, corner.y, corner.x + SCALE_WIDE * ui_scale, corner.y + SCALE_TALL * ui_scale)
-    draw_scale_bar(state.scene, box, ui_scale, imgui.get_window_draw_list())
+    ends = state.settings.heat_ends if state.settings.heat_ends != ALL_VALUES else None
+    draw_scale_bar(state.scene, box, ui_scale, imgui.get_window_draw_list(), ends=ends)
     imgui.dummy(Vec(SCALE_WIDE * ui_scale, SCALE_TALL * ui_scale))
 
 

@@ -220,11 +220,12 @@ def test_sections_of_the_desktop_do_here_what_they_do_there(wearer):
     assert wearer.x("lamp") == 1.0
     wearer.press("Stops")
     wearer.unfold("Objects")
-    wearer.scroll()
+    wearer.scroll_to("seen")
     before = {obj.name for obj in wearer.editor.scene.objects if obj.visible}
     wearer.press("seen")  # of the first object in sight
     (hidden,) = before - {obj.name for obj in wearer.editor.scene.objects if obj.visible}
     assert not wearer.state.world.objects[hidden].drawn.visible, "the world has heard of it"
+    wearer.scroll_to("leg")
     wearer.press("leg")
     assert wearer.shown == "leg"
     wearer.scroll(1.0)
@@ -312,7 +313,9 @@ def test_the_gallery_is_the_desktop_s(cube):
         time.sleep(0.01)
     assert len(gallery.thumbnails.pictures) == 4
     cube.wait()
+    cube.scroll_to("ice")
     cube.press("ice")
+    cube.scroll_to("fire")
     cube.press("fire")
     assert gallery.picked == ("ice", "fire") and cube.x("cube") == 0.5
     place = (PANEL.size[0] / 2, PANEL.size[1] * 0.7)

@@ -54,6 +54,7 @@ HEADSET_TABLES = {
         "NO_ROOM": ALL,
     },
     "sections.glass_section": {"NONE": ALL, "HELP": ALL},
+    "sections.tool_sections": {"HOW": VALUES},
     "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL}, "wrist_menu": {"SURE": ALL},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called

@@ -7,6 +7,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.scale_bar import in_unit
+from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import button_row, item_label, tip
 from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.texts.table import said
@@ -36,7 +37,7 @@ class InspectActions:
 
     toggle: Callable[[], None]  # the tool
     auto: Callable[[], None]  # level and span of what is seen
-    report: Callable[[], None]
+    report: Callable[[], None] | None = None  # None: it is not offered
 
 
 def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scale: float) -> None:
@@ -74,11 +75,14 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
         "Save marks": "NAME.marks.json beside the scene: read when it is opened again.",
         "Report": "One HTML file with pictures and tables of this view, among the exports.",
     }
-    clicked = button_row(tips, ui_scale, 2)
+    report = actions.report
+    if report is None:
+        del tips["Report"]
+    clicked = button_row(tips, ui_scale, len(tips))
     if clicked == "Save marks":
         tool.keep()
-    elif clicked:
-        actions.report()
+    elif clicked and report is not None:
+        report()
 
 
 def _table(tool: Inspecting, wanted: str, unit: str, ui_scale: float) -> None:
@@ -113,19 +117,29 @@ def _table(tool: Inspecting, wanted: str, unit: str, ui_scale: float) -> None:
 
 def _chosen(tool: Inspecting, ui_scale: float) -> None:
     """The name of the chosen mark, to be typed, and the button that deletes it."""
-    gap, name = imgui.get_style().item_spacing.x, tool.chosen
-    width = 0.6 * (imgui.get_content_region_avail().x - gap)
-    imgui.set_next_item_width(width)
+    name = tool.chosen
+    if theme.has_keys():
+        _name(tool, name, ui_scale)
+        imgui.same_line()
+    else:
+        imgui.align_text_to_frame_padding()
+        imgui.text_disabled(name)
+        imgui.same_line()
+    if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:
+        tool.delete(name)
+    tip("Delete the mark; Ctrl+Z brings it back while the tool is on.", ui_scale)
+
+
+def _name(tool: Inspecting, name: str, ui_scale: float) -> None:
+    """Of the chosen mark, to be typed."""
+    gap = imgui.get_style().item_spacing.x
+    imgui.set_next_item_width(0.6 * (imgui.get_content_region_avail().x - gap))
     done, text = imgui.input_text(
         f"##name of {name}", name, imgui.InputTextFlags_.enter_returns_true
     )
     tip("Its name; Enter takes it over.", ui_scale)
     if done and not tool.name_mark(name, text) and text != name:
         imgui.set_keyboard_focus_here(-1)
-    imgui.same_line()
-    if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:
-        tool.delete(name)
-    tip("Delete the mark; Ctrl+Z brings it back while the tool is on.", ui_scale)
 
 
 def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:

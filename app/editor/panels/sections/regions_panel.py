@@ -99,16 +99,17 @@ def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
     """Every control of the region that is being edited."""
     regions, number = state.regions, state.regions.chosen
     objects = state.scene.objects
-    changed, name = imgui.input_text("##name", region.name)
-    tip("Its name.", ui_scale)
-    if changed:
-        regions.edit(number, name=name[:LONGEST_NAME])
+    if theme.has_keys():  # a hand in a headset types nothing
+        changed, name = imgui.input_text("##name", region.name)
+        tip("Its name.", ui_scale)
+        if changed:
+            regions.edit(number, name=name[:LONGEST_NAME])
     if len(objects) > 1 and region.kind != "painted":
         names = [said("of {name}", name=obj.name) for obj in objects]
         index = choice("object", region.index, range(len(objects)), names, names=True)
         tip("The object whose part it is.", ui_scale)
         regions.edit(number, index=index)
-    if region.is_placed:
+    if region.is_placed and theme.has_keys():  # that hand takes it and puts it down
         _place(state, ui_scale)
     _sizes(state, region, ui_scale)
     far = 0.5 * state.radius
@@ -183,8 +184,9 @@ def _direction(state: EditorState, region: Region, ui_scale: float) -> None:
 def _brush(state: EditorState, region: Region, ui_scale: float) -> None:
     """The brush, how much is painted, and what needs no brush."""
     regions = state.regions
-    regions.brush = slider("brush", regions.brush, 3.0, MOST_BRUSH, "brush: %.0f px")
-    tip(KIND_TIPS["painted"], ui_scale)
+    if theme.has_keys():
+        regions.brush = slider("brush", regions.brush, 3.0, MOST_BRUSH, "brush: %.0f px")
+        tip(KIND_TIPS["painted"], ui_scale)
     if region.painted is None:
         return
     count = int(region.painted.sum())

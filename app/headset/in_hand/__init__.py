@@ -1,0 +1,1 @@
+"""Tools of the desktop in a hand of the headset: sections, regions, paint, heat and lengths."""

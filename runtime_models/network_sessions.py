@@ -1,0 +1,69 @@
+"""One network of a model as onnxruntime runs it: whole, or with Psi(x) folded into a bias."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.runtime_models.model import AnchorModel, Mlp
+from shapeshift.runtime_models.package.write_onnx import write_onnx
+from shapeshift.runtime_models.session import open_session
+
+
+class WholeNetwork:
+    """One network as its ONNX file holds it: every input for every anchor."""
+
+    def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
+        self._inputs = mlp.inputs
+        self._session = open_session(write_onnx(mlp, name), threads)
+
+    def feature_part(self, features: np.ndarray) -> None:
+        """Nothing is kept."""
+
+    def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:
+        """(n, k * size) of features (n, F), directions (n, 3) and Psi, (1, d) or (n, d).
+
+        base: None, as feature_part gives it.
+        """
+        count = len(parts["feature"])
+        columns = [np.broadcast_to(parts[p], (count, parts[p].shape[1])) for p in self._inputs]
+        return self._session.run(["output"], {"input": np.concatenate(columns, axis=1)})[0]
+
+
+class FoldedNetwork:
+    """The same network with Psi(x) in its first bias: only what differs from anchor to anchor."""
+
+    def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
+        widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
+        part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
+        first = mlp.weights[0]  # (hidden, inputs)
+        self._keeps = {"feature", "direction"} <= set(mlp.inputs)
+        outside = ("control", "feature") if self._keeps else ("control",)
+        self._inputs = [part for part in mlp.inputs if part not in outside]
+        self._bias = mlp.biases[0].astype(np.float64)
+        self._control = first[:, part_of == "control"].astype(np.float64)  # (hidden, d or 0)
+        self._feature = first[:, part_of == "feature"]
+        self._base: np.ndarray | None = None  # (A, hidden)
+        rest = replace(mlp, weights=(first[:, ~np.isin(part_of, outside)], *mlp.weights[1:]))
+        kind = "input and rows" if self._keeps else "input"
+        self._session = open_session(write_onnx(rest, name, first_bias=kind), threads)
+
+    def feature_part(self, features: np.ndarray) -> np.ndarray | None:
+        """(A, hidden) what the first layer makes of all features, from the first use on."""
+        if self._keeps and self._base is None:
+            # By a session as well: numpy's matrix product leaves threads spinning for milliseconds.
+            layer = Mlp((self._feature,), (np.zeros(len(self._feature), np.float32),))
+            session = open_session(write_onnx(layer, "features"), threads=1)
+            self._base = session.run(["output"], {"input": features})[0]
+        return self._base
+
+    def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:
+        """The same of one Psi (1, d) for all; base (n, hidden): their feature part, if kept."""
+        bias = self._bias[None]
+        if self._control.shape[1]:
+            bias = bias + parts["control"].astype(np.float64) @ self._control.T
+        columns = [parts[part] for part in self._inputs] or [parts["feature"][:, :0]]
+        rows = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=1)
+        given = {"input": rows, "bias": bias.astype(np.float32)}
+        if base is not None:
+            given["rows"] = base
+        return self._session.run(["output"], given)[0]
