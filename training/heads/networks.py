@@ -37,7 +37,7 @@ class HeadLayout:
     control: int = 16  # d of Psi
     fixed: tuple[str, ...] = ()  # heads that do not see Psi: what they give is shared by all stops
     view_dependent: bool = True  # whether colour sees the direction from the eye
-    attributes: tuple[str, ...] = tuple(ANCHOR_ATTRIBUTES)  # of anchors, besides their features
+    attributes: tuple[str, ...] = ("frame", "color")  # of anchors, besides their features
 
     def __post_init__(self) -> None:
         for name in self.fixed:

@@ -1,5 +1,6 @@
 // Adam (Kingma and Ba, 2015), one work-item a parameter, with decoupled weight decay (AdamW,
-// Loshchilov and Hutter, 2019): a part `pull` of the value, times the rate, goes in every step.
+// Loshchilov and Hutter, 2019): a part `pull` of the value, times the rate, goes in every step that
+// has a gradient of it: what a photo does not show rests, whether it takes the step or not.
 // Reads:   grad; rates, one for all or one a parameter; the moments of the steps before.
 // Writes:  value, mean and square, in place.
 // Units:   those of the parameter; a rate is a step in them.
@@ -17,7 +18,8 @@ inline void update(int i, float g, float correct1, float correct2, float rate, f
   mean[i] = m;
   square[i] = v;
   float step = rate * (m * correct1) / (sqrt(v * correct2) + EPSILON);
-  value[i] = (1.0f - rate * pull) * value[i] - step;
+  float kept = g != 0.0f ? 1.0f - rate * pull : 1.0f;
+  value[i] = kept * value[i] - step;
 }
 
 // rates: one for all (rate_stride 0) or one a parameter (1), times `rate_scale`.
@@ -35,8 +37,8 @@ __kernel void adam(int count, float correct1, float correct2, float rate_scale, 
 // One work-item a row: an item a number would divide by the width.
 __kernel void adam_rows(int rows_count, int width, __global const int *rows, float correct1,
                         float correct2, float rate_scale, float pull,
-                        __global const float *rates, __global const float *grad, __global float *value, __global float *mean,
-                        __global float *square) {
+                        __global const float *rates, __global const float *grad,
+                        __global float *value, __global float *mean, __global float *square) {
   int row = get_global_id(0);
   if (!(row < rows_count)) return;
   float rate = rate_scale * rates[0];

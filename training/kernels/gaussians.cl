@@ -156,7 +156,7 @@ inline float4 turned_backward(float4 q, float3 v, float3 grad) {
 __kernel void activate_backward(int anchors_count, float reach, float unit, float eye_x,
                                 float eye_y, float eye_z, __global const float *raw,
                                 __global const float *anchors, __global const float *frames,
-                                __global const float *light, __global const float *scales, 
+                                __global const float *light, __global const float *scales,
                                 __global const float *opacity, __global const float *color,
                                 __global const float *grad_means,
                                 __global const float *grad_scales,

@@ -13,7 +13,9 @@ from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
 from shapeshift.training.reference import decode_reference, step_loss_reference
 from shapeshift.training.step import TrainingStep
 
-LAYOUT = HeadLayout(splats=2, features=8, hidden=8, control=4)
+LAYOUT = HeadLayout(
+    splats=2, features=8, hidden=8, control=4, attributes=("frame", "color", "light")
+)
 OTHERS = {
     "shape fixed": replace(LAYOUT, fixed=("offset", "scale", "rotation")),
     "colour alike from everywhere": replace(LAYOUT, view_dependent=False),

@@ -97,7 +97,7 @@ def test_what_another_part_won_is_not_used_up():
 
 
 def test_settings_without_each_part():
-    settings = TrainSettings()
+    settings = TrainSettings(anchor_attributes="frame,color,light")
     found = {name: part.without(settings, STOPS) for name, part in BY_NAME.items()}
     assert found["shape that follows x"].layout(2).fixed == SHAPE_HEADS
     assert found["scale that follows x"].fixed == "scale"
@@ -110,9 +110,9 @@ def test_settings_without_each_part():
     assert found["anchors' own axes and sizes"].anchor_attributes == "color,light"
     assert found["anchors' own base colours"].anchor_attributes == "frame,light"
     assert found["anchors' own light by direction"].anchor_attributes == "frame,color"
-    # Where colours do not see the direction there are no light, so nothing to take away.
-    blind = TrainSettings(view_dependent=False)
-    assert BY_NAME["anchors' own light by direction"].without(blind, STOPS) is None
+    for none in ({}, {"view_dependent": False, "anchor_attributes": "frame,light"}):
+        usual = TrainSettings(**none)  # blind colours have no light, so nothing is taken away
+        assert BY_NAME["anchors' own light by direction"].without(usual, STOPS) is None
 
 
 def test_parts_that_are_not_there_are_not_tried():

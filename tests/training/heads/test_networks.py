@@ -14,6 +14,7 @@ from shapeshift.runtime_models.package.write_package import package_files
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import (
+    ANCHOR_ATTRIBUTES,
     ATTRIBUTE_WIDTH,
     HeadLayout,
     Heads,
@@ -59,18 +60,20 @@ def relative(found, wanted) -> float:
     return float(np.abs(found - wanted).max() / max(np.abs(wanted).max(), 1e-30))
 
 
+EVERY = tuple(ANCHOR_ATTRIBUTES)
 LAYOUTS = [
     HeadLayout(splats=5),
     HeadLayout(splats=10),
     HeadLayout(splats=1, features=1, hidden=1, control=1),
-    HeadLayout(splats=3, features=7, hidden=9, control=5),
-    HeadLayout(splats=4, features=32, hidden=64, control=16),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=EVERY),
+    HeadLayout(splats=4, features=32, hidden=64, control=16, attributes=EVERY),
     HeadLayout(splats=2, features=8, hidden=16),
     HeadLayout(splats=2, features=5, hidden=130),
-    HeadLayout(splats=3, features=7, hidden=9, control=5, view_dependent=False),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, view_dependent=False, attributes=EVERY),
     HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=()),
     HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=("frame",)),
     HeadLayout(splats=3, features=7, hidden=9, attributes=("color",)),
+    HeadLayout(splats=3, features=7, hidden=9, attributes=("light",)),
     HeadLayout(splats=3, features=7, hidden=9, control=5, fixed=("offset", "scale", "rotation")),
     HeadLayout(splats=2, hidden=12, fixed=HEADS, view_dependent=False),
 ]
@@ -201,7 +204,7 @@ def activated(layout, raw, rows):
 
 @pytest.mark.parametrize("spread", [0.5, 20.0])  # 20: every activation saturates somewhere
 def test_activations_and_their_gradient(device, spread):
-    layout = HeadLayout(splats=3)
+    layout = HeadLayout(splats=3, attributes=EVERY)
     rng = np.random.default_rng(2)
     anchors = rng.normal(size=(21, 3)).astype(np.float32)
     raw = (spread * rng.normal(size=(21, layout.raw_at[-1]))).astype(np.float32)
@@ -295,7 +298,10 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     exported = model_of(state, layout, VOXEL, encoding, stops, {})
     files = package_files(exported, "float32")
     read = read_files(files.__getitem__, "test")
-    assert {n: read.networks[n].inputs for n in HEADS} == {n: layout.parts_of(n) for n in HEADS}
+    taken = {n: read.networks[n].inputs for n in HEADS}
+    assert ("light" in taken["color"]) == ("light" in layout.per_anchor) == (read.light is not None)
+    taken["color"] = tuple(part for part in taken["color"] if part != "light")
+    assert taken == {n: layout.parts_of(n) for n in HEADS}
     heads, activation = Heads(device, layout), Activation(device, layout, VOXEL)
     on_device = [device.upload(a) for a in (weights, anchors, features)]
     there = {"anchors": on_device[1]} | {n: device.upload(array) for n, array in own.items()}
