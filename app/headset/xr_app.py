@@ -292,7 +292,8 @@ class XrApp:
         through = self.state.through
         self.background = BLACK if through else look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
-        settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0)
+        fovea = self.state.worn.now.foveation
+        settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0, foveation=fovea)
         self.renderer.settings = replace(settings, background=self.background)
         start = time.perf_counter()
         glass = self._hand_glass

@@ -262,8 +262,8 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
                       float min_transmittance, __global float* image AND_HEAT AND_FINE) {
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
 #ifdef FOVEATED
-  // Pixels from a sample to the next.  A coarse tile has 8 x 8 samples, in its blocks 0, 2, 8 and 10,
-  // each of which takes the place of four.
+  // Pixels from a sample to the next.  A coarse tile has 8 x 8 samples, in its blocks 0, 2, 8 and
+  // 10, each of which takes the place of four.
   const int step = kinds[tile] == COARSE ? 2 : 1;
   const uint used = step > 1 ? 0x0505 : 0xffff;
   // A sample of the last of an odd number of pixels has one beyond it.

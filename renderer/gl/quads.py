@@ -27,7 +27,7 @@ from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter
 from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, StereoPairSplatter
 from shapeshift.renderer.gl.surface import DepthPictures, draw_surface
-from shapeshift.renderer.gl.target import brightest, choose_target
+from shapeshift.renderer.gl.target import brightest, choose_target, warn_once
 from shapeshift.renderer.layout import MOST_VIEWS
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy, sort_frames
@@ -38,6 +38,8 @@ from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import View
+
+WHOLE = "quads on software GL are drawn in all pixels, whatever foveation says; tiles follow it."
 
 
 class QuadsDrawing(Drawing):
@@ -53,6 +55,8 @@ class QuadsDrawing(Drawing):
         self._splatter = Splatter(gpu)
         self.stereo_pair = StereoPairSplatter(gpu) if is_software(gpu.ctx) else None
         self._foveated = FoveatedSplatter(gpu)
+        # Software GL pays for triangles, and drawing twice has twice as many.
+        self.foveates = not is_software(gpu.ctx)
         self._depths = DepthPictures(gpu)
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._sort_policy = SortPolicy()
@@ -173,6 +177,9 @@ class QuadsDrawing(Drawing):
         """Draws views that were projected together, from image i on; two at once where it pays."""
         arena, pair, disparity = self.arena, self.stereo_pair, None
         foveas = foveas_of(group, settings)
+        if foveas and not self.foveates:
+            warn_once(WHOLE)
+            foveas = []
         alike = len(group) == 2 and not foveas and group[0].size == group[1].size and arena.count
         if pair is not None and alike and not self.draws_heat:
             if settings.low_pass >= LEAST_LOW_PASS:

@@ -59,7 +59,9 @@ class Splatter:
             if not hides:
                 target.clear(0.0, 0.0, 0.0, 0.0)
             if arena.count:
-                self._draw_triangles(arena, covered or size, min_alpha, row * arena.count, heat, hides)
+                self._draw_triangles(
+                    arena, covered or size, min_alpha, row * arena.count, heat, hides
+                )
 
     def _draw_triangles(
         self, arena: Arena, size: tuple[int, int], min_alpha: float, first: int,

@@ -97,7 +97,9 @@ def parts_of(
 ) -> tuple[HiddenMesh, HiddenMesh]:  # fmt: skip
     """What the drawing of the middle leaves out, and that of the rest; and what the lens hides."""
     left, right, down, up = tangents
-    centre = np.array([left + fovea.centre[0] * fovea.unit[0], up - fovea.centre[1] * fovea.unit[1]])
+    centre = np.array(
+        [left + fovea.centre[0] * fovea.unit[0], up - fovea.centre[1] * fovea.unit[1]]
+    )
     angles = np.linspace(0, 2 * np.pi, SIDES + 1)
     circle = np.stack([np.cos(angles), np.sin(angles)], 1)  # (SIDES + 1, 2)
     a, b = circle[:-1], circle[1:]
@@ -105,7 +107,10 @@ def parts_of(
     around = fovea.outer / np.cos(np.pi / SIDES)
     end = 2 * (abs(centre).sum() + abs(np.array(tangents)).max() + around) * np.sqrt(2)
     ring = np.concatenate(
-        [np.stack([around * a, end * a, end * b], 1), np.stack([around * a, end * b, around * b], 1)]
+        [
+            np.stack([around * a, end * a, end * b], 1),
+            np.stack([around * a, end * b, around * b], 1),
+        ]
     )
     within = max(fovea.inner - MARGIN * max(fovea.unit), 0.0)
     disc = np.stack([np.zeros_like(a), within * a, within * b], 1)
