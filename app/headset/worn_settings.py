@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from shapeshift.runtime_models.files.json_fields import is_number, saved_object
 from shapeshift.renderer.settings import FOVEATIONS
+from shapeshift.runtime_models.files.json_fields import is_number, saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.vr.frame import SIDES
 from shapeshift.vr.locomotion.height import POSTURES

@@ -12,6 +12,7 @@ from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
@@ -22,6 +23,7 @@ from shapeshift.app.headset.pacing import Pacing, choose_quality
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import SceneShelf
+from shapeshift.app.headset.sections.comfort_section import NO_ROOM
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.session.comeback import Comeback
 from shapeshift.app.headset.shutter import Shutter
@@ -171,7 +173,7 @@ class XrApp:
         same_room = self.session.play.kind == session.play.kind == ROOMS_OWN
         if self._comeback is None or self._comeback.placed:
             self._comeback = Comeback(self.state, self._head, same_room)
-        self.session, self.state.sees_through = session, session.sees_through
+        self.session = session
         self.eyes.fit(session.sizes)
 
     def rest_at_desk(self) -> None:
@@ -203,6 +205,9 @@ class XrApp:
         seconds = self._time_passed(frame)
         self.pulses.clear()
         state = self.state
+        if state.sees_through and not self.session.sees_through:  # the vendor's cameras failed
+            state.editor.messages.fail(said(NO_ROOM))
+        state.sees_through = self.session.sees_through
         state.see_objects_alone()
         frame, moves = state.fit.worn(frame, seconds)
         stops = self._obstacles and not state.through  # the room's own are seen

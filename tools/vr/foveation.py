@@ -1,11 +1,11 @@
 """What a sharp middle saves: python3 tools/vr/foveation.py --out docs/bench/foveation.csv
 
-Processor time of `Renderer.draw` of both eyes, all threads, in ms: medians of frames drawn in turns,
-so that whatever else the machine does meets all cases alike; as a ratio to all pixels.  dB against
-these, within the level's angle and beyond it (of `scale` within 25 degrees and beyond), over both
-eyes; `equal`: no bit differs.  `near`: the scene fills the picture; `crowded`: a ring of eight copies
-of the bundled scene about the person.  Quads on software GL, which draws whole pictures there, are
-made to draw as on a GPU.
+Processor time of `Renderer.draw` of both eyes, all threads, in ms: medians of frames drawn in
+turns, so that whatever else the machine does meets all cases alike; as a ratio to all pixels.  dB
+against these, within the level's angle and beyond it (of `scale` within 25 degrees and beyond),
+over both eyes; `equal`: no bit differs.  `near`: the scene fills the picture; `crowded`: a ring of
+eight copies of the bundled scene about the person.  Quads on software GL, which draws whole
+pictures there, are made to draw as on a GPU.
 """
 
 import argparse
@@ -123,7 +123,6 @@ def measure(ctx: moderngl.Context | None, name: str, scene: Scene, views: list[V
             parts.append("equal" if same else f"{psnr(*pairs):.2f}")
         row = f"{head},{case},{ms[case]:.2f},{ms[case] / ms['all pixels']:.3f},{','.join(parts)}"
         rows.append(row.replace("'", '"'))
-        print(rows[-1], flush=True)
     return rows
 
 

@@ -27,6 +27,7 @@ from shapeshift.vr.openxr.events import (
     ControllersChanged,
     GoingAway,
     MaskChanged,
+    PassthroughChanged,
     Recentred,
     StateChanged,
     poll_events,
@@ -37,6 +38,7 @@ from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.joints import HandTrackers
 from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
 from shapeshift.vr.openxr.life import BEGIN, END, LOST, Life
+from shapeshift.vr.openxr.passthrough import Passthrough
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import choose_format
 from shapeshift.vr.openxr.visibility import VisibilityMasks
@@ -105,7 +107,8 @@ class Session:
         system = (instance.handle, instance.system, stereo)
         blends = xr.enumerate_environment_blend_modes(*system)
         self._blend, self._alpha = choose_blend(xr, blends), xr.EnvironmentBlendMode.ALPHA_BLEND
-        self.sees_through = int(self._alpha) in map(int, blends)  # the room, where pictures let
+        self._blends_alpha = int(self._alpha) in map(int, blends)
+        self._passthrough = Passthrough(instance, self._handle, not self._blends_alpha)
         views = xr.enumerate_view_configuration_views(*system)
         offered = [int(each) for each in xr.enumerate_swapchain_formats(self._handle)]
         try:
@@ -114,6 +117,11 @@ class Session:
             raise NoHeadset(f"{instance.runtime}: {none}") from None
         sizes = [eye_size(view, part) for view in views]
         return FrameLayers(instance, self._handle, self._ctx, sizes, self.pixels)
+
+    @property
+    def sees_through(self) -> bool:
+        """Whether the room itself can be shown, where pictures let."""
+        return self._blends_alpha or self._passthrough.there
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -155,7 +163,9 @@ class Session:
         made = self.layers.hand_over(
             textures, self._views, self.play.handle, write_depth, quad, through
         )
-        self._end([ctypes.byref(layer) for layer in made], through)
+        below = self._passthrough.layer(through)
+        every = [*([] if below is None else [below]), *made]
+        self._end([ctypes.byref(layer) for layer in every], through)
 
     def hidden_parts(self) -> list[float]:
         """Of each eye's picture the share that its lens does not show, as the runtime tells it."""
@@ -192,6 +202,8 @@ class Session:
                         self.profiles = self.hands.profiles()
                     case MaskChanged():
                         self.masks.ask()
+                    case PassthroughChanged(flags):
+                        self._passthrough.changed(flags)
                     case GoingAway():
                         self.life.lost = True
 
@@ -277,7 +289,7 @@ class Session:
         self._open = None
         self._finish()
         self._drain()
-        blend = self._alpha if see_through else self._blend
+        blend = self._alpha if see_through and self._blends_alpha else self._blend
         info = xr.FrameEndInfo(state.predicted_display_time, blend, layers=layers)
         self.pace.end(time.perf_counter() - self._began)
         with self._instance.asked("take a frame"):
@@ -298,6 +310,7 @@ class Session:
     def close(self) -> None:
         """Gives all back, also what was lost with the runtime."""
         self.layers.close()
+        self._passthrough.close()
         self.bare_hands.close()
         ended = (self.hands.detach, self.hands.close)
         for end in (*ended, lambda: self._xr.destroy_session(self._handle)):

@@ -1,5 +1,6 @@
-"""foveated: a view drawn twice by quads, its middle in all pixels and the rest in a quarter of them,
-from the same records in the same order; the depth test keeps each to its part.
+"""foveated: a view drawn twice by quads, its middle in all pixels, the rest in a quarter of them.
+
+Records and order are the same; the depth test keeps each drawing to its part.
 """
 
 from functools import lru_cache
@@ -96,7 +97,7 @@ def parts_of(
     hidden: HiddenMesh | None,
 ) -> tuple[HiddenMesh, HiddenMesh]:  # fmt: skip
     """What the drawing of the middle leaves out, and that of the rest; and what the lens hides."""
-    left, right, down, up = tangents
+    left, _, _, up = tangents
     centre = np.array(
         [left + fovea.centre[0] * fovea.unit[0], up - fovea.centre[1] * fovea.unit[1]]
     )

@@ -207,8 +207,8 @@ def _pixels(settings: RenderSettings, drawing: str, ui_scale: float) -> RenderSe
     radii += [said("sharp within {degrees:.0f}\u00b0", degrees=r) for r in RADIUS_DEGREES.values()]
     fovea = choice("fovea", settings.foveation, FOVEATIONS, radii)
     tip(
-        "Farther from the middle a quarter of the pixels are drawn. Pays where a scene fills a wide "
-        "view.", ui_scale,
+        "Farther from the middle a quarter of the pixels are drawn. Pays where a scene fills a "
+        "wide view.", ui_scale,
     )  # fmt: skip
     tiles = not drawing.startswith("quads")
     imgui.begin_disabled(tiles)
