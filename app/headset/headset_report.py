@@ -122,6 +122,7 @@ def frame_row(done: DoneFrame) -> dict:
         "area": area_row(frame.area) if frame.area is not None else None,
         "panel": done.panel(),
         "glass": done.state.glass.row(),
+        "shadows": done.state.shadows,
         "layers": done.layers,
         "events": [event for record in done.records for event in record.events],
         "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in done.pulses],

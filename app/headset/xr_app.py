@@ -19,6 +19,7 @@ from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.over.glass_state import GlassState, stop_now
 from shapeshift.app.headset.over.hand_glass import HandGlass
 from shapeshift.app.headset.over.over_splats import OverSplats
+from shapeshift.app.headset.over.table_shadows import TableShadows
 from shapeshift.app.headset.pacing import Pacing, choose_quality
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
@@ -82,6 +83,8 @@ class XrApp:
         self._closing.callback(self.shutter.close)
         self._hand_glass = HandGlass(mirror.ctx, renderer)
         self._closing.callback(self._hand_glass.close)
+        self._shadows = TableShadows(mirror.ctx)
+        self._closing.callback(self._shadows.close)
         self._scene = ExitStack()  # what ends with the scene that is open
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
@@ -89,6 +92,7 @@ class XrApp:
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
+        self._seconds = 0.0  # since that
         self._figured_s = 0.0  # when the panel's figures were made
         self._drawing_ms = 0.0  # of the splats of both eyes, last
         self.interrupted = False  # by Ctrl-C: no frame is left half done
@@ -202,7 +206,7 @@ class XrApp:
 
     def frame(self, frame: Frame) -> None:
         """One frame: the person, the world, the pictures of both eyes."""
-        seconds = self._time_passed(frame)
+        self._seconds = seconds = self._time_passed(frame)
         self.pulses.clear()
         state = self.state
         if state.sees_through and not self.session.sees_through:  # the vendor's cameras failed
@@ -304,6 +308,9 @@ class XrApp:
         glass = self._hand_glass
         looking = glass.look(self.state, views, play_views)
         self.renderer.update(self.state.shown)
+        if through:
+            self._shadows.follow(self.renderer, self.state.shown, self._seconds)
+        self.state.shadows = tuple(c.name for c in self._shadows.casts) if through else ()
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
         looking = glass.draw(looking, self.state)
         taken_ms = (time.perf_counter() - start) * 1e3
@@ -328,6 +335,7 @@ class XrApp:
         renderer.present(framebuffer, i)
         if self.state.through:
             see_through.draw(framebuffer, renderer.coverage(i))
+            self._shadows.draw(framebuffer, self.state.play_space.view(play_view))
         elif self.state.floor_shown:
             grid, behind = Grid(self._level_m, self._clearness), plain_color(self.background)
             where = (play_view, self.state.play_space, renderer.coverage(i))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.support.xr.person import Person
 from tests.support.xr.validation import complaints, switched_on
 
 SUPPORT = Path(__file__).resolve().parents[1] / "support" / "xr"
@@ -79,3 +80,21 @@ def test_the_vendors_room_lies_below_the_pictures(stand, start, case):
     else:
         assert room["calls"] == [*OPENED, *SHOWN, *CLOSED]
         assert drawn[0] == [ROOM, PROJECTION] and drawn[-1] == [PROJECTION]
+
+
+@pytest.mark.slow
+def test_objects_alone_have_shadows_on_ones_own_table(stand, start):
+    """And none where the room is not seen."""
+    settings = {"SHAPESHIFT_TEST_ROOM": str(stand.folder / "room.json")}
+    words = ("--quality", "best", "--no-hints", "--no-depth")
+    program = start(stand, *words, "--passthrough", program=VENDOR, **settings)
+    with program.headset(stand.port) as remote:
+        seen = Person(program, remote).until(lambda line: len(line["shadows"]) == 4, "shadows")
+        program.interrupt()
+    report = json.loads((stand.folder / "report.json").read_text())
+    assert sorted(seen["shadows"]) == ["ball", "cube", "plate", "ring"]
+    assert report["passthrough"] and "Traceback" not in program.told()
+    (stand.folder / "lines.jsonl").unlink()
+    program = start(stand, *words, "--frames", "12", program=VENDOR, **settings)
+    program.end()
+    assert not any(line["shadows"] for line in program.read() or program.lines)
