@@ -324,6 +324,7 @@ def describe(link: "HeadsetLink") -> dict:
         "depth": session.layers.depth,
         "hidden": session.hidden_parts(),
         "passthrough": session.sees_through,
+        "gaze": session.gaze.there,
         **session.pace.report(),
     }
 

@@ -302,6 +302,7 @@ class XrApp:
         self.background = BLACK if through else look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
         fovea = self.state.worn.now.foveation
+        self.session.gaze.wanted = fovea != "off"
         settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0, foveation=fovea)
         self.renderer.settings = replace(settings, background=self.background)
         start = time.perf_counter()

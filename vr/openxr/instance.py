@@ -11,6 +11,7 @@ DRAWING = ("XR_KHR_opengl_enable", "XR_MNDX_egl_enable")  # one of them is neede
 LOCAL_FLOOR, DISPLAY_RATE = "XR_EXT_local_floor", "XR_FB_display_refresh_rate"
 DEPTH_LAYER, HAND_TRACKING = "XR_KHR_composition_layer_depth", "XR_EXT_hand_tracking"
 VISIBILITY_MASK, PASSTHROUGH = "XR_KHR_visibility_mask", "XR_FB_passthrough"
+EYE_GAZE = "XR_EXT_eye_gaze_interaction"
 WANTED = (
     LOCAL_FLOOR,
     DISPLAY_RATE,
@@ -18,6 +19,7 @@ WANTED = (
     HAND_TRACKING,
     VISIBILITY_MASK,
     PASSTHROUGH,
+    EYE_GAZE,
 )  # good to have
 HOW_TO = (
     "start SteamVR, WiVRn or Monado and make it the active OpenXR runtime, "

@@ -32,6 +32,7 @@ from shapeshift.vr.openxr.events import (
     StateChanged,
     poll_events,
 )
+from shapeshift.vr.openxr.gaze import Gaze, tangents_along
 from shapeshift.vr.openxr.graphics import bind_current, check_requirements
 from shapeshift.vr.openxr.hands import Hands, pose_of
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
@@ -75,12 +76,13 @@ class Session:
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
-        self.hands = Hands(instance.handle)
+        self.hands, self.gaze = Hands(instance.handle), Gaze(instance)
         self._handle = self._create()
         self.play = open_play_space(instance, self._handle)
         self._view_space = open_head_space(instance, self._handle)
         self._bounds = Bounds(instance, self._handle)
-        self.hands.attach(self._handle)
+        self.hands.attach(self._handle, self.gaze.sets)
+        self.gaze.open_space(self._handle)
         self._controllers, self.bare_hands = controllers, HandTrackers(instance, self._handle)
         self.pace.display_s = display_period(instance, self._handle)
         self.layers = self._make_layers(part, pixels)
@@ -241,7 +243,8 @@ class Session:
 
     def _read_hands(self, now: int, focused: bool) -> dict[str, Hand]:
         """Controllers, and in the place of one that is not there the bare hand."""
-        hands, bare = self.hands.read(self.play.handle, now, focused), self.bare_hands
+        more = self.gaze.sets if self.gaze.wanted else ()
+        hands, bare = self.hands.read(self.play.handle, now, focused, more), self.bare_hands
         if focused and bare.there:
             for side, hand in hands.items():
                 if not (self._controllers and hand.active):
@@ -266,8 +269,17 @@ class Session:
             for view, old in zip(self._views, self._eyes, strict=True)
         )
         self._eyes = left, right
+        ahead = self.gaze.direction(self.play.handle, now) if self.life.focused else None
         views = [
-            View(pose, tangents_of(view.fov), NEAR_M, FAR_M, size, hidden=self.masks.of(i))
+            View(
+                pose,
+                tangents_of(view.fov),
+                NEAR_M,
+                FAR_M,
+                size,
+                hidden=self.masks.of(i),
+                gaze=tangents_along(ahead, pose),
+            )
             for i, (pose, view, size) in enumerate(
                 zip(self._eyes, self._views, self.sizes, strict=True)
             )
@@ -312,7 +324,7 @@ class Session:
         self.layers.close()
         self._passthrough.close()
         self.bare_hands.close()
-        ended = (self.hands.detach, self.hands.close)
+        ended = (self.gaze.close, self.hands.detach, self.hands.close)
         for end in (*ended, lambda: self._xr.destroy_session(self._handle)):
             try:
                 end()
