@@ -21,7 +21,7 @@ LOWER_M = 0.002  # what sinks so far below its plane has none there any more
 
 
 @dataclass
-class _Standing:
+class Standing:
     """What is known of one object."""
 
     model: object
@@ -46,15 +46,15 @@ class TableShadows:
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
         self._shadows: Shadows | None = None
-        self._standing: dict[str, _Standing] = {}
+        self.standing: dict[str, Standing] = {}
         self._worker: ThreadPoolExecutor | None = None
         self.casts: list[Cast] = []  # of this frame
 
     def follow(self, renderer: Renderer, scene: Scene, seconds: float) -> None:
         """After the renderer has taken the scene over; `seconds` since the frame before."""
         names = {obj.name for obj in scene.objects if obj.seen}
-        self._standing = {n: each for n, each in self._standing.items() if n in names}
-        busy = any(each.work is not None for each in self._standing.values())
+        self.standing = {n: each for n, each in self.standing.items() if n in names}
+        busy = any(each.work is not None for each in self.standing.values())
         self.casts = []
         for i, obj in enumerate(scene.objects):
             if not obj.seen:
@@ -76,17 +76,17 @@ class TableShadows:
             self._shadows = Shadows(self._ctx)
         self._shadows.draw(framebuffer, view, self.casts)
 
-    def _of(self, renderer: Renderer, i: int, obj: SceneObject) -> _Standing:
-        standing = self._standing.get(obj.name)
+    def _of(self, renderer: Renderer, i: int, obj: SceneObject) -> Standing:
+        standing = self.standing.get(obj.name)
         if standing is None or standing.model is not obj.model:
-            standing = self._standing[obj.name] = _Standing(obj.model)
+            standing = self.standing[obj.name] = Standing(obj.model)
         key = (control_key(obj), obj.sections, obj.appearance.opacity)
         if standing.blocks is None or standing.key != key:
             standing.key, standing.blocks = key, blocks_of(*renderer.drawing.read_splats(i))
             standing.made_for, standing.matrix = None, np.zeros((4, 4))
         return standing
 
-    def _move(self, standing: _Standing, matrix: np.ndarray, seconds: float) -> None:
+    def _move(self, standing: Standing, matrix: np.ndarray, seconds: float) -> None:
         """Where it is now, and what it stands on."""
         assert standing.blocks is not None
         moved = not np.allclose(matrix, standing.matrix, atol=1e-4)
@@ -102,7 +102,7 @@ class TableShadows:
         if sinks or standing.still_s >= RESTS_S:
             standing.plane_y = standing.bottom_y
 
-    def _ask(self, standing: _Standing, busy: bool) -> bool:
+    def _ask(self, standing: Standing, busy: bool) -> bool:
         """Has its shadow worked out where it would be another one; whether it does."""
         plane, blocks = standing.plane_y, standing.blocks
         if plane is None or blocks is None or not len(blocks.points):
@@ -117,7 +117,7 @@ class TableShadows:
         standing.work = self._worker.submit(shadow_on, blocks, standing.matrix.copy(), plane)
         return True
 
-    def _collect(self, standing: _Standing) -> None:
+    def _collect(self, standing: Standing) -> None:
         if standing.work is not None and standing.work.done():
             standing.shadow, standing.work = standing.work.result(), None
 

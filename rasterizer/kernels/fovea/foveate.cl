@@ -18,7 +18,7 @@ typedef float4 pair_t;
 // Of samples i of two rows, what lies a quarter of the way from the nearer one to the other.
 #define DOWN(i) (0.75f * near_row[i] + 0.25f * far_row[i])
 
-// Pixels 2 i and 2 i + 1 of samples i from `first` to `last`: each lies a quarter of a sample aside.
+// Pixels 2 i and 2 i + 1 of samples i from `first` to `last`: each lies a quarter aside.
 inline void fill(int first, int last, int width, __global const pixel_t* near_row,
                  __global const pixel_t* far_row, __global pixel_t* row) {
   if (first > last) return;

@@ -32,7 +32,7 @@ def settle(shadows: TableShadows, renderer: Renderer, scene: Scene, seconds: flo
     for _ in range(4 * len(scene.objects) + 2):
         shadows.follow(renderer, scene, seconds)
         until = time.monotonic() + 60
-        while any(s.work is not None and not s.work.done() for s in shadows._standing.values()):
+        while any(s.work is not None and not s.work.done() for s in shadows.standing.values()):
             assert time.monotonic() < until
             time.sleep(0.002)
     shadows.follow(renderer, scene, 0.0)
@@ -48,7 +48,7 @@ def test_each_object_has_one_where_it_ends_below(renderer, ctx):
     planes = heights(shadows)
     assert planes.keys() == {"ball 0", "ball 1"}
     bottom = planes["ball 0"]
-    points = shadows._standing["ball 0"].blocks.points
+    points = shadows.standing["ball 0"].blocks.points
     assert np.quantile(points[:, 1], 0.05) > bottom >= points[:, 1].min()
     assert planes["ball 1"] == pytest.approx(bottom + 2.0, abs=1e-6)
     assert [tuple(cast.place[[0, 2]]) for cast in shadows.casts] == [(0.0, 0.0), (3.0, 0.0)]

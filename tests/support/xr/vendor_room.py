@@ -68,10 +68,10 @@ class VendorRoom:
             return ctypes.cast(self.address(str(name)), xr.PFN_xrVoidFunction)
 
         def end(session, info):
-            kinds = [int(info._layers[i].contents._type) for i in range(info.layer_count)]
-            self.frames.append({"kinds": kinds, "blend": int(info._environment_blend_mode)})
+            kinds = [int(layer.contents.type) for layer in info.layers]
+            self.frames.append({"kinds": kinds, "blend": int(info.environment_blend_mode)})
             vendors = int(xr.StructureType.COMPOSITION_LAYER_PASSTHROUGH_FB)
-            own = [info._layers[i] for i, kind in enumerate(kinds) if kind != vendors]
+            own = [info.layers[i] for i, kind in enumerate(kinds) if kind != vendors]
             rest = xr.FrameEndInfo(info.display_time, info.environment_blend_mode, layers=own)
             return end_frame(session, rest)
 
