@@ -1,7 +1,7 @@
 // foveate: a picture that is sharp within a circle, and of a quarter of the pixels beyond.
 // Needs:   HEAT (1: a second image beside it).
-// Reads:   sharp; halved, of half the width and height (rounded up), linear; with HEAT both of these
-//          of the heat; the circles.
+// Reads:   sharp; halved, of half the width and height (rounded up), linear; with HEAT both
+//          of the heat, too; the circles.
 // Writes:  color, to the bit that of `sharp` within the inner circle; with HEAT heat.
 // Units:   pixels from lower left; radii in tangents.
 uniform sampler2D sharp, halved;
