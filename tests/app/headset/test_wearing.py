@@ -253,7 +253,6 @@ def test_over_the_room_there_is_no_floor_and_no_background(scene):
 
 def test_the_gaze_is_asked_for_while_only_its_surroundings_are_sharp(scene):
     played = Played([])
-    document, _ = scene
     parts = (played, played, played, played, *scene, Pacing(DARK, "best"), Report())
     xr_app = XrApp(*parts, worn=KeptSettings(foveation="high"))
     xr_app.frame(frame_at(0.0))
