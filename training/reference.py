@@ -8,7 +8,13 @@ from shapeshift.runtime_models.model import HEADS
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
-from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, HeadLayout
+from shapeshift.training.heads.networks import (
+    ATTRIBUTE_WIDTH,
+    LOBE_AXES,
+    LOBE_EDGE,
+    LOBE_SLOPE,
+    HeadLayout,
+)
 from shapeshift.training.losses.min_opacity import MIN_OPACITY
 
 
@@ -45,14 +51,18 @@ def heads_reference(
 def activate_reference(
     raw: dict[str, np.ndarray], anchors: np.ndarray, voxel: float,
     frames: np.ndarray | None = None, colors: np.ndarray | None = None,
+    lobes: np.ndarray | None = None, direction: np.ndarray | None = None,
 ) -> tuple:  # fmt: skip
     """(means, scales, wxyz, opacity, color) of raw outputs (A, out) by head.
 
-    frames (A, 7) and base colours (A, 3), where anchors have such: see gaussians.cl.
+    frames (A, 7), base colours (A, 3) and lobes (A, 8), which show in some of the directions
+    (A, 3) from the eye, where anchors have such: see gaussians.cl.
     """
     count, k = raw["opacity"].shape
     frames = np.tile([0.0, 0, 0, 1, 0, 0, 0], (count, 1)) if frames is None else frames
     colors = np.zeros((count, 3)) if colors is None else colors
+    if lobes is not None and direction is not None:
+        colors = colors + lobe_light(lobes, direction)[:, None]
     frames, base = np.repeat(frames, k, axis=0), np.repeat(colors, k, axis=0)
     size, turn = np.exp(frames[:, :3]), normalize(frames[:, 3:])
     offset = size * REACH * voxel * np.tanh(raw["offset"].reshape(-1, 3))
@@ -65,6 +75,16 @@ def activate_reference(
     )
 
 
+def lobe_light(lobes: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(A,) logits that lobes (A, 8) add where one looks along directions (A, 3).
+
+    Between nothing and all of it, a lobe is as far open as its side of the edge says.
+    """
+    inside = LOBE_SLOPE * (direction @ LOBE_AXES.T - LOBE_EDGE)  # (A, 8)
+    least, most = np.minimum(lobes, 0), np.maximum(lobes, 0)
+    return np.clip(np.where(lobes > 0, lobes + inside, -inside), least, most).sum(axis=1)
+
+
 def decode_reference(
     layout: HeadLayout, parameters: dict[str, np.ndarray], control, eye, voxel: float
 ) -> tuple:
@@ -75,7 +95,8 @@ def decode_reference(
     heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
     own = (parameters.get(name) for name in ATTRIBUTE_WIDTH)
     own = (None if rows is None else np.asarray(rows, np.float64) for rows in own)
-    return activate_reference({n: raw for n, (_, raw) in heads.items()}, anchors, voxel, *own)
+    raw = {name: outputs for name, (_, outputs) in heads.items()}
+    return activate_reference(raw, anchors, voxel, *own, directions(anchors, eye))
 
 
 def image_loss_reference(image, photo, share: float, weight=None) -> float:

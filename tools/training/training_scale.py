@@ -24,7 +24,12 @@ sys.path.insert(0, str(ROOT))
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.scene.pose import View, look_at, perspective  # noqa: E402
 from shapeshift.training.density.densification_stats import DensificationStats  # noqa: E402
-from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded  # noqa: E402
+from shapeshift.training.heads.networks import (  # noqa: E402
+    ATTRIBUTE_WIDTH,
+    HeadLayout,
+    initial_weights,
+    padded,
+)
 from shapeshift.training.heads.optimizer import Adam  # noqa: E402
 from shapeshift.training.losses.losses import ImageLoss  # noqa: E402
 from shapeshift.training.memory import step_memory  # noqa: E402
@@ -67,6 +72,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
         "features": features.astype(np.float32),
         "frames": np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (anchors, 1)),
         "colors": np.zeros((anchors, 3), np.float32),
+        "lobes": np.zeros((anchors, ATTRIBUTE_WIDTH["lobes"]), np.float32),
     }
     adam = Adam(device, values, {name: np.full(1, 1e-3, np.float32) for name in values})
     voxel = 2 * RADIUS * np.sqrt(np.pi / anchors)  # the mean distance of neighbours

@@ -1,7 +1,7 @@
 """The five heads on the device: packing of their weights, forward and backward (eq. 4, 5)."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +14,14 @@ CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients 
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
 RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
 # What anchors may have besides their features, and the optimiser's group of it.
-ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors"}
-ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3}  # numbers an anchor, see gaussians.cl
+ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors", "lobe": "lobes"}
+# Lobes lie about the corners of a cube: with 66 degrees between a lobe's middle and where it begins,
+# neighbours meet and every direction is in one or more.
+LOBE_AXES = np.array(list(product((-1, 1), repeat=3))) / np.sqrt(3)  # (8, 3)
+LOBE_SLOPE, LOBE_EDGE = 4.0, 0.4  # the same numbers stand in gaussians.cl
+ATTRIBUTE_WIDTH = {  # numbers an anchor, see gaussians.cl
+    "frames": 7, "colors": 3, "lobes": len(LOBE_AXES),
+}  # fmt: skip
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
 
@@ -52,7 +58,8 @@ class HeadLayout:
     @property
     def per_anchor(self) -> tuple[str, ...]:
         """The optimiser's groups that have a row for each anchor."""
-        return ("anchors", "features", *(ANCHOR_ATTRIBUTES[name] for name in self.attributes))
+        own = (name for name in self.attributes if name != "lobe" or self.view_dependent)
+        return ("anchors", "features", *(ANCHOR_ATTRIBUTES[name] for name in own))
 
     def parts_of(self, name: str) -> tuple[str, ...]:
         """What a head's network takes, in the order of the exported one (eq. 5)."""
@@ -92,6 +99,7 @@ class HeadLayout:
             "CONDITIONED": sum(1 << m for m, name in enumerate(HEADS) if name not in self.fixed),
             "FRAMES": "frame" in self.attributes,
             "BASE_COLORS": "color" in self.attributes,
+            "LOBES": "lobes" in self.per_anchor,
         }  # fmt: skip
         for m, out in enumerate(self.outs):
             numbers |= {

@@ -1,17 +1,23 @@
 // Raw outputs of the heads -> Gaussians, forward and backward: the activations of each head.
 //
 // Defined by networks.py: SPLATS (k an anchor), RAW and OUT_AT0..4 in the order of the heads
-// offset, scale, rotation, opacity, colour; FRAMES and BASE_COLORS (1: anchors have such).
+// offset, scale, rotation, opacity, colour; FRAMES, BASE_COLORS and LOBES (1: anchors have such).
 // offset = reach * tanh(h) metres     (bounded: culling boxes can rely on it)
 // scale  = unit * exp(clip(h, -6, 3)) metres, one sigma
-// opacity = tanh(h), below zero absent; colour = sigmoid(h + c) with the anchor's base colour c, a
-// logit; rotation is left as it comes, wxyz.
+// opacity = tanh(h), below zero absent; colour = sigmoid(h + c + l) with the anchor's base colour c
+// and what its lobes l add, logits; rotation is left as it comes, wxyz.
 // A frame (A, 7) is an anchor's own sizes, as logarithms s, and axes, as a quaternion q of any
 // length: mean = anchor + R(q) (exp(s) * offset), scale = exp(s) * scale, rotation = q times it.
-// Reads:   raw (A, RAW), anchors (A, 3), frames, base colours; backward the Gaussians' gradients.
+// Lobes (A, 8) make an anchor lighter or darker in some directions, one about each corner u of a cube:
+//   l = sum of relu(lobe + z) - relu(z), z = 4 (u . d - 0.4), d from the eye to the anchor,
+// nothing where z is well below 0 and all of the lobe where it is well above.  Written so, since a
+// network of ReLUs holds it exactly: packages need no form for it (export.py).
+// Reads:   raw (A, RAW), anchors (A, 3), frames, base colours, lobes, the eye; backward the
+//          Gaussians' gradients.
 // Writes:  means, scales, wxyz, opacity, color; backward grad_raw and gradients of what it read.
 // Units:   metres; one sigma; opacity and display sRGB in 0..1.
 
+#include "direction.cl"
 #define LOWEST -6.0f
 #define HIGHEST 3.0f
 #define FRAME 7
@@ -53,11 +59,35 @@ inline float3 base_color(int a, __global const float *colors) {
 #endif
 }
 
-__kernel void activate(int splats, float reach, float unit, __global const float *raw,
-                       __global const float *anchors, __global const float *frames,
-                       __global const float *colors, __global float *means,
-                       __global float *scales, __global float *wxyz, __global float *opacity,
-                       __global float *color) {
+#define CORNERS 8
+#define LOBE_SLOPE 4.0f  // the same numbers stand in networks.py
+#define LOBE_EDGE 0.4f
+
+inline float3 corner(int m) {
+  return 0.57735027f * (float3)(m & 4 ? 1.0f : -1.0f, m & 2 ? 1.0f : -1.0f, m & 1 ? 1.0f : -1.0f);
+}
+
+inline float lobe_side(int m, float3 d) { return LOBE_SLOPE * (dot(corner(m), d) - LOBE_EDGE); }
+
+// What an anchor adds to the logits of all its splats.
+inline float3 own_color(int a, float3 eye, __global const float *anchors,
+                        __global const float *colors, __global const float *lobes) {
+  float3 sum = base_color(a, colors);
+#if LOBES
+  float3 d = direction_and_inverse(eye, anchors + 3 * a).xyz;
+  for (int m = 0; m < CORNERS; m++) {
+    float z = lobe_side(m, d);
+    sum += fmax(lobes[CORNERS * a + m] + z, 0.0f) - fmax(z, 0.0f);
+  }
+#endif
+  return sum;
+}
+
+__kernel void activate(int splats, float reach, float unit, float eye_x, float eye_y, float eye_z,
+                       __global const float *raw, __global const float *anchors,
+                       __global const float *frames, __global const float *colors,
+                       __global const float *lobes, __global float *means, __global float *scales,
+                       __global float *wxyz, __global float *opacity, __global float *color) {
   int i = get_global_id(0);
   if (!(i < splats)) return;
   int a = i / SPLATS, k = i % SPLATS;
@@ -67,17 +97,19 @@ __kernel void activate(int splats, float reach, float unit, __global const float
   vstore3(vload3(a, anchors) + turned(f.turn, f.size * offset), i, means);
   vstore3(f.size * unit * exp(clamp(vload3(k, h + OUT_AT1), LOWEST, HIGHEST)), i, scales);
   vstore4(product(f.turn, vload4(k, h + OUT_AT2)), i, wxyz);
-  vstore3(1.0f / (1.0f + exp(-(vload3(k, h + OUT_AT4) + base_color(a, colors)))), i, color);
+  float3 own = own_color(a, (float3)(eye_x, eye_y, eye_z), anchors, colors, lobes);
+  vstore3(1.0f / (1.0f + exp(-(vload3(k, h + OUT_AT4) + own))), i, color);
   opacity[i] = tanh(h[OUT_AT3 + k]);
 }
 
 #define PADDED(n) (((n) + 7) / 8 * 8)
 
 // The same for a CPU, one work-item an anchor: its row of raw outputs in vectors of eight.
-__kernel void activate_rows(int anchors_count, float reach, float unit, __global const float *raw,
+__kernel void activate_rows(int anchors_count, float reach, float unit, float eye_x, float eye_y,
+                            float eye_z, __global const float *raw,
                             __global const float *anchors, __global const float *frames,
-                            __global const float *colors, __global float *means,
-                            __global float *scales, __global float *wxyz,
+                            __global const float *colors, __global const float *lobes,
+                            __global float *means, __global float *scales, __global float *wxyz,
                             __global float *opacity, __global float *color) {
   int a = get_global_id(0);
   if (!(a < anchors_count)) return;
@@ -87,7 +119,8 @@ __kernel void activate_rows(int anchors_count, float reach, float unit, __global
   float offset[PADDED(3 * SPLATS)], scale[PADDED(3 * SPLATS)], shade[PADDED(3 * SPLATS)];
   float solid[PADDED(SPLATS)], base[PADDED(3 * SPLATS)];
   for (int c = 0; c < PADDED(3 * SPLATS) / 8; c++) vstore8(0.0f, c, base);
-  for (int k = 0; k < SPLATS * BASE_COLORS; k++) vstore3(base_color(a, colors), k, base);
+  float3 own = own_color(a, (float3)(eye_x, eye_y, eye_z), anchors, colors, lobes);
+  for (int k = 0; k < SPLATS * (BASE_COLORS || LOBES); k++) vstore3(own, k, base);
   for (int c = 0; c < PADDED(3 * SPLATS) / 8; c++) {
     vstore8(reach * tanh(vload8(c, h + OUT_AT0)), c, offset);
     vstore8(unit * exp(clamp(vload8(c, h + OUT_AT1), LOWEST, HIGHEST)), c, scale);
@@ -114,16 +147,18 @@ inline float4 turned_backward(float4 q, float3 v, float3 grad) {
 
 // One work-item an anchor: its splats' gradients become the row of raw gradients, and those of the
 // means also add up to the anchor's own.
-__kernel void activate_backward(int anchors_count, float reach, float unit,
-                                __global const float *raw, __global const float *frames,
-                                __global const float *scales, __global const float *opacity,
-                                __global const float *color, __global const float *grad_means,
+__kernel void activate_backward(int anchors_count, float reach, float unit, float eye_x,
+                                float eye_y, float eye_z, __global const float *raw,
+                                __global const float *anchors, __global const float *frames,
+                                __global const float *lobes, __global const float *scales, 
+                                __global const float *opacity, __global const float *color,
+                                __global const float *grad_means,
                                 __global const float *grad_scales,
                                 __global const float *grad_wxyz,
                                 __global const float *grad_opacity,
                                 __global const float *grad_color, __global float *grad_raw,
                                 __global float *grad_anchors, __global float *grad_frames,
-                                __global float *grad_colors) {
+                                __global float *grad_colors, __global float *grad_lobes) {
   int a = get_global_id(0);
   if (!(a < anchors_count)) return;
   __global const float *h = raw + a * RAW;
@@ -153,6 +188,19 @@ __kernel void activate_backward(int anchors_count, float reach, float unit,
     by_turn += turned_backward(f.turn, offset, grad);
     by_turn += product(by_wxyz, inverse(vload4(k, h + OUT_AT2)));
   }
+#if LOBES
+  float4 look = direction_and_inverse((float3)(eye_x, eye_y, eye_z), anchors + 3 * a);
+  float3 by_look = 0;
+  float by_light = by_color.x + by_color.y + by_color.z;
+  for (int m = 0; m < CORNERS; m++) {
+    float z = lobe_side(m, look.xyz);
+    float open = lobes[CORNERS * a + m] + z > 0.0f ? by_light : 0.0f;
+    grad_lobes[CORNERS * a + m] = open;
+    by_look += LOBE_SLOPE * corner(m) * (open - (z > 0.0f ? by_light : 0.0f));
+  }
+  // Through the division by the distance: what points along the direction does nothing.
+  by_anchor += (by_look - look.xyz * dot(by_look, look.xyz)) * look.w;
+#endif
   vstore3(by_anchor, a, grad_anchors);
 #if FRAMES
   vstore3(by_size, 0, grad_frames + FRAME * a);

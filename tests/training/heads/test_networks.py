@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
 from shapeshift.runtime_models.package.read_package import read_files
@@ -193,9 +194,9 @@ def test_an_eye_at_an_anchor_is_finite(device, form):
 def activated(layout, raw, rows):
     """Splats of raw outputs (A, RAW) in float64, fields in the order of Gaussians."""
     raw = raw.astype(np.float64)
-    anchors, frames, colors = (rows[n].astype(np.float64) for n in ("anchors", "frames", "colors"))
+    anchors, *own = (rows[n].astype(np.float64) for n in ("anchors", *ATTRIBUTE_WIDTH))
     by_head = {n: raw_of(raw, layout, n) for n in HEADS}
-    return activate_reference(by_head, anchors, VOXEL, frames, colors)
+    return activate_reference(by_head, anchors, VOXEL, *own, directions(anchors, EYE))
 
 
 @pytest.mark.parametrize("spread", [0.5, 20.0])  # 20: every activation saturates somewhere
@@ -205,10 +206,10 @@ def test_activations_and_their_gradient(device, spread):
     anchors = rng.normal(size=(21, 3)).astype(np.float32)
     raw = (spread * rng.normal(size=(21, layout.raw_at[-1]))).astype(np.float32)
     activation = Activation(device, layout, VOXEL)
-    own = {"frames": rng.normal(0, 0.7, (21, 7)), "colors": rng.normal(size=(21, 3))}
+    own = {n: rng.normal(0, 0.7, (21, width)) for n, width in ATTRIBUTE_WIDTH.items()}
     rows = {"anchors": anchors} | {n: a.astype(np.float32) for n, a in own.items()}
     there = {name: device.upload(array) for name, array in rows.items()}
-    splats = activation.forward(device.upload(raw), there)
+    splats = activation.forward(device.upload(raw), there, EYE)
     wanted = activated(layout, raw, rows)
     for got, want in zip(splats.fields(), wanted, strict=True):
         assert relative(device.download(got), want) < 1e-6
@@ -237,8 +238,14 @@ def test_activations_and_their_gradient(device, spread):
             assert abs(found[row, column] - numeric) < 2e-6 * max(abs(numeric), 1)
     unused = np.setdiff1d(np.arange(layout.raw_at[-1]), real)
     assert not found[:, unused].any()
-    summed = grads[0].reshape(21, 3, 3).sum(1)
-    np.testing.assert_allclose(device.download(by_group["anchors"]), summed, atol=2e-6)
+    for name in ("anchors", "lobes"):  # which lobes show depends on where an anchor stands
+
+        def scalar_of(values, name=name):
+            splats = activated(layout, raw, rows | {name: values})
+            return sum((a * g).sum() for a, g in zip(splats, grads, strict=True))
+
+        numeric = finite_differences(scalar_of, rows[name].astype(np.float64))
+        np.testing.assert_allclose(device.download(by_group[name]), numeric, atol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -296,7 +303,7 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     for x in (0.0, 0.3, 1.0):
         psi = psi_of(read, x).astype(np.float32)
         raw = heads.forward(*on_device, psi, EYE)
-        ours = activation.forward(raw, there)
+        ours = activation.forward(raw, there, EYE)
         theirs = evaluate(read, x, EYE)
         for name in ("means", "scales", "opacity", "color"):
             mine = device.download(getattr(ours, name))
