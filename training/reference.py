@@ -4,17 +4,12 @@ import numpy as np
 
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.reference import render_reference
+from shapeshift.runtime_models.colors.spherical_harmonics import C1, basis
 from shapeshift.runtime_models.model import HEADS
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
-from shapeshift.training.heads.networks import (
-    ATTRIBUTE_WIDTH,
-    LOBE_AXES,
-    LOBE_EDGE,
-    LOBE_SLOPE,
-    HeadLayout,
-)
+from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, HeadLayout
 from shapeshift.training.losses.min_opacity import MIN_OPACITY
 
 
@@ -51,18 +46,18 @@ def heads_reference(
 def activate_reference(
     raw: dict[str, np.ndarray], anchors: np.ndarray, voxel: float,
     frames: np.ndarray | None = None, colors: np.ndarray | None = None,
-    lobes: np.ndarray | None = None, direction: np.ndarray | None = None,
+    light: np.ndarray | None = None, direction: np.ndarray | None = None,
 ) -> tuple:  # fmt: skip
     """(means, scales, wxyz, opacity, color) of raw outputs (A, out) by head.
 
-    frames (A, 7), base colours (A, 3) and lobes (A, 8), which show in some of the directions
-    (A, 3) from the eye, where anchors have such: see gaussians.cl.
+    frames (A, 7), base colours (A, 3) and light (A, 8), by directions (A, 3) from the eye, where
+    anchors have such: see gaussians.cl.
     """
     count, k = raw["opacity"].shape
     frames = np.tile([0.0, 0, 0, 1, 0, 0, 0], (count, 1)) if frames is None else frames
     colors = np.zeros((count, 3)) if colors is None else colors
-    if lobes is not None and direction is not None:
-        colors = colors + lobe_light(lobes, direction)[:, None]
+    if light is not None and direction is not None:
+        colors = colors + light_of(light, direction)[:, None]
     frames, base = np.repeat(frames, k, axis=0), np.repeat(colors, k, axis=0)
     size, turn = np.exp(frames[:, :3]), normalize(frames[:, 3:])
     offset = size * REACH * voxel * np.tanh(raw["offset"].reshape(-1, 3))
@@ -75,14 +70,10 @@ def activate_reference(
     )
 
 
-def lobe_light(lobes: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(A,) logits that lobes (A, 8) add where one looks along directions (A, 3).
-
-    Between nothing and all of it, a lobe is as far open as its side of the edge says.
-    """
-    inside = LOBE_SLOPE * (direction @ LOBE_AXES.T - LOBE_EDGE)  # (A, 8)
-    least, most = np.minimum(lobes, 0), np.maximum(lobes, 0)
-    return np.clip(np.where(lobes > 0, lobes + inside, -inside), least, most).sum(axis=1)
+def light_of(light: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(A,) logits that coefficients (A, 8) add along directions (A, 3), by the table of 3DGS."""
+    there = basis(direction, 9)[:, [3, 1, 2, 4, 5, 7, 6, 8]] * [-1, -1, 1, 1, -1, -1, 1, 1] / C1
+    return (light * there).sum(axis=1)
 
 
 def decode_reference(

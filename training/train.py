@@ -65,7 +65,7 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
         "features": np.array([rates.feature], np.float32),
         "frames": np.array([rates.frame], np.float32),
         "colors": np.array([rates.color], np.float32),
-        "lobes": np.array([rates.color], np.float32),
+        "light": np.array([rates.color], np.float32),
     }
 
 

@@ -31,9 +31,9 @@ from shapeshift.training.train import Trainer  # noqa: E402
 WAYS = {
     "default": {},
     "no growth": {"grow": False},
-    "no frames": {"anchor_attributes": "color,lobe"},
-    "no base colours": {"anchor_attributes": "frame,lobe"},
-    "no lobes": {"anchor_attributes": "frame,color"},
+    "no frames": {"anchor_attributes": "color,light"},
+    "no base colours": {"anchor_attributes": "frame,light"},
+    "no light": {"anchor_attributes": "frame,color"},
     "features alone": {"anchor_attributes": ""},
 }
 LOOKS = (0.25, 0.5, 0.75, 1.0)  # shares of the run

@@ -72,7 +72,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
         "features": features.astype(np.float32),
         "frames": np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (anchors, 1)),
         "colors": np.zeros((anchors, 3), np.float32),
-        "lobes": np.zeros((anchors, ATTRIBUTE_WIDTH["lobes"]), np.float32),
+        "light": np.zeros((anchors, ATTRIBUTE_WIDTH["light"]), np.float32),
     }
     adam = Adam(device, values, {name: np.full(1, 1e-3, np.float32) for name in values})
     voxel = 2 * RADIUS * np.sqrt(np.pi / anchors)  # the mean distance of neighbours

@@ -31,7 +31,7 @@ class FirstAnchors(NamedTuple):
     anchors: np.ndarray  # (A, 3) metres
     frames: np.ndarray  # (A, 7) logarithms of sizes in voxels, then wxyz: see gaussians.cl
     colors: np.ndarray  # (A, 3) logits
-    lobes: np.ndarray  # (A, 8) logits, none yet: colours are alike from everywhere
+    light: np.ndarray  # (A, 8) logits, none yet: colours are alike from everywhere
     voxel: float  # metres: the median size
 
 
@@ -51,8 +51,8 @@ def first_anchors(
     seen = np.clip(photo_colors(places, photos, background or BLACK), DARKEST, BRIGHTEST)
     colors = np.log(seen / (1 - seen))
     at, axes, logits = (a.astype(np.float32) for a in (places, frames, colors))
-    lobes = np.zeros((len(at), ATTRIBUTE_WIDTH["lobes"]), np.float32)
-    return FirstAnchors(at, axes, logits, lobes, voxel)
+    light = np.zeros((len(at), ATTRIBUTE_WIDTH["light"]), np.float32)
+    return FirstAnchors(at, axes, logits, light, voxel)
 
 
 def choose_positions(first: InitialPoints, most: int) -> np.ndarray:

@@ -53,7 +53,7 @@ class Activation:
         }
 
     def attributes_of(self, rows: dict[str, Any]) -> tuple:
-        """Frames, base colours and lobes of a step's anchors, or what stands in their place."""
+        """Frames, base colours and light of a step's anchors, or what stands in their place."""
         return tuple(rows.get(name, self.nothing) for name in ATTRIBUTE_WIDTH)
 
     def forward(self, raw, rows: dict[str, Any], eye: np.ndarray) -> Gaussians:
@@ -74,10 +74,10 @@ class Activation:
 
     def backward(self, raw, rows: dict[str, Any], grad: Gaussians) -> tuple:
         """(grad_raw (A, RAW), by group those of `rows` but the features) of the last `forward`."""
-        splats, (frames, _, lobes) = self.splats, self.attributes_of(rows)
+        splats, (frames, _, light) = self.splats, self.attributes_of(rows)
         self.device.launch(
             self.kernels["activate_backward"], self.count, 16,
-            self.count, self.reach, self.unit, *self.eye, raw, rows["anchors"], frames, lobes,
+            self.count, self.reach, self.unit, *self.eye, raw, rows["anchors"], frames, light,
             splats.scales, splats.opacity, splats.color, *grad.fields(), self.grad_raw,
             self.grad_anchors, *self.attributes_of(self.grad_attributes),
         )  # fmt: skip

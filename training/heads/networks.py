@@ -1,7 +1,7 @@
 """The five heads on the device: packing of their weights, forward and backward (eq. 4, 5)."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +14,8 @@ CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients 
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
 RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
 # What anchors may have besides their features, and the optimiser's group of it.
-ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors", "lobe": "lobes"}
-# Lobes lie about the corners of a cube: with 66 degrees between a lobe's middle and where it begins,
-# neighbours meet and every direction is in one or more.
-LOBE_AXES = np.array(list(product((-1, 1), repeat=3))) / np.sqrt(3)  # (8, 3)
-LOBE_SLOPE, LOBE_EDGE = 4.0, 0.4  # the same numbers stand in gaussians.cl
-ATTRIBUTE_WIDTH = {  # numbers an anchor, see gaussians.cl
-    "frames": 7, "colors": 3, "lobes": len(LOBE_AXES),
-}  # fmt: skip
+ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors", "light": "light"}
+ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3, "light": 8}  # numbers an anchor, see gaussians.cl
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
 
@@ -58,7 +52,7 @@ class HeadLayout:
     @property
     def per_anchor(self) -> tuple[str, ...]:
         """The optimiser's groups that have a row for each anchor."""
-        own = (name for name in self.attributes if name != "lobe" or self.view_dependent)
+        own = (name for name in self.attributes if name != "light" or self.view_dependent)
         return ("anchors", "features", *(ANCHOR_ATTRIBUTES[name] for name in own))
 
     def parts_of(self, name: str) -> tuple[str, ...]:
@@ -99,7 +93,7 @@ class HeadLayout:
             "CONDITIONED": sum(1 << m for m, name in enumerate(HEADS) if name not in self.fixed),
             "FRAMES": "frame" in self.attributes,
             "BASE_COLORS": "color" in self.attributes,
-            "LOBES": "lobes" in self.per_anchor,
+            "LIGHT": "light" in self.per_anchor,
         }  # fmt: skip
         for m, out in enumerate(self.outs):
             numbers |= {

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 BETA1, BETA2 = 0.9, 0.999  # the same numbers stand in adam.cl
-# Towards 0, of a group: each step takes so much of a value, times the rate, from it.  Of lobes that
+# Towards 0, of a group: each step takes so much of a value, times the rate, from it.  Of light that
 # leaves what the photos agree on: their gradients mostly point one way, those of chance do not.
-PULL = {"lobes": np.float32(0.5)}
+PULL = {"light": np.float32(0.5)}
 
 
 @dataclass

@@ -18,9 +18,9 @@ OTHERS = {
     "shape fixed": replace(LAYOUT, fixed=("offset", "scale", "rotation")),
     "colour alike from everywhere": replace(LAYOUT, view_dependent=False),
     "all at once": replace(LAYOUT, fixed=("opacity", "color"), view_dependent=False),
-    "no frames": replace(LAYOUT, attributes=("color", "lobe")),
-    "no base colours": replace(LAYOUT, attributes=("frame", "lobe")),
-    "no lobes": replace(LAYOUT, attributes=("frame", "color")),
+    "no frames": replace(LAYOUT, attributes=("color", "light")),
+    "no base colours": replace(LAYOUT, attributes=("frame", "light")),
+    "no light": replace(LAYOUT, attributes=("frame", "color")),
 }
 VOXEL = 0.5
 SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
@@ -38,7 +38,7 @@ def situation(seed: int, layout: HeadLayout = LAYOUT):
     }
     own = {
         "frames": rng.normal(0, 0.5, (5, 7)), "colors": rng.normal(size=(5, 3)),
-        "lobes": rng.normal(0, 0.5, (5, 8)),
+        "light": rng.normal(0, 0.5, (5, 8)),
     }  # fmt: skip
     parameters |= {n: own[n].astype(np.float32) for n in layout.per_anchor[2:]}
     control = rng.random(4).astype(np.float32)

@@ -107,10 +107,10 @@ def test_settings_without_each_part():
     assert found["half of the features"].features == 8
     assert found["one splat of every anchor"].splats_per_anchor == 4
     assert found["a third of the anchors"].max_anchors == 8000
-    assert found["anchors' own axes and sizes"].anchor_attributes == "color,lobe"
-    assert found["anchors' own base colours"].anchor_attributes == "frame,lobe"
+    assert found["anchors' own axes and sizes"].anchor_attributes == "color,light"
+    assert found["anchors' own base colours"].anchor_attributes == "frame,light"
     assert found["anchors' own light by direction"].anchor_attributes == "frame,color"
-    # Where colours do not see the direction there are no lobes, so nothing to take away.
+    # Where colours do not see the direction there are no light, so nothing to take away.
     blind = TrainSettings(view_dependent=False)
     assert BY_NAME["anchors' own light by direction"].without(blind, STOPS) is None
 

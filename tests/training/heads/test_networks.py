@@ -238,7 +238,7 @@ def test_activations_and_their_gradient(device, spread):
             assert abs(found[row, column] - numeric) < 2e-6 * max(abs(numeric), 1)
     unused = np.setdiff1d(np.arange(layout.raw_at[-1]), real)
     assert not found[:, unused].any()
-    for name in ("anchors", "lobes"):  # which lobes show depends on where an anchor stands
+    for name in ("anchors", "light"):  # which light show depends on where an anchor stands
 
         def scalar_of(values, name=name):
             splats = activated(layout, raw, rows | {name: values})
