@@ -30,6 +30,7 @@ _NAMES_OF = {
     "api.inspect": ("change",),
     "api.learn": ("TrainedScene", "evaluate", "poses", "train"),
     "api.measure": ("bench", "chart", "compare"),
+    "api.update": ("update",),
     "api.play": ("Step", "cameras", "simulate"),
     "app.change.find_change": ("SceneChange",),
     "app.paths": ("DEMO", "TOUCH"),

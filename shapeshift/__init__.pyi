@@ -14,6 +14,7 @@ from shapeshift.api.play import cameras as cameras
 from shapeshift.api.play import simulate as simulate
 from shapeshift.api.render import Renderer as Renderer
 from shapeshift.api.scene import Scene as Scene
+from shapeshift.api.update import update as update
 from shapeshift.api.write import Exported as Exported
 from shapeshift.api.write import export as export
 from shapeshift.app.change.find_change import SceneChange as SceneChange
