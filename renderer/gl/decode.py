@@ -37,7 +37,7 @@ class Decoder:
         for model in models:
             if id(model) in made:
                 continue
-            if isinstance(model, SplatLayers):
+            if isinstance(model, SplatLayers) and model.motion is None:
                 made[id(model)] = Layers(gpu, model)
             elif mlps == "gl" and isinstance(model, AnchorModel):
                 made[id(model)] = GlNetworks(gpu, model)

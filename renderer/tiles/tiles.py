@@ -138,7 +138,9 @@ class TilesDrawing(Drawing):
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
             return
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
-        slot.placed = slot.sh is not None
+        slot.placed = (
+            isinstance(model := slot.evaluator.model, SplatLayers) and model.motion is None
+        )
 
     def color_set(self, which: int, count: int) -> None:
         self._colors = self._colors[:count]
