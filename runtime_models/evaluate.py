@@ -35,6 +35,11 @@ def shape_follows_control(model: Model) -> bool:
     return isinstance(model, SplatLayers)
 
 
+def only_fades(model: Model) -> bool:
+    """Whether x changes nothing of its splats but their opacity: layers that do not move."""
+    return isinstance(model, SplatLayers) and model.motion is None
+
+
 def colors_follow_control(model: Model) -> bool:
     """Whether the colour of a splat depends on x."""
     return isinstance(model, AnchorModel) and "control" in model.networks["color"].inputs

@@ -3,6 +3,7 @@ from shapeshift.api.learn import TrainedScene as TrainedScene
 from shapeshift.api.learn import evaluate as evaluate
 from shapeshift.api.learn import poses as poses
 from shapeshift.api.learn import train as train
+from shapeshift.api.learn import update as update
 from shapeshift.api.load import info as info
 from shapeshift.api.load import load as load
 from shapeshift.api.measure import bench as bench
@@ -14,7 +15,6 @@ from shapeshift.api.play import cameras as cameras
 from shapeshift.api.play import simulate as simulate
 from shapeshift.api.render import Renderer as Renderer
 from shapeshift.api.scene import Scene as Scene
-from shapeshift.api.update import update as update
 from shapeshift.api.write import Exported as Exported
 from shapeshift.api.write import export as export
 from shapeshift.app.change.find_change import SceneChange as SceneChange

@@ -43,7 +43,7 @@ from shapeshift.renderer.tiles.inputs import (
 )
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.evaluate import Evaluator, only_fades
 from shapeshift.runtime_models.model import Model, SplatLayers, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance, Background
@@ -138,9 +138,7 @@ class TilesDrawing(Drawing):
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
             return
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
-        slot.placed = (
-            isinstance(model := slot.evaluator.model, SplatLayers) and model.motion is None
-        )
+        slot.placed = only_fades(slot.evaluator.model)
 
     def color_set(self, which: int, count: int) -> None:
         self._colors = self._colors[:count]
