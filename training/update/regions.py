@@ -90,7 +90,9 @@ def cut_photo(photo: LoadedPhoto, region: UpdateRegion) -> LoadedPhoto | None:
         seen &= photo.weight > 0
     if not seen.sum() >= LEAST_PIXELS:
         return None
-    (top, height), (left, width) = (_span(seen.any(axis=axis)) for axis in (1, 0))
+    used_rows, used_columns = (np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0))
+    top, height = _span(used_rows, seen.shape[0])
+    left, width = _span(used_columns, seen.shape[1])
     rows, columns = slice(top, top + height), slice(left, left + width)
     weight = seen if photo.weight is None else seen * photo.weight
     return replace(
@@ -102,12 +104,11 @@ def cut_photo(photo: LoadedPhoto, region: UpdateRegion) -> LoadedPhoto | None:
     )
 
 
-def _span(used: np.ndarray) -> tuple[int, int]:
-    """(first, how many) of the pixels of a side, about those that are used."""
-    there = np.flatnonzero(used)
-    count = min(-(-(there[-1] + 1 - there[0]) // STEP) * STEP, len(used))
-    first = (there[0] + there[-1] + 1 - count) // 2
-    return int(np.clip(first, 0, len(used) - count)), int(count)
+def _span(used: np.ndarray, side: int) -> tuple[int, int]:
+    """(first, how many) of a side's pixels, about those that are used (n,), rising."""
+    count = min(-(-(used[-1] + 1 - used[0]) // STEP) * STEP, side)
+    first = (used[0] + used[-1] + 1 - count) // 2
+    return int(np.clip(first, 0, side - count)), int(count)
 
 
 def moved_capture(capture: Capture, a_from_b: Similarity) -> Capture:

@@ -5,6 +5,7 @@ leaves them; at the end they are taken from the scene as it was, as are the netw
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -205,7 +206,7 @@ class UpdateStep(TrainingStep):
         self.nothing = device.upload(np.zeros(1, np.int32))
 
     def backward(self, grad: Gaussians) -> dict[str, object]:
-        grads = super().backward(grad)
+        grads: dict[str, Any] = super().backward(grad)
         rows = self.nothing if self.rows is None else self.rows
         for name in self.layout.per_anchor:
             width = self.adam[name].shape[1]
