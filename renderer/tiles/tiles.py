@@ -44,7 +44,7 @@ from shapeshift.renderer.tiles.inputs import (
 )
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.evaluate import Evaluator, only_fades
 from shapeshift.runtime_models.model import Model, SplatLayers, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance, Background
@@ -139,7 +139,7 @@ class TilesDrawing(Drawing):
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
             return
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
-        slot.placed = slot.sh is not None
+        slot.placed = only_fades(slot.evaluator.model)
 
     def color_set(self, which: int, count: int) -> None:
         self._colors = self._colors[:count]
