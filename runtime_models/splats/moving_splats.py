@@ -30,7 +30,7 @@ TIME_STOPS = (Stop("Start", 0.0, "layer"), Stop("End", 1.0, "layer"))
 def with_motion_columns(raw: RawSplats) -> RawSplats:
     """The splats of a file, where they move made ready for `motion_of`; else as they are.
 
-    Raises BadFile for colours that only a network knows.
+    Raises BadFile for colours that only a network knows, and where no motion is finite.
     """
     moving = [name for name in raw.extra if name.startswith(MARKS)]
     if not moving:
@@ -47,8 +47,10 @@ def with_motion_columns(raw: RawSplats) -> RawSplats:
         )
     raw.memory.charge(2 * BYTES * len(raw.means), f"{len(raw.means):,} splats that move")
     if raw.sh.shape[1] == 1:
-        raw.sh[:] = (raw.sh - 0.5) / np.float32(C0)
-    length = np.linalg.norm(raw.wxyz.astype(np.float64), axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # such rows are dropped later
+            raw.sh[:] = (raw.sh - 0.5) / np.float32(C0)
+    with np.errstate(invalid="ignore"):
+        length = np.linalg.norm(raw.wxyz.astype(np.float64), axis=1)
     scale = np.divide(1, length, out=np.zeros_like(length), where=length > 0)
     for name in TURNING:  # of the quaternion that is read, which is made one of length 1
         turning = raw.extra.pop(name, np.zeros(len(scale)))
@@ -58,6 +60,9 @@ def with_motion_columns(raw: RawSplats) -> RawSplats:
     found_rows = row_findings("a motion that is not finite", broken, DROPPED, raw)
     if len(broken):
         drop(raw, broken)
+    if not len(raw.means):
+        what = found_rows[0].what
+        raise BadFile(f"{raw.file}: not one of {len(broken):,} splats can be drawn, as {what}.")
     return replace(raw, findings=(*raw.findings, *found_rows))
 
 

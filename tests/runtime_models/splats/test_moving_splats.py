@@ -134,6 +134,15 @@ def test_motions_that_are_not_finite_go_and_odd_ones_stay_finite(tmp_path):
         read_model(tmp_path / "a.ply", Reading(strict=True))
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_file_of_none_but_broken_motions_is_one_sentence(tmp_path, count):
+    rows = moving_rows(count)
+    for row in rows:
+        row["trbf_scale"] = math.nan
+    with pytest.raises(BadFile, match=rf"a\.ply: not one of {count} splats? can be drawn, as "):
+        read_model(write_rows(tmp_path / "a.ply", rows), Reading())
+
+
 def test_a_quaternion_that_passes_zero_is_one_of_length_1(tmp_path):
     rows = whole_rows(2)
     rows[0].update(rot_0=1.0, rot_1=0.0, rot_2=0.0, rot_3=0.0, omega_0=-2.0, omega_1=0.0,
