@@ -57,6 +57,10 @@ COMMANDS = {
         "photos without poses, or a video, to a capture for train",
     ),
     "train": ("training.train", "posed photos of several modalities to a scene"),
+    "update": (
+        "training.update",
+        "a part of a scene trained anew from a later visit, all else as it was",
+    ),
     "style": (
         "training.style",
         "put a new stop into a finished scene, all others as they were; or take one out",

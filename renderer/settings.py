@@ -9,6 +9,7 @@ ORDERS = ("depth", "distance")
 KEY_BITS = (16, 32)
 STEREO_SORTS = ("shared", "each")
 STEREO_COLORS = ("auto", "each", "shared")
+FOVEATIONS = ("off", "low", "medium", "high")
 TARGETS = ("auto", "rgba8", "rgba16", "rgba16f", "rgba32f")
 EDGES = ("ellipses", "points", "rings")
 DEBUG_VIEWS = ("", "culls", "birdseye", "overdraw", "depth", "object", *EDGES)
@@ -31,6 +32,8 @@ class RenderSettings:
     # bits from 0 to the scene's brightest colour, half floats where that is over 64 or not bounded.
     target: str = "auto"
     render_scale: float = 1.0  # of the view's width and height, then shown at full size
+    # Sharp where one looks, and a quarter of the pixels farther out (renderer/foveation.py).
+    foveation: str = "off"
     min_transmittance: float = 1e-4  # tiles: a pixel with less left is done (3DGS)
     # Depth beside the colours, expected along each ray, at this part of the picture's width and
     # height; 0: none.
@@ -65,6 +68,7 @@ class RenderSettings:
         for name, choices in (
             ("order", ORDERS), ("key_bits", KEY_BITS), ("stereo_sort", STEREO_SORTS),
             ("stereo_colors", STEREO_COLORS), ("target", TARGETS), ("debug", DEBUG_VIEWS),
+            ("foveation", FOVEATIONS),
         ):  # fmt: skip
             if getattr(self, name) not in choices:
                 text = ", ".join(repr(c) for c in choices)

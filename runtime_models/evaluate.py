@@ -35,6 +35,11 @@ def shape_follows_control(model: Model) -> bool:
     return isinstance(model, SplatLayers)
 
 
+def only_fades(model: Model) -> bool:
+    """Whether x changes nothing of its splats but their opacity: layers that do not move."""
+    return isinstance(model, SplatLayers) and model.motion is None
+
+
 def colors_follow_control(model: Model) -> bool:
     """Whether the colour of a splat depends on x."""
     return isinstance(model, AnchorModel) and "control" in model.networks["color"].inputs
@@ -132,7 +137,11 @@ class Evaluator:
         if isinstance(model, SplatLayers):
             weights = model.weights(x)  # (stops,) or (stops, N)
             there = weights[model.layer] if weights.ndim == 1 else _own(weights, model.layer)
-            return model.means, model.scales, model.wxyz, model.opacity * there
+            opacity = model.opacity * there
+            if model.motion is None:
+                return model.means, model.scales, model.wxyz, opacity
+            means, wxyz, opacity = model.motion.at(model.means, model.wxyz, opacity, model.time(x))
+            return means, model.scales, normalize(wxyz) if unit else wxyz, opacity
         if self._centres is None:
             self._centres = np.tile(model.anchors, model.splats_per_anchor)
         means = self._shape("offset", x)  # (A, k * 3)

@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.light_harmonics import WIDTH as LIGHT_WIDTH
 from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.shapes import check
+from shapeshift.runtime_models.splat_motion import SplatMotion
 from shapeshift.runtime_models.stop import ControlEncoding, Stop
 from shapeshift.runtime_models.stop_weights import Controls, Pace, StopBlend, encode_control
 
@@ -207,6 +208,7 @@ class SplatLayers:
     labels: np.ndarray | None = None  # (N,) int32 object of each splat; 0 = background
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) columns kept for export
     findings: tuple[Finding, ...] = ()
+    motion: SplatMotion | None = None  # time as x: then all lie in layer 0 and mode is cumulative
 
     def __post_init__(self) -> None:
         check(
@@ -238,7 +240,12 @@ class SplatLayers:
             layer=np.ascontiguousarray(self.layer[rows]),
             labels=None if self.labels is None else np.ascontiguousarray(self.labels[rows]),
             extra={name: column[rows] for name, column in self.extra.items()},
+            motion=None if self.motion is None else self.motion.with_rows(rows),
         )
+
+    def time(self, control: Controls) -> float | np.ndarray:
+        """Of splats that move: the place between the stops, 0 to 1; (n,) of n controls."""
+        return self.blend.weights(control) @ np.array([stop.x for stop in self.stops])
 
     def weights(self, control: Controls) -> np.ndarray:
         """(stops,) float32 in 0..1: how much of each layer is there; (stops, n) of n controls.

@@ -78,6 +78,8 @@ class View:
     whole: tuple[float, float, float, float] | None = None
     # Where nobody looks, through a headset's lens: what is drawn there is nobody's loss.
     hidden: HiddenMesh | None = None
+    # Tangents to the right and up of what this eye looks at, where that is known; else straight on.
+    gaze: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         """Refuses what has no picture: ValueError with a sentence."""
@@ -92,6 +94,8 @@ class View:
                     f"a view has the tangents {tangents}; left must be less than right, and down "
                     "less than up, all finite."
                 )
+        if self.gaze is not None and not all(map(math.isfinite, self.gaze)):
+            raise ValueError(f"a view has the gaze {self.gaze}; two finite tangents are wanted.")
         if not 0 < self.near < self.far:
             raise ValueError(
                 f"a view has near {self.near} and far {self.far}; 0 < near < far is wanted, metres."

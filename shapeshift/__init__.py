@@ -28,7 +28,7 @@ _NAMES_OF = {
     "api.render": ("Renderer",),
     "api.write": ("Exported", "export"),
     "api.inspect": ("change",),
-    "api.learn": ("TrainedScene", "evaluate", "poses", "train"),
+    "api.learn": ("TrainedScene", "evaluate", "poses", "train", "update"),
     "api.measure": ("bench", "chart", "compare"),
     "api.play": ("Step", "cameras", "simulate"),
     "app.change.find_change": ("SceneChange",),

@@ -3,6 +3,7 @@ from shapeshift.api.learn import TrainedScene as TrainedScene
 from shapeshift.api.learn import evaluate as evaluate
 from shapeshift.api.learn import poses as poses
 from shapeshift.api.learn import train as train
+from shapeshift.api.learn import update as update
 from shapeshift.api.load import info as info
 from shapeshift.api.load import load as load
 from shapeshift.api.measure import bench as bench

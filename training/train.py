@@ -13,6 +13,7 @@ from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
 from shapeshift.training.calibration.pose_refinement import PoseGradient, PoseRefinement
 from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.density.densify import (
+    NewAnchors,
     absent_as_nan,
     densify_and_prune,
     resize_optimizer_state,
@@ -73,6 +74,7 @@ class Trainer(Run):
     """One run.  `steps` trains; `model` may be called between any two steps."""
 
     primitive = param_group = "anchors"
+    storage = "float16"  # of what anchors have, in a package
     settings: TrainSettings
 
     def __init__(
@@ -101,18 +103,15 @@ class Trainer(Run):
         if not settings.downscale:
             self.warnings += memory_warnings(capture.photos, self.factor)
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
-        for name, found in by_modality.items():
-            if not found:
-                raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
+        if empty := [name for name, found in by_modality.items() if not found]:
+            raise BadFile(f"{capture.folder}: modality '{empty[0]}' has no training photos.")
         background = choose_background(settings.background, capture.background, photos)
         if settings.background == "auto" and background and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
             self.warnings.append(background_warning(background))
         self.schedule = Schedule(by_modality, settings.seed, background)
         self.blending = ShapeBlending(settings.blended_shapes, settings.seed, self.stops)
-        self.encoding = encoding_for([stop.x for stop in self.stops])
-        self.layout = settings.layout(self.encoding.d)
-        self.anchor_cap = anchor_cap(settings, self.layout, self.encoding, self.stops)
+        self.lay_out()
         self.targets = Targets(device)
         self.exposures = Exposures(device, by_modality, has_one_exposure(photos))
         self.lr_warmup = LrWarmup()
@@ -125,13 +124,22 @@ class Trainer(Run):
             self.initialise(photos, report)
         else:
             self.restore(*resume)
-        self.step = TrainingStep(device, self.layout, self.voxel, self.adam)
+        self.step = self.new_step()
         self.step.min_scale = self.min_scale
         self.step.pose_gradient = PoseGradient(device) if refined else None
         self.guard = DivergenceGuard(self.adam.state() | self.poses.state())
         self.next_snapshot = self.iteration + SNAPSHOT_EVERY
         if resume is not None:
             self.guard.first_loss = dict(resume[1]["first_loss"])
+
+    def lay_out(self) -> None:
+        """What the networks are like, and how many anchors there may be."""
+        self.encoding = encoding_for([stop.x for stop in self.stops])
+        self.layout = self.settings.layout(self.encoding.d)
+        self.anchor_cap = anchor_cap(self.settings, self.layout, self.encoding, self.stops)
+
+    def new_step(self) -> TrainingStep:
+        return TrainingStep(self.device, self.layout, self.voxel, self.adam)
 
     def initialise(self, photos: list[LoadedPhoto], report: Report | None) -> None:
         """Anchors, features and weights of a new run."""
@@ -168,11 +176,10 @@ class Trainer(Run):
         self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
         self.run_length = notes["run_length"]
         self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
-        groups = ("weights", *self.layout.per_anchor)
-        values = {n: state[f"{n}.value"] for n in groups}
+        values = {n: state[f"{n}.value"] for n in ("weights", *self.layout.per_anchor)}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
-        self.stats, self.visibility = self.fresh_statistics(len(values["anchors"]))
+        self.stats, self.visibility = self.fresh_statistics(self.anchors_count)
         self.stats.load(state)
         self.visibility.load(state)
         self.exposures.load(state)
@@ -189,8 +196,8 @@ class Trainer(Run):
             "lr_warmup_start": self.lr_warmup.start,
         }  # fmt: skip
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
-        known |= self.poses.state() | self.min_scale.state()
-        return self.adam.state() | known, notes
+        more = self.poses.state() | self.min_scale.state()
+        return self.adam.state() | known | more, notes
 
     @property
     def anchors_count(self) -> int:
@@ -205,12 +212,11 @@ class Trainer(Run):
         return self.settings.rates(self.run_length or 0)
 
     def all_rates(self) -> dict[str, np.ndarray]:
-        rates = parameter_rates(self.layout, self.rates(), self.voxel)
-        return self.lr_warmup.rates(rates, self.iteration)
+        usual = parameter_rates(self.layout, self.rates(), self.voxel)
+        return self.lr_warmup.rates(usual, self.iteration)
 
     def control(self, modality: str) -> np.ndarray:
-        x = next(s.x for s in self.stops if s.name == modality)
-        return self.encoding.encode(x)
+        return self.encoding.encode(next(s.x for s in self.stops if s.name == modality))
 
     def compile_kernels(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted.
@@ -347,9 +353,14 @@ class Trainer(Run):
         sizes = np.full(len(anchors), self.voxel)
         if "frame" in self.layout.attributes:
             sizes = self.voxel * np.exp(now["frames.value"][:, :3].mean(axis=1))
-        kept, new = densify_and_prune(anchors, sizes, means, self.stats.state(), self.anchor_cap)
+        known = self.stats.state(), self.anchor_cap
+        kept, new = self.allowed(*densify_and_prune(anchors, sizes, means, *known))
         self.load_state(resize_optimizer_state(now, self.layout.per_anchor, kept, new))
         self.densified_at = self.iteration
+
+    def allowed(self, kept: np.ndarray, new: NewAnchors) -> tuple[np.ndarray, NewAnchors]:
+        """Of who stays and who comes, what a run may do: here everything."""
+        return kept, new
 
     def remaining_steps(self) -> int:
         """How many more the budget allows, as fast as they have been."""

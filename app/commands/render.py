@@ -71,6 +71,9 @@ class Options(ReadingOptions):
     """Red, green and blue by which all colours are multiplied."""
     opacity: float = 1.0
     """By which the opacity of every splat is multiplied, 0 to 1."""
+    foveation: Literal["off", "low", "medium", "high"] = "off"
+    """Draw all pixels only within 35 (low), 25 or 15 degrees of straight on, and a quarter of them
+    beyond, as launch.py vr --foveation does: to see and measure it without a headset."""
     drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
     """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
     context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
@@ -166,8 +169,8 @@ def run(options: Options) -> int:
         if budget:
             drawn = ChartSubject(subjects[0], None, views[0].size, 1 + (options.stereo > 0))
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
-            if options.stereo_colors != "auto":
-                renderer.settings = replace(renderer.settings, stereo_colors=options.stereo_colors)
+            both = (options.stereo_colors, options.foveation)
+            renderer.settings = with_words(renderer.settings, *both)
         scenes = [sectioned(with_selectors(shown[c], selectors[i]), cuts) for c, i in rows]
         work = (renderer, scenes, [views[i] for _, i in rows], paths, options.stereo)
         if options.output == "picture":
@@ -274,10 +277,17 @@ def choose_settings(options: Options):
     from shapeshift.renderer.settings import RenderSettings
 
     try:
-        names = ("debug", "stereo_colors", *LIMITS)
+        names = ("debug", "stereo_colors", "foveation", *LIMITS)
         return RenderSettings(**{name: getattr(options, name) for name in names})
     except ValueError as error:
         raise UsageError(f"--{str(error).replace('_', '-', 1)}") from None
+
+
+def with_words(settings, stereo_colors: str, foveation: str):
+    """What a budget chose, with what was said besides."""
+    if stereo_colors != "auto":
+        settings = replace(settings, stereo_colors=stereo_colors)
+    return replace(settings, foveation=foveation)
 
 
 def choose_cameras(options: Options, size: tuple[int, int] | None):

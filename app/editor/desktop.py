@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.app.camera_files import camera_reading
-from shapeshift.app.drawing import parse_size
+from shapeshift.app.drawing import parse_size, read_cuts
 from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import first_look, named_cameras, opened_scene
@@ -44,7 +44,8 @@ def run(options: Options) -> int:
     found = named_cameras(options.camera, options, read)
     if not found.sources and found.file is None:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
-    scene, edited = opened_scene(found, options.x)
+    cuts = read_cuts(options.section, [source.model for source in found.sources])
+    scene, edited = opened_scene(found, options.x, cuts)
     state.open_sources(found.sources, scene, first_look(found), edited)
     state.settings = replace(state.settings, debug=options.debug)
     state.regions.add_selectors(read_selectors(options.select, state), 0)

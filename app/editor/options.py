@@ -4,7 +4,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Debug, Opt
+from shapeshift.app.command_line import (
+    CONTROL,
+    EXPERT,
+    POSITIONAL,
+    REGIONS,
+    SECTIONS,
+    SIZE,
+    Debug,
+    Opt,
+)
 from shapeshift.app.opening import ReadingOptions
 
 
@@ -28,6 +37,10 @@ class Options(ReadingOptions):
     """Regions with an X of their own (a stop's name or a number): sphere:x,y,z:radius:X[:border]
     box:x,y,z:hx,hy,hz:X[:border] half:x,y,z:nx,ny,nz:X[:border] lens:degrees:X[:border].  Default:
     none."""
+    section: Annotated[tuple[str, ...], SECTIONS] = ()
+    """Planes and boxes in the world that cut all objects, as of render: plane:nx,ny,nz,d keeps the
+    places p with n.p <= d, box:x,y,z:hx,hy,hz its inside; then :capped, :hard or :soft:WIDTH for
+    the edge, and :beyond=X to show another stop there.  Default: none."""
     compare: Annotated[str, Opt(metavar="SCENE")] = ""
     """Another scene (or scene@Stop, scene@0.5) to compare with: a line parts the two pictures.
     Default: none."""

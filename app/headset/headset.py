@@ -39,6 +39,9 @@ class Options(ReadingOptions):
     quality: Literal["auto", "best", "balanced", "fast"] = "auto"
     """auto: shortcuts only where the exact picture of both eyes takes longer than the headset's
     frames last, and fewer pixels while frames are late; best: exact, always."""
+    foveation: Literal["off", "low", "medium", "high"] | None = None
+    """Draw all pixels only within 35 (low), 25 or 15 degrees of what is looked at, or of straight
+    on, and a quarter of them beyond.  Default: as the panel was set last, at first off."""
     posture: Literal["standing", "seated"] | None = None
     """seated: the room is raised so that your eyes are 1.6 m over its floor; Recentre measures
     anew.  Default: as the panel was set last, at first standing."""
@@ -321,6 +324,7 @@ def describe(link: "HeadsetLink") -> dict:
         "depth": session.layers.depth,
         "hidden": session.hidden_parts(),
         "passthrough": session.sees_through,
+        "gaze": session.gaze.there,
         **session.pace.report(),
     }
 

@@ -123,6 +123,7 @@ def frame_row(done: DoneFrame) -> dict:
         "panel": done.panel(),
         "glass": done.state.glass.row(),
         "tools": done.state.tools.row(),
+        "shadows": done.state.shadows,
         "layers": done.layers,
         "events": [event for record in done.records for event in record.events],
         "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in done.pulses],

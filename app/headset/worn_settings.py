@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from shapeshift.renderer.settings import FOVEATIONS
 from shapeshift.runtime_models.files.json_fields import is_number, saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.vr.frame import SIDES
@@ -26,6 +27,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "walking_hand": SIDES,
     "turning": TURNINGS,
     "hand_model": HAND_MODELS,
+    "foveation": FOVEATIONS,
 }
 
 
@@ -39,6 +41,7 @@ class WornSettings:
     walking_hand: str = "left"  # whose stick walks
     turning: str = "snap"
     hand_model: str = "gloves"
+    foveation: str = "off"  # how near to what one looks at all pixels are drawn
     vignette: float = 0.8  # 0: none, 1: black
     text_size: float = 1.0  # of the panel, with all that is on it
     passthrough: bool = False  # the room itself is behind the scene, where the runtime shows it

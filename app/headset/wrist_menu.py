@@ -29,7 +29,11 @@ from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.save_start import save_scene
 from shapeshift.app.headset.scene_shelf import SceneShelf
-from shapeshift.app.headset.sections.comfort_section import draw_comfort, draw_see_through
+from shapeshift.app.headset.sections.comfort_section import (
+    draw_comfort,
+    draw_foveation,
+    draw_see_through,
+)
 from shapeshift.app.headset.sections.glass_section import draw_glass
 from shapeshift.app.headset.sections.performance_section import draw_figures
 from shapeshift.app.headset.sections.room_section import (
@@ -228,6 +232,7 @@ class WristMenu:
     def _draw_comfort(self, _: float) -> None:
         state = self._state
         draw_comfort(state.worn.now, self._choose)
+        draw_foveation(state.worn.now, self._choose)
         draw_see_through(state.through, state.sees_through, self._choose)
 
     def _draw_scenes(self, actions: SceneActions, scale: float) -> None:

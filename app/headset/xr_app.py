@@ -12,6 +12,7 @@ from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.in_hand.probe import Probe
@@ -19,10 +20,12 @@ from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.over.glass_state import GlassState, stop_now
 from shapeshift.app.headset.over.hand_glass import HandGlass
 from shapeshift.app.headset.over.over_splats import OverSplats
+from shapeshift.app.headset.over.table_shadows import TableShadows
 from shapeshift.app.headset.pacing import Pacing, choose_quality
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import SceneShelf
+from shapeshift.app.headset.sections.comfort_section import NO_ROOM
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.session.comeback import Comeback
 from shapeshift.app.headset.shutter import Shutter
@@ -83,6 +86,8 @@ class XrApp:
         self._closing.callback(self._hand_glass.close)
         self._probe = Probe(mirror.ctx, renderer)
         self._closing.callback(self._probe.close)
+        self._shadows = TableShadows(mirror.ctx)
+        self._closing.callback(self._shadows.close)
         self._scene = ExitStack()  # what ends with the scene that is open
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
@@ -90,6 +95,7 @@ class XrApp:
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
+        self._seconds = 0.0  # since that
         self._figured_s = 0.0  # when the panel's figures were made
         self._drawing_ms = 0.0  # of the splats of both eyes, last
         self.interrupted = False  # by Ctrl-C: no frame is left half done
@@ -175,7 +181,7 @@ class XrApp:
         same_room = self.session.play.kind == session.play.kind == ROOMS_OWN
         if self._comeback is None or self._comeback.placed:
             self._comeback = Comeback(self.state, self._head, same_room)
-        self.session, self.state.sees_through = session, session.sees_through
+        self.session = session
         self.eyes.fit(session.sizes)
 
     def rest_at_desk(self) -> None:
@@ -204,9 +210,12 @@ class XrApp:
 
     def frame(self, frame: Frame) -> None:
         """One frame: the person, the world, the pictures of both eyes."""
-        seconds = self._time_passed(frame)
+        self._seconds = seconds = self._time_passed(frame)
         self.pulses.clear()
         state = self.state
+        if state.sees_through and not self.session.sees_through:  # the vendor's cameras failed
+            state.editor.messages.fail(said(NO_ROOM))
+        state.sees_through = self.session.sees_through
         state.see_objects_alone()
         frame, moves = state.fit.worn(frame, seconds)
         stops = self._obstacles and not state.through  # the room's own are seen
@@ -298,13 +307,18 @@ class XrApp:
         through = self.state.through
         self.background = BLACK if through else look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
-        settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0)
+        fovea = self.state.worn.now.foveation
+        self.session.gaze.wanted = fovea != "off"
+        settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0, foveation=fovea)
         settings = replace(settings, heat_ends=look.heat_ends)
         self.renderer.settings = replace(settings, background=self.background)
         start = time.perf_counter()
         glass = self._hand_glass
         looking = glass.look(self.state, views, play_views)
         self.renderer.update(self.state.shown)
+        if through:
+            self._shadows.follow(self.renderer, self.state.shown, self._seconds)
+        self.state.shadows = tuple(c.name for c in self._shadows.casts) if through else ()
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
         looking = glass.draw(looking, self.state)
         taken_ms = (time.perf_counter() - start) * 1e3
@@ -329,6 +343,7 @@ class XrApp:
         renderer.present(framebuffer, i)
         if self.state.through:
             see_through.draw(framebuffer, renderer.coverage(i))
+            self._shadows.draw(framebuffer, self.state.play_space.view(play_view))
         elif self.state.floor_shown:
             grid, behind = Grid(self._level_m, self._clearness), plain_color(self.background)
             where = (play_view, self.state.play_space, renderer.coverage(i))

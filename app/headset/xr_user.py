@@ -95,6 +95,7 @@ class XrState:
     sees_through: bool = False  # the runtime can show the room behind pictures
     worn: KeptSettings = field(default_factory=KeptSettings)
     glass: GlassState = field(default_factory=GlassState)
+    shadows: tuple[str, ...] = ()  # of these objects, on one's own table, in this frame
     shown: Scene = field(default_factory=lambda: Scene(()))  # of this frame, as it is drawn
     fit: Fitting = field(init=False)
     tools: HandTools = field(init=False)

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from shapeshift.app.errors import UsageError
+from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation, scale_of
 from shapeshift.scene.inspection.marks_file import MarksFile
 
@@ -17,6 +18,10 @@ class EmissionOptions(Protocol):
     def reflected(self) -> float | None: ...
     @property
     def taken_with(self) -> tuple[float, float] | None: ...
+    @property
+    def air(self) -> tuple[float, float, float] | None: ...
+    @property
+    def taken_air(self) -> tuple[float, float, float] | None: ...
 
 
 def choose_emission(
@@ -42,8 +47,8 @@ def choose_emission(
             of_all = share
     marked = own or any(mark.emissivity is not None for mark in file.marks)
     before = file.emission
-    chosen = before or of_all is not None or options.reflected is not None or options.taken_with
-    if not (chosen or marked):
+    given = (of_all, options.reflected, options.taken_with, options.air, options.taken_air)
+    if not (before or marked or any(each is not None for each in given)):
         return None, own
     try:
         scale_of(unit)
@@ -53,9 +58,11 @@ def choose_emission(
             known.surface.reflected if options.reflected is None else options.reflected,
         )
         taken = SurfaceRadiation(*options.taken_with) if options.taken_with else known.taken
+        air = Air(*options.air) if options.air else known.air
+        camera_air = Air(*options.taken_air) if options.taken_air else known.taken_air
     except ValueError as error:
         raise UsageError(str(error)) from None
-    return Emission(surface, taken), own
+    return Emission(surface, taken, air, camera_air), own
 
 
 def with_emissivities(file: MarksFile, own: dict[str, float]) -> MarksFile:

@@ -60,6 +60,12 @@ class Options(ReadingOptions):
     taken_with: tuple[float, float] | None = None
     """Emissivity and reflected temperature that the camera was set to, in whose values these are
     already.  Default: those of the file of marks, else 1, with which nothing was corrected."""
+    air: tuple[float, float, float] | None = None
+    """Metres, per cent of humidity and °C of the air between camera and surfaces at the photos.
+    Default: that of the file of marks, else none."""
+    taken_air: tuple[float, float, float] | None = None
+    """The same as the camera was set to, of which its values are free already, as those of
+    radiometric JPEG.  Default: that of the file of marks, else none."""
     level: float | None = None
     """The value in the middle of the palette.  Default: that of the stop's range."""
     span: float | None = None

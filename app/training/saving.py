@@ -73,7 +73,7 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
         say("the picture was lost in the last steps; what is kept is the last good state")
     model, state = trainer.model(), trainer.checkpoint()
     try:
-        write_package(model, out)
+        write_package(model, out, trainer.storage)
         write_checkpoint(checkpoint, *state)
         save_cameras(trainer, out)
     except OSError as error:
@@ -82,7 +82,7 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
         return
     try:
         elsewhere = Path(tempfile.mkdtemp(prefix="shapeshift-"))
-        write_package(model, elsewhere / out.name)
+        write_package(model, elsewhere / out.name, trainer.storage)
         write_checkpoint(elsewhere / checkpoint.name, *state)
         save_cameras(trainer, elsewhere / out.name)
     except OSError:

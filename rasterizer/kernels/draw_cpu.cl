@@ -5,15 +5,21 @@
 // and batch, not one a splat, and nothing of a pixel is read or written in between. Blending is
 // 3DGS's, front to back (paper eq. 2): C += c alpha T, T *= 1 - alpha.
 // Reads:   the lists of bin (starts, intersections) and the records (N, 12) of each view; with HEAT
-//          = 1 value and weight of each splat (float4 x and w).
+//          = 1 value and weight of each splat (float4 x and w); with FOVEATED = 1 the kind of each
+//          tile, a byte.
 // Writes:  image (H, W, 4), alpha = 1 - T; with HEAT heat_image (H, W, 2), blended as the colours
-//          are.
+//          are.  With FOVEATED the same at half the width and height (rounded up): samples at the
+//          corner that four pixels share, or their mean; the image has no pixels of coarse tiles
+//          then, which foveate.cl fills.
 // Units:   pixels, row 0 on top; display sRGB; transmittance T in 0..1.
 #include "common/vector.cl"
 #include "common/tiles.cl"
 #define SIDE 4     // pixels of a block, and blocks of a tile
 #define BLOCKS 16  // bits of a ushort
 #define BATCH 32   // bits of a uint
+// Kinds of tiles with FOVEATED: those between, 0, have all their pixels and no samples.
+#define COARSE 1   // samples alone
+#define SEAM 2     // both
 
 // Pixel centres of a block, from its corner: lane k is column k % 4, row k / 4.
 #define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
@@ -40,6 +46,21 @@ typedef struct {
 #define AND_HEAT
 #define AND_HEAT_OF(view)
 #define GIVE_HEAT(view)
+#endif
+#if defined(FOVEATED) && defined(HEAT)
+#define AND_FINE , __global const uchar* kinds, __global float* halved, __global float2* hot_halved
+#define AND_FINE_OF(v)                                                 \
+  , __global const uchar* kinds_##v, __global float* halved_##v,      \
+      __global float2* hot_halved_##v
+#define GIVE_FINE(v) , kinds_##v, halved_##v, hot_halved_##v
+#elif defined(FOVEATED)
+#define AND_FINE , __global const uchar* kinds, __global float* halved
+#define AND_FINE_OF(v) , __global const uchar* kinds_##v, __global float* halved_##v
+#define GIVE_FINE(v) , kinds_##v, halved_##v
+#else
+#define AND_FINE
+#define AND_FINE_OF(v)
+#define GIVE_FINE(v)
 #endif
 
 // 2^x as in vector.cl, with a relative error of 2.6e-6: minimax of degree 4.
@@ -201,19 +222,63 @@ inline void store_heat(float16 hot, float16 weight, int x0, int y0, int width, i
 }
 #endif
 
+#ifdef FOVEATED
+// Of one channel of a block the means of four pixels each: (0, 0), (1, 0), (0, 1) and (1, 1).
+inline float4 means_of(float16 c) {
+  return 0.25f * (c.s028a + c.s139b + c.s46ce + c.s57df);
+}
+
+// Where a picture of half the width and height ends, a block has fewer of them.
+inline void store_means(float16 r, float16 g, float16 b, float16 a, int x0, int y0, int width,
+                        int height, __global float* image) {
+  const float4 red = means_of(r), green = means_of(g), blue = means_of(b), alpha = means_of(a);
+  const float16 four = (float16)(red.s0, green.s0, blue.s0, alpha.s0, red.s1, green.s1, blue.s1,
+                                 alpha.s1, red.s2, green.s2, blue.s2, alpha.s2, red.s3, green.s3,
+                                 blue.s3, alpha.s3);
+  float to[16];
+  vstore16(four, 0, to);
+  for (int i = 0; i < 4; i++)
+    if (x0 + i % 2 < width && y0 + i / 2 < height)
+      vstore4(vload4(i, to), (size_t)(y0 + i / 2) * width + x0 + i % 2, image);
+}
+
+#ifdef HEAT
+inline void store_heat_means(float16 hot, float16 weight, int x0, int y0, int width, int height,
+                             __global float2* heat_image) {
+  float h[4], w[4];
+  vstore4(means_of(hot), 0, h);
+  vstore4(means_of(weight), 0, w);
+  for (int i = 0; i < 4; i++)
+    if (x0 + i % 2 < width && y0 + i / 2 < height)
+      heat_image[(size_t)(y0 + i / 2) * width + x0 + i % 2] = (float2)(h[i], w[i]);
+}
+#endif
+#endif
+
 // min_transmittance: a block is done when less is left in each of its pixels (3DGS's early stop, by
 // blocks).
 inline void draw_tile(int tile, int width, int height, int tiles_x, __global const int* tile_start,
                       __global const int* intersections, __global const float* record,
-                      float min_transmittance, __global float* image AND_HEAT) {
+                      float min_transmittance, __global float* image AND_HEAT AND_FINE) {
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+#ifdef FOVEATED
+  // Pixels from a sample to the next.  A coarse tile has 8 x 8 samples, in its blocks 0, 2, 8 and
+  // 10, each of which takes the place of four.
+  const int step = kinds[tile] == COARSE ? 2 : 1;
+  const uint used = step > 1 ? 0x0505 : 0xffff;
+  // A sample of the last of an odd number of pixels has one beyond it.
+  const int last_x = width + 1 & ~1, last_y = height + 1 & ~1;
+#else
+  const int step = 1, last_x = width, last_y = height;
+  const uint used = 0xffff;
+#endif
   // T is the transmittance so far, R G B the sum of c alpha T, of all 16 blocks of the tile.
   float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
-    const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
-    const float16 y = LANE_Y + (float)(y0 + k / SIDE * SIDE);
+    const float16 x = LANE_X * (float)step + (float)(x0 + k % SIDE * SIDE);
+    const float16 y = LANE_Y * (float)step + (float)(y0 + k / SIDE * SIDE);
     // Pixels outside the image are done from the start.
-    const int16 inside = isless(x, (float16)(width)) & isless(y, (float16)(height));
+    const int16 inside = isless(x, (float16)(last_x)) & isless(y, (float16)(last_y));
     T[k] = select((float16)(0), (float16)(1), inside);
     R[k] = G[k] = B[k] = 0;
   }
@@ -223,7 +288,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
 #endif
   Batch batch;
   // Bit k: block k still takes splats.
-  uint open = 0xffff;
+  uint open = used;
   const int end = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end && open;) {
     const int n = fetch(p, end, x0, y0, intersections, record, &batch);
@@ -231,11 +296,18 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
     for (int j = 0; j < n; j++) batch.heat[j] = heat[intersections[p + j]].xw;
 #endif
     p += n;
+#ifdef FOVEATED
+    for (int k = 0; k < BLOCKS && step > 1; k++) {
+      if (!(used >> k & 1)) continue;
+      uint* of = batch.block_splats + k;  // and of the blocks to the right, below and across
+      of[0] |= of[1] | of[SIDE] | of[SIDE + 1];
+    }
+#endif
     for (int k = 0; k < BLOCKS; k++) {
       uint left = open >> k & 1 ? batch.block_splats[k] : 0;
       if (!left) continue;
-      const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
-      const float16 y = LANE_Y + (float)(y0 + k / SIDE * SIDE);
+      const float16 x = LANE_X * (float)step + (float)(x0 + k % SIDE * SIDE);
+      const float16 y = LANE_Y * (float)step + (float)(y0 + k / SIDE * SIDE);
       // One block's pixels, in registers for all of the batch's splats that reach it.
       float16 t = T[k], r = R[k], g = G[k], b = B[k];
 #ifdef HEAT
@@ -277,6 +349,26 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
     }
   }
   // Premultiplied, over nothing: the background is put behind it when it is shown.
+#ifdef FOVEATED
+  const int half_w = (width + 1) / 2, half_h = (height + 1) / 2;
+  for (int k = 0; k < BLOCKS; k++) {
+    if (!(used >> k & 1)) continue;
+    const int x = x0 + k % SIDE * SIDE, y = y0 + k / SIDE * SIDE;
+    if (step > 1) {
+      store_block(R[k], G[k], B[k], 1 - T[k], x / 2, y / 2, half_w, half_h, halved);
+#ifdef HEAT
+      store_heat(H[k], W[k], x / 2, y / 2, half_w, half_h, hot_halved);
+#endif
+      continue;
+    }
+    if (kinds[tile] != SEAM) continue;
+    store_means(R[k], G[k], B[k], 1 - T[k], x / 2, y / 2, half_w, half_h, halved);
+#ifdef HEAT
+    store_heat_means(H[k], W[k], x / 2, y / 2, half_w, half_h, hot_halved);
+#endif
+  }
+  if (step > 1) return;
+#endif
   for (int k = 0; k < BLOCKS; k++)
     store_block(R[k], G[k], B[k], 1 - T[k], x0 + k % SIDE * SIDE, y0 + k / SIDE * SIDE, width,
                 height, image);
@@ -289,13 +381,15 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
 // One view, or the same tile of two views one after the other: eyes share what the caches hold.
 __kernel void draw(int width, int height, int tiles_x, float min_transmittance,
                    __global const int* starts_0, __global const int* intersections_0,
-                   __global const float* record_0, __global float* image_0 AND_HEAT_OF(0),
+                   __global const float* record_0, __global float* image_0 AND_HEAT_OF(0)
+                       AND_FINE_OF(0),
                    __global const int* starts_1, __global const int* intersections_1,
-                   __global const float* record_1, __global float* image_1 AND_HEAT_OF(1)) {
+                   __global const float* record_1, __global float* image_1 AND_HEAT_OF(1)
+                       AND_FINE_OF(1)) {
   const int tile = get_global_id(0);
   draw_tile(tile, width, height, tiles_x, starts_0, intersections_0, record_0, min_transmittance,
-            image_0 GIVE_HEAT(0));
+            image_0 GIVE_HEAT(0) GIVE_FINE(0));
   if (image_1)
     draw_tile(tile, width, height, tiles_x, starts_1, intersections_1, record_1, min_transmittance,
-              image_1 GIVE_HEAT(1));
+              image_1 GIVE_HEAT(1) GIVE_FINE(1));
 }

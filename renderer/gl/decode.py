@@ -11,7 +11,7 @@ from shapeshift.renderer.gl.gpu import Gpu, groups_for
 from shapeshift.renderer.gl.layers import Layers
 from shapeshift.renderer.gl.networks import GlNetworks
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.evaluate import Evaluator, only_fades
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
@@ -37,7 +37,7 @@ class Decoder:
         for model in models:
             if id(model) in made:
                 continue
-            if isinstance(model, SplatLayers):
+            if isinstance(model, SplatLayers) and only_fades(model):
                 made[id(model)] = Layers(gpu, model)
             elif mlps == "gl" and isinstance(model, AnchorModel):
                 made[id(model)] = GlNetworks(gpu, model)

@@ -14,18 +14,20 @@ import numpy as np
 
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
+from shapeshift.renderer.foveation import foveas_of
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.debug.overdraw import count_overdraw
 from shapeshift.renderer.gl.debug.splat_edges import draw_edges
 from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.lenses.foveated import FoveatedSplatter
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter
 from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, StereoPairSplatter
 from shapeshift.renderer.gl.surface import DepthPictures, draw_surface
-from shapeshift.renderer.gl.target import brightest, choose_target
+from shapeshift.renderer.gl.target import brightest, choose_target, warn_once
 from shapeshift.renderer.layout import MOST_VIEWS
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy, sort_frames
@@ -36,6 +38,8 @@ from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import View
+
+WHOLE = "quads on software GL are drawn in all pixels, whatever foveation says; tiles follow it."
 
 
 class QuadsDrawing(Drawing):
@@ -50,6 +54,9 @@ class QuadsDrawing(Drawing):
         self._projector = Projector(gpu)
         self._splatter = Splatter(gpu)
         self.stereo_pair = StereoPairSplatter(gpu) if is_software(gpu.ctx) else None
+        self._foveated = FoveatedSplatter(gpu)
+        # Software GL pays for triangles, and drawing twice has twice as many.
+        self.foveates = not is_software(gpu.ctx)
         self._depths = DepthPictures(gpu)
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._sort_policy = SortPolicy()
@@ -169,7 +176,11 @@ class QuadsDrawing(Drawing):
     ) -> None:
         """Draws views that were projected together, from image i on; two at once where it pays."""
         arena, pair, disparity = self.arena, self.stereo_pair, None
-        alike = len(group) == 2 and group[0].size == group[1].size and arena.count
+        foveas = foveas_of(group, settings)
+        if foveas and not self.foveates:
+            warn_once(WHOLE)
+            foveas = []
+        alike = len(group) == 2 and not foveas and group[0].size == group[1].size and arena.count
         if pair is not None and alike and not self.draws_heat:
             if settings.low_pass >= LEAST_LOW_PASS:
                 disparity = pair.disparity(arena, group[0].size[0])
@@ -181,6 +192,10 @@ class QuadsDrawing(Drawing):
             heat = None
             if self.draws_heat:
                 heat = arena.heat_of(sets[row] if sets else min(i + row, len(arena.colors) - 1))
+            if foveas:
+                how = (view, foveas[row], settings.min_alpha, row, heat)
+                self._foveated.draw(self._splatter, arena, i + row, *how)
+                continue
             self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row, heat, view)
 
     @contextmanager
@@ -275,7 +290,7 @@ class QuadsDrawing(Drawing):
 
     def close(self) -> None:
         self._release_arena()
-        for part in (self._splatter, self._depths, self._sorter, self._projector):
+        for part in (self._splatter, self._foveated, self._depths, self._sorter, self._projector):
             if part is not None:
                 part.release()
 

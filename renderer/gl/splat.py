@@ -43,11 +43,13 @@ class Splatter:
         row: int = 0,
         heat: moderngl.Buffer | None = None,
         view: View | None = None,
+        covered: tuple[int, int] | None = None,
     ) -> None:
         """Draws the arena as it was last projected and sorted, into the image of view i.
 
         row: which of the views that were projected together.  heat: what is drawn into a second
-        image in addition.  view: whose hidden mesh stays empty.
+        image in addition.  view: whose hidden mesh stays empty.  covered: pixels of the
+        projection that the image shows, where these are not its own.
         """
         target = self.target_of(i, size, heat is not None)
         hides = view is not None and view.hidden is not None
@@ -57,7 +59,9 @@ class Splatter:
             if not hides:
                 target.clear(0.0, 0.0, 0.0, 0.0)
             if arena.count:
-                self._draw_triangles(arena, size, min_alpha, row * arena.count, heat, hides)
+                self._draw_triangles(
+                    arena, covered or size, min_alpha, row * arena.count, heat, hides
+                )
 
     def _draw_triangles(
         self, arena: Arena, size: tuple[int, int], min_alpha: float, first: int,

@@ -20,7 +20,7 @@ from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
 from shapeshift.rasterizer.project import CULL_REASONS, Projected
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
-from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
+from shapeshift.rasterizer.raster import compile_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.rasterizer.splat_edges import draw_edges
@@ -32,6 +32,7 @@ from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
+from shapeshift.renderer.tiles.blend import blend_views
 from shapeshift.renderer.tiles.depth import depth_picture, in_fewer_pixels, surface_picture
 from shapeshift.renderer.tiles.inputs import (
     behind,
@@ -43,7 +44,7 @@ from shapeshift.renderer.tiles.inputs import (
 )
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.evaluate import Evaluator, only_fades
 from shapeshift.runtime_models.model import Model, SplatLayers, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance, Background
@@ -138,7 +139,7 @@ class TilesDrawing(Drawing):
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
             return
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
-        slot.placed = slot.sh is not None
+        slot.placed = only_fades(slot.evaluator.model)
 
     def color_set(self, which: int, count: int) -> None:
         self._colors = self._colors[:count]
@@ -228,9 +229,8 @@ class TilesDrawing(Drawing):
                 same = [i for i, view in enumerate(views) if view.size == size]
                 drawn = [(self._projected[i], tiles[i]) for i in same]
                 heats = self._heats_of([sets[i] for i in same]) if self.draws_heat else []
-                images, heats = rasterize_with_heat(
-                    self.device, drawn, heats, size, min_transmittance=settings.min_transmittance
-                )
+                alike = [views[i] for i in same]
+                images, heats = blend_views(self.device, drawn, heats, alike, settings)
                 numbers = [first + i for i in same]
                 self._images.update(zip(numbers, images, strict=True))
                 self._heat_images.update(zip(numbers, heats, strict=False))

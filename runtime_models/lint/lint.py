@@ -10,6 +10,7 @@ from shapeshift.runtime_models.lint.lint_whole import (
     sample_of,
 )
 from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.splats.moving_splats import motion_of
 from shapeshift.runtime_models.splats.operations.activate import ODD, activate
 from shapeshift.runtime_models.splats.operations.recentre import origin_of, recentred
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
@@ -55,6 +56,7 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
         extra=raw.extra,
         findings=tuple(findings),
         format=raw.format,
+        motion=motion_of(raw.extra, ours),
         memory=memory,
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from shapeshift.runtime_models.files.memory import Account, Memory, unlimited
 from shapeshift.runtime_models.model import Finding
+from shapeshift.runtime_models.splat_motion import SplatMotion
 
 ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")  # of RawSplats and PlainSplats
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
@@ -122,6 +123,7 @@ class PlainSplats:
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) each
     findings: tuple[Finding, ...] = ()
     format: str = "3DGS PLY"
+    motion: SplatMotion | None = None  # None: they do not move
     memory: Account = field(default_factory=unlimited, compare=False)  # as of RawSplats
 
     @property

@@ -18,6 +18,7 @@ from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import formats, read_plain, read_raw
 from shapeshift.runtime_models.splats.layers.read_layers import join_layers
+from shapeshift.runtime_models.splats.moving_splats import TIME_STOPS
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.stop_names import is_thermal_name
 
@@ -97,8 +98,11 @@ def read_file(path: Path, reading: Reading) -> SplatLayers:
     """One file of splats: one stop, or two where it holds thermal harmonics, too."""
     raw = read_raw(path, reading)
     if "t_dc_0" not in raw.extra:
-        return join_layers([judge(raw, reading)], (Stop(path.stem, 0.0, "layer"),), reading.mode,
-                           [path.name])  # fmt: skip
+        plain = judge(raw, reading)
+        if plain.motion is not None:
+            return join_layers([plain], TIME_STOPS, "cumulative", [path.name])
+        stops = (Stop(path.stem, 0.0, "layer"),)
+        return join_layers([plain], stops, reading.mode, [path.name])
     parts = [judge(each, reading) for each in (thermal_twin(raw), raw)][::-1]
     return join_layers(parts, stops_of_pair(), reading.mode or "exclusive", [path.name])
 

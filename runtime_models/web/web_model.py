@@ -98,6 +98,11 @@ def describe_anchors(out: Container, model: AnchorModel) -> dict:
 
 def describe_layers(out: Container, model: SplatLayers) -> dict:
     """Plain splats: one set a stop, weighed by x."""
+    if model.motion is not None:
+        raise BadFile(
+            "the splats of this scene move in time, and a page holds splats that stand; export one "
+            "moment with --x, as .ply or .glb."
+        )
     count, coefficients, _ = model.sh.shape
     flat = model.sh.reshape(count, -1)
     entry = {

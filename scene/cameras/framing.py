@@ -22,6 +22,7 @@ NEAR_RADII = 0.01
 RAY_POINTS = 24
 RAY_REACH = 0.05  # tangent of the angle up to which a point can be meant by a ray
 SMALLEST_RADIUS, SMALLEST_PART = 1e-30, 1e-9  # metres; of how far from zero the centre is
+MOMENTS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of what moves in time
 FALLBACK_RADIUS = 1.0  # metres, when nothing is there to be framed
 
 
@@ -135,6 +136,10 @@ def orbit_path(
 
 def model_points(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3) and opacity (N,) that stand for a model without decoding it."""
+    if isinstance(model, SplatLayers) and model.motion is not None:
+        given = model.means, model.wxyz, model.opacity
+        moments = [model.motion.at(*given, time) for time in MOMENTS]
+        return np.concatenate([m[0] for m in moments]), np.concatenate([m[2] for m in moments])
     if isinstance(model, SplatLayers):
         return model.means, model.opacity
     return model.anchors, np.ones(len(model.anchors), np.float32)

@@ -13,6 +13,12 @@ from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.dated_stops import (
+    NO_PLACE,
+    date_in_entry,
+    named_by_date,
+    placed_by_date,
+)
 from shapeshift.scene.captures.photo import decoded, over_black
 from shapeshift.scene.captures.value_ranges import with_own_ranges
 
@@ -143,8 +149,12 @@ def upright_rotation(up: object, where: str) -> np.ndarray:
 
 
 def spread_stops(names: Iterable[str]) -> tuple[Stop, ...]:
-    """Stops evenly from 0 to 1 in the order of the names; the kind is read from the name."""
+    """Stops evenly from 0 to 1 in the order of the names, the kind read from the name; names that
+    are dates are stops of visible light as far apart as these.
+    """
     names = list(names)
+    if dated := named_by_date(names):
+        return dated
     xs = np.linspace(0, 1, len(names)) if len(names) > 1 else [0.0]
     return tuple(
         Stop(name, float(x), guess_kind(name, len(names)))
@@ -172,19 +182,23 @@ def stops_from(listed: object, where: str) -> list[Stop]:
     stops = [stop_from(row, where) for row in rows_of(listed, f"{where}: modality", 1)]
     if len({stop.name for stop in stops}) < len(stops):
         raise BadFile(f"{where}: two modalities have the same name; rename one")
-    return stops
+    return list(placed_by_date(stops, where))
 
 
 def stop_from(entry: Fields, where: str) -> Stop:
     name = entry.text("name")
     entry.where = f"{where}: modality {shown(name)}"
+    date = date_in_entry(entry)
     return Stop(
         name,
-        entry.number("x", wanted="0 to 1", low=0, high=1),
+        entry.number("x", wanted="0 to 1", low=0, high=1)
+        if entry.has("x") or not date
+        else NO_PLACE,
         entry.line("kind", "rgb", known=STOP_KINDS) if entry.has("kind") else "rgb",
         entry.text("palette", ""),
         entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None,
         entry.text("unit", ""),
+        date,
     )
 
 

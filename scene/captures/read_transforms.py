@@ -27,6 +27,7 @@ from shapeshift.scene.captures.capture_rules import (
     with_counts,
 )
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
 from shapeshift.scene.captures.read_points import read_points
@@ -165,7 +166,7 @@ def stops_of(data: dict, entries: Sequence[Mapping], where: str) -> tuple[Stop, 
     listed = data.get("modalities")
     if not listed:
         names = [
-            Fields(entry, f"{where}: frame {i}").text("modality", "RGB")
+            Fields(entry, f"{where}: frame {i}").text("modality", usual_modality(entry, where, i))
             for i, entry in enumerate(entries)
         ]
         if "" in names:
@@ -176,6 +177,11 @@ def stops_of(data: dict, entries: Sequence[Mapping], where: str) -> tuple[Stop, 
             raise BadFile(f"{where}: two modalities have the same name; rename one")
         return spread_stops(listed)
     return tuple(sorted(stops_from(listed, where), key=lambda stop: stop.x))
+
+
+def usual_modality(entry: Mapping, where: str, number: int) -> str:
+    """Of a frame that names none."""
+    return day_of_frame(entry, f"{where}: frame {number}") or "RGB"
 
 
 def shots_of(
@@ -195,8 +201,9 @@ def shots_of(
     if not opencv_axes(entry):
         matrix = matrix @ OPENCV_FROM_EYE
     names = [s.name for s in stops]
-    if "modality" in entry or len(names) == 1:
-        modality = fields.text("modality", names[0])
+    day = "" if "modality" in entry else day_of_frame(entry, where)
+    if "modality" in entry or day or len(names) == 1:
+        modality = fields.text("modality", day or names[0])
         if modality not in names:
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"

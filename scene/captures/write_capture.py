@@ -37,6 +37,7 @@ def write_capture(capture: Capture) -> Path:
                 "unit": stop.unit,
                 "counts": counts_of(capture, stop.name),
             }
+            | ({"date": stop.date} if stop.date else {})
             for stop in capture.stops
         ],
         "frames": [frame(photo, folder) for photo in capture.photos],

@@ -3,12 +3,15 @@
 A surface of emissivity e and temperature T sends e L(T) + (1 - e) L(T_r) to the camera: its own
 radiation, and that of what is around it at T_r.  L is Planck's law at 9.8 micrometres, which stands
 for the band of thermal cameras (7.5 to 14): temperatures differ by 0.2 °C at most from those by the
-whole band, from 0 to 150 °C at emissivities of 0.5 and more.  The air is taken for clear.
+whole band, from 0 to 150 °C at emissivities of 0.5 and more.  Of that the air lets a share t
+through and adds 1 - t of its own, at its temperature (air.py).
 """
 
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from shapeshift.scene.inspection.air import NO_AIR, Air
 
 PLANCK = 14387.77 / 9.8  # kelvins: h c / (wavelength k), CODATA 2018, at 9.8 micrometres
 ZERO_C = 273.15  # kelvins
@@ -50,6 +53,8 @@ class Emission:
 
     surface: SurfaceRadiation = field(default_factory=SurfaceRadiation)
     taken: SurfaceRadiation = field(default_factory=SurfaceRadiation)  # what the camera was set to
+    air: Air = NO_AIR  # between the camera and the surface, at the photos
+    taken_air: Air = NO_AIR  # what the camera was set to: of this its values are free already
 
     def corrected(
         self, values: np.ndarray, unit: str, emissivity: float | None = None
@@ -60,7 +65,10 @@ class Emission:
         share = self.surface.emissivity if emissivity is None else emissivity
         mirrored = radiance(self.surface.reflected, unit)
         was = self.taken.emissivity
-        seen = was * radiance(values, unit) + (1 - was) * radiance(self.taken.reflected, unit)
+        sent = was * radiance(values, unit) + (1 - was) * radiance(self.taken.reflected, unit)
+        arrived = through(self.taken_air, sent)
+        share_of_air = self.air.transmission
+        seen = (arrived - (1 - share_of_air) * radiance(self.air.celsius, "°C")) / share_of_air
         return temperature((seen - (1 - share) * mirrored) / share, unit)
 
     def growth(self, value: float, unit: str) -> float:
@@ -74,10 +82,20 @@ class Emission:
         text = (
             f"emissivity {self.surface.emissivity:g}, {self.surface.reflected:g} {unit} reflected"
         )
+        if self.air.distance_m > 0:
+            text += f", {self.air.words()}"
+        if self.taken_air.distance_m > 0:
+            text += f"; photos taken with {self.taken_air.words()}"
         if self.taken.emissivity == 1:
             return text
         taken = f"{self.taken.emissivity:g} and {self.taken.reflected:g} {unit}"
         return f"{text}; photos taken with {taken}"
+
+
+def through(air: Air, sent: np.ndarray) -> np.ndarray:
+    """(...) radiances of a surface behind the air, with what the air sends itself."""
+    share = air.transmission
+    return share * sent + (1 - share) * radiance(air.celsius, "°C")
 
 
 def radiance(temperatures: np.ndarray | float, unit: str) -> np.ndarray:

@@ -10,6 +10,7 @@ from shapeshift.runtime_models.files.json_fields import Fields, is_number, read_
 from shapeshift.runtime_models.files.plain_text import LONGEST_NAME, json_text, name_line
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.inspection.air import NO_AIR, Air
 from shapeshift.scene.inspection.emissivity import (
     LEAST_C,
     LEAST_EMISSIVITY,
@@ -167,13 +168,33 @@ def _held_out(row: Fields) -> HeldOutError:
 
 def _emission(row: Fields) -> Emission:
     taken = row.optional_object("taken")
-    surface = _surface(row)
+    surface, air = _surface(row), _air(row)
     row.refuse_unknown_keys()
     if taken is None:
-        return Emission(surface)
-    camera = _surface(taken)
+        return Emission(surface, air=air)
+    camera, camera_air = _surface(taken), _air(taken)
     taken.refuse_unknown_keys()
-    return Emission(surface, camera)
+    return Emission(surface, camera, air, camera_air)
+
+
+def _air(row: Fields) -> Air:
+    """'air': metres, per cent and °C; none where it is not there."""
+    if not row.has("air"):
+        return NO_AIR
+    try:
+        return Air(*row.numbers("air", 3))
+    except ValueError as error:
+        raise BadFile(f"{row.where}: {error}") from None
+
+
+def _emission_row(emission: Emission) -> dict:
+    surface, taken = (
+        vars(radiation) | ({"air": list(vars(air).values())} if air.distance_m > 0 else {})
+        for radiation, air in (
+            (emission.surface, emission.air), (emission.taken, emission.taken_air)
+        )
+    )  # fmt: skip
+    return surface | {"taken": taken}
 
 
 def _surface(row: Fields) -> SurfaceRadiation:
@@ -212,7 +233,7 @@ def marks_rows(file: MarksFile) -> dict:
     if file.held_out is not None:
         rows["held_out"] = vars(file.held_out)
     if file.emission is not None:
-        rows["emission"] = vars(file.emission.surface) | {"taken": vars(file.emission.taken)}
+        rows["emission"] = _emission_row(file.emission)
     return rows
 
 

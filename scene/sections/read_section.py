@@ -64,3 +64,12 @@ def read_section(text: str, stops: Sequence[Stop] = ()) -> SceneSection:
         return SceneSection(shape=shape, edge=edge, width_m=width, beyond=beyond)
     except ValueError as error:
         raise ValueError(f"{said}: {error}") from None
+
+
+def read_box(text: str) -> BoxShape:
+    """The box of a text box:x,y,z:hx,hy,hz alone; ValueError, one sentence, for anything else."""
+    section = read_section(text)
+    if not isinstance(section.shape, BoxShape) or text.count(":") != 2:
+        line = one_line(text)[:LONGEST]
+        raise ValueError(f"'{line}' is more than a box; box:x,y,z:hx,hy,hz is wanted.")
+    return section.shape

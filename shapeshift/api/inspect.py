@@ -22,6 +22,7 @@ from shapeshift.app.inspection.draw_values import (
 from shapeshift.app.inspection.facing import value_facing
 from shapeshift.app.paths import plain
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.lengths import Measurement, Point, Scale
 from shapeshift.scene.inspection.lengths import measure as measured
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer as FrameRenderer
 
 BLACK = (0.0, 0.0, 0.0)
+AirNumbers = Sequence[float]  # metres, per cent of humidity, °C
 Place = Sequence[float]  # (column, row) in pixels of a view, or (x, y, z) metres in the world
 
 
@@ -56,6 +58,7 @@ class InspectedScene(OpenedScene):
         colors: str = "",
         emissivity: float | None = None,
         reflected: float | None = None,
+        air: AirNumbers | None = None,
     ) -> ValuePicture:
         """A view of the thermal stop as numbers: `values` (H, W) in `unit` and `depth_m` (H, W),
         NaN where less than half of a pixel is covered, and `points` (H, W, 3) metres in the world.
@@ -63,15 +66,16 @@ class InspectedScene(OpenedScene):
         stop: which one; "": the first thermal one.  value_range, unit: what its black and white
         stand for, where the scene does not say.  colors: the palette of a stop that holds its
         colours and no values.  emissivity, reflected: of the surfaces that are seen, whose
-        temperatures the values become; None: 1, and 20 in their unit; neither: they are as
-        photographed.  Raises UsageError.
+        temperatures the values become; None: 1, and 20 in their unit.  air: metres, per cent of
+        humidity and °C of what lay between camera and surface; None: nothing.  None of the three:
+        values are as photographed.  Raises UsageError.
 
             seen = scene.values("front", (640, 480))
             (column, row), celsius = seen.hottest()
         """
         thermal = thermal_scene(self.subject, ThermalChoice(stop, value_range, unit, colors))
         picture = _drawn(thermal, choose_views(self, camera, 1, size)[0])
-        return _corrected(picture, emissivity, reflected)
+        return _corrected(picture, emissivity, reflected, air)
 
     def temperature(
         self,
@@ -80,6 +84,7 @@ class InspectedScene(OpenedScene):
         size: Size | None = None,
         emissivity: float | None = None,
         reflected: float | None = None,
+        air: AirNumbers | None = None,
         **choice: "str | tuple[float, float]",
     ) -> float:
         """The value of the thermal stop, in its unit, at (x, y, z) metres in the world or at
@@ -98,11 +103,11 @@ class InspectedScene(OpenedScene):
             radius = self.bounds[1]
 
             def seen(view: View) -> ValuePicture:
-                return _corrected(_drawn(thermal, view), emissivity, reflected)
+                return _corrected(_drawn(thermal, view), emissivity, reflected, air)
 
             return value_facing(seen, spot, radius)
         picture = _drawn(thermal, choose_views(self, camera or "front", 1, size)[0])
-        picture = _corrected(picture, emissivity, reflected)
+        picture = _corrected(picture, emissivity, reflected, air)
         if len(spot) == 3:
             return float(picture.values_at(spot[None])[0])
         return float(picture.at(picture.values, spot[None])[0])
@@ -180,15 +185,16 @@ def _drawn(thermal: ThermalScene, view: View) -> ValuePicture:
 
 
 def _corrected(
-    picture: ValuePicture, emissivity: float | None, reflected: float | None
+    picture: ValuePicture, emissivity: float | None, reflected: float | None, air: AirNumbers | None
 ) -> ValuePicture:
     """Raises UsageError."""
-    if emissivity is None and reflected is None:
+    if emissivity is None and reflected is None and air is None:
         return picture
     given = {"emissivity": emissivity, "reflected": reflected}
     try:
         surface = SurfaceRadiation(**{k: float(v) for k, v in given.items() if v is not None})
-        return picture.corrected(Emission(surface))
+        between = Air() if air is None else Air(*map(float, air))
+        return picture.corrected(Emission(surface, air=between))
     except ValueError as error:
         raise UsageError(str(error)) from None
 

@@ -111,6 +111,8 @@ HEAVY = [
     ("stability", "a.ply", "--out", "heavy/stability", "--cases", "counts", *SIZE),
     ("colliders", "hulls.scene.json", "--out", "heavy/made.scene.json"),  # CoACD, on its own
     ("eval", "light/a.shift", "capture"),
+    ("update", "light/a.shift", "capture", "--where", "box:0,0,0:50,50,50", "--out",
+     "heavy/update.shift", "--iterations", "2"),
     ("style", "light/a.shift", "--shape", "fur", "--out", "heavy/style.shift"),
     ("fit", "capture", "--out", "heavy/fit.shift", "--iterations", "2",
      "--final-iterations", "2", "--seeds", "2"),
@@ -139,7 +141,7 @@ def test_heavy_commands_do_neither(folder, capture, tmp_path, words, request):
     more = {}
     if words[:1] == ("view",):
         more = {"DISPLAY": request.getfixturevalue("display")}
-    if words[:1] in (("eval",), ("style",)):
+    if words[:1] in (("eval",), ("style",), ("update",)):
         run(folder, tmp_path, ("train", "capture", "--out", "light/a.shift", "--iterations", "2"))
     run(folder, tmp_path, words, **more)
 

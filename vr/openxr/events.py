@@ -29,11 +29,18 @@ class MaskChanged:
 
 
 @dataclass(frozen=True)
+class PassthroughChanged:
+    """The vendor's own view of the room has failed, or is to be made anew."""
+
+    flags: int  # of XrPassthroughStateChangedFlagsFB
+
+
+@dataclass(frozen=True)
 class GoingAway:
     """The runtime itself ends soon."""
 
 
-Event = StateChanged | Recentred | ControllersChanged | MaskChanged | GoingAway
+Event = StateChanged | Recentred | ControllersChanged | MaskChanged | PassthroughChanged | GoingAway
 
 
 def poll_events(xr, instance: Any) -> list[Event]:
@@ -66,6 +73,8 @@ def read_event(xr, buffer) -> Event | None:
         return ControllersChanged()
     if kind == int(kinds.EVENT_DATA_VISIBILITY_MASK_CHANGED_KHR):
         return MaskChanged()
+    if kind == int(kinds.EVENT_DATA_PASSTHROUGH_STATE_CHANGED_FB):
+        return PassthroughChanged(int(_as(buffer, xr.EventDataPassthroughStateChangedFB)._flags))
     if kind == int(kinds.EVENT_DATA_INSTANCE_LOSS_PENDING):
         return GoingAway()
     return None

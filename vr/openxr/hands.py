@@ -4,6 +4,7 @@ The only place where OpenXR's xyzw quaternions become our wxyz and back.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -89,25 +90,29 @@ class Hands:
             return False
         return True
 
-    def attach(self, session: Any) -> None:
-        """Once, between the session's creation and its begin."""
+    def attach(self, session: Any, more: Sequence[Any] = ()) -> None:
+        """Once, between the session's creation and its begin; more: action sets of others."""
         import xr
 
         self._session = session
-        info = xr.SessionActionSetsAttachInfo(action_sets=[self._set])
+        info = xr.SessionActionSetsAttachInfo(action_sets=[self._set, *more])
         xr.attach_session_action_sets(session, info)
         for name in POSES:
             for side in SIDES:
                 info = xr.ActionSpaceCreateInfo(self._actions[name], self._paths[side])
                 self._spaces[name, side] = xr.create_action_space(session, info)
 
-    def read(self, play_space: Any, time_ns: int, focused: bool) -> dict[str, Hand]:
-        """Where the hands will be at a time of the runtime, and what is pressed now."""
+    def read(
+        self, play_space: Any, time_ns: int, focused: bool, more: Sequence[Any] = ()
+    ) -> dict[str, Hand]:
+        """Where the hands will be at a time of the runtime, and what is pressed now; more: action
+        sets of others, which are to be synced in the same call.
+        """
         import xr
 
         if not focused:
             return dict.fromkeys(SIDES, LOST)
-        wanted = [xr.ActiveActionSet(self._set, xr.NULL_PATH)]
+        wanted = [xr.ActiveActionSet(each, xr.NULL_PATH) for each in (self._set, *more)]
         xr.sync_actions(self._session, xr.ActionsSyncInfo(active_action_sets=wanted))
         return {side: self._hand(side, play_space, time_ns) for side in SIDES}
 

@@ -10,8 +10,17 @@ API = (1, 0, 34)  # every runtime still in use speaks it
 DRAWING = ("XR_KHR_opengl_enable", "XR_MNDX_egl_enable")  # one of them is needed
 LOCAL_FLOOR, DISPLAY_RATE = "XR_EXT_local_floor", "XR_FB_display_refresh_rate"
 DEPTH_LAYER, HAND_TRACKING = "XR_KHR_composition_layer_depth", "XR_EXT_hand_tracking"
-VISIBILITY_MASK = "XR_KHR_visibility_mask"
-WANTED = (LOCAL_FLOOR, DISPLAY_RATE, DEPTH_LAYER, HAND_TRACKING, VISIBILITY_MASK)  # good to have
+VISIBILITY_MASK, PASSTHROUGH = "XR_KHR_visibility_mask", "XR_FB_passthrough"
+EYE_GAZE = "XR_EXT_eye_gaze_interaction"
+WANTED = (
+    LOCAL_FLOOR,
+    DISPLAY_RATE,
+    DEPTH_LAYER,
+    HAND_TRACKING,
+    VISIBILITY_MASK,
+    PASSTHROUGH,
+    EYE_GAZE,
+)  # good to have
 HOW_TO = (
     "start SteamVR, WiVRn or Monado and make it the active OpenXR runtime, "
     "or name its manifest in XR_RUNTIME_JSON"

@@ -27,16 +27,19 @@ from shapeshift.vr.openxr.events import (
     ControllersChanged,
     GoingAway,
     MaskChanged,
+    PassthroughChanged,
     Recentred,
     StateChanged,
     poll_events,
 )
+from shapeshift.vr.openxr.gaze import Gaze, tangents_along
 from shapeshift.vr.openxr.graphics import bind_current, check_requirements
 from shapeshift.vr.openxr.hands import Hands, pose_of
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.joints import HandTrackers
 from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
 from shapeshift.vr.openxr.life import BEGIN, END, LOST, Life
+from shapeshift.vr.openxr.passthrough import Passthrough
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import choose_format
 from shapeshift.vr.openxr.visibility import VisibilityMasks
@@ -73,12 +76,13 @@ class Session:
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
-        self.hands = Hands(instance.handle)
+        self.hands, self.gaze = Hands(instance.handle), Gaze(instance)
         self._handle = self._create()
         self.play = open_play_space(instance, self._handle)
         self._view_space = open_head_space(instance, self._handle)
         self._bounds = Bounds(instance, self._handle)
-        self.hands.attach(self._handle)
+        self.hands.attach(self._handle, self.gaze.sets)
+        self.gaze.open_space(self._handle)
         self._controllers, self.bare_hands = controllers, HandTrackers(instance, self._handle)
         self.pace.display_s = display_period(instance, self._handle)
         self.layers = self._make_layers(part, pixels)
@@ -105,7 +109,8 @@ class Session:
         system = (instance.handle, instance.system, stereo)
         blends = xr.enumerate_environment_blend_modes(*system)
         self._blend, self._alpha = choose_blend(xr, blends), xr.EnvironmentBlendMode.ALPHA_BLEND
-        self.sees_through = int(self._alpha) in map(int, blends)  # the room, where pictures let
+        self._blends_alpha = int(self._alpha) in map(int, blends)
+        self._passthrough = Passthrough(instance, self._handle, not self._blends_alpha)
         views = xr.enumerate_view_configuration_views(*system)
         offered = [int(each) for each in xr.enumerate_swapchain_formats(self._handle)]
         try:
@@ -114,6 +119,11 @@ class Session:
             raise NoHeadset(f"{instance.runtime}: {none}") from None
         sizes = [eye_size(view, part) for view in views]
         return FrameLayers(instance, self._handle, self._ctx, sizes, self.pixels)
+
+    @property
+    def sees_through(self) -> bool:
+        """Whether the room itself can be shown, where pictures let."""
+        return self._blends_alpha or self._passthrough.there
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -155,7 +165,9 @@ class Session:
         made = self.layers.hand_over(
             textures, self._views, self.play.handle, write_depth, quad, through
         )
-        self._end([ctypes.byref(layer) for layer in made], through)
+        below = self._passthrough.layer(through)
+        every = [*([] if below is None else [below]), *made]
+        self._end([ctypes.byref(layer) for layer in every], through)
 
     def hidden_parts(self) -> list[float]:
         """Of each eye's picture the share that its lens does not show, as the runtime tells it."""
@@ -192,6 +204,8 @@ class Session:
                         self.profiles = self.hands.profiles()
                     case MaskChanged():
                         self.masks.ask()
+                    case PassthroughChanged(flags):
+                        self._passthrough.changed(flags)
                     case GoingAway():
                         self.life.lost = True
 
@@ -229,7 +243,8 @@ class Session:
 
     def _read_hands(self, now: int, focused: bool) -> dict[str, Hand]:
         """Controllers, and in the place of one that is not there the bare hand."""
-        hands, bare = self.hands.read(self.play.handle, now, focused), self.bare_hands
+        more = self.gaze.sets if self.gaze.wanted else ()
+        hands, bare = self.hands.read(self.play.handle, now, focused, more), self.bare_hands
         if focused and bare.there:
             for side, hand in hands.items():
                 if not (self._controllers and hand.active):
@@ -254,8 +269,17 @@ class Session:
             for view, old in zip(self._views, self._eyes, strict=True)
         )
         self._eyes = left, right
+        ahead = self.gaze.direction(self.play.handle, now) if self.life.focused else None
         views = [
-            View(pose, tangents_of(view.fov), NEAR_M, FAR_M, size, hidden=self.masks.of(i))
+            View(
+                pose,
+                tangents_of(view.fov),
+                NEAR_M,
+                FAR_M,
+                size,
+                hidden=self.masks.of(i),
+                gaze=tangents_along(ahead, pose),
+            )
             for i, (pose, view, size) in enumerate(
                 zip(self._eyes, self._views, self.sizes, strict=True)
             )
@@ -277,7 +301,7 @@ class Session:
         self._open = None
         self._finish()
         self._drain()
-        blend = self._alpha if see_through else self._blend
+        blend = self._alpha if see_through and self._blends_alpha else self._blend
         info = xr.FrameEndInfo(state.predicted_display_time, blend, layers=layers)
         self.pace.end(time.perf_counter() - self._began)
         with self._instance.asked("take a frame"):
@@ -298,8 +322,9 @@ class Session:
     def close(self) -> None:
         """Gives all back, also what was lost with the runtime."""
         self.layers.close()
+        self._passthrough.close()
         self.bare_hands.close()
-        ended = (self.hands.detach, self.hands.close)
+        ended = (self.gaze.close, self.hands.detach, self.hands.close)
         for end in (*ended, lambda: self._xr.destroy_session(self._handle)):
             try:
                 end()

@@ -209,8 +209,9 @@ class Inspecting:
 
     def radiate(self, surface: SurfaceRadiation | None) -> None:
         """Values become temperatures of such surfaces; None: they are as photographed."""
-        taken = self.file.emission.taken if self.file.emission else SurfaceRadiation()
-        file = replace(self.file, emission=Emission(surface, taken) if surface else None)
+        known = self.file.emission or Emission()
+        emission = replace(known, surface=surface) if surface else None
+        file = replace(self.file, emission=emission)
         before, now = self._before[-1] if self._before else None, self.file
         same = before and before.marks is now.marks and before.isotherms is now.isotherms
         if same and surface and now.emission:

@@ -17,6 +17,8 @@ PANEL_NAMES = {"left": "Panel: left", "right": "Panel: right"}
 WALK_NAMES = {"left": "Walk: left", "right": "Walk: right"}
 MODEL_NAMES = {"gloves": "Gloves", "controllers": "Controllers"}
 TURN_NAMES = {"snap": "Snap turns", "smooth": "Smooth", "none": "By body"}
+SHARP = "sharp around the gaze"
+SHARP_NAMES = {"off": "All over", "low": "35°", "medium": "25°", "high": "15°"}
 ROOM, NO_ROOM = "the room behind the scene", "The runtime shows no room behind pictures."
 EDGE, TEXT = "dark edge while moving", "size of this panel"
 
@@ -34,6 +36,12 @@ def draw_comfort(settings: WornSettings, choose: Callable[..., None]) -> None:
         imgui.text_disabled(said(title))
         labels = [f"{100 * value:.0f} %" for value in offered]
         _row(name, offered, labels, settings, choose)
+
+
+def draw_foveation(settings: WornSettings, choose: Callable[..., None]) -> None:
+    """How far from what one looks at all pixels are drawn."""
+    imgui.text_disabled(said(SHARP))
+    _words("foveation", SHARP_NAMES, settings, choose)
 
 
 def draw_see_through(shown: bool, offered: bool, choose: Callable[..., None]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.moving_splats import held_still
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.stop_names import stems_named
 
@@ -62,6 +63,9 @@ def join_layers(
 
     Takes the parts over: the list is empty afterwards, so that each array goes once it is copied.
     """
+    if len(parts) > 1:
+        parts[:] = [held_still(part, 0.0) for part in parts]
+    motion = parts[0].motion
     counts, last = [len(part.means) for part in parts], len(parts) - 1
     kinds = sorted({part.format for part in parts})
     provenance: dict[str, object] = {"format": " + ".join(kinds), "files": list(files)}
@@ -103,6 +107,7 @@ def join_layers(
             for name in columns
         },
         findings=findings,
+        motion=motion,
     )
 
 

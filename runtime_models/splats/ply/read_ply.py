@@ -13,9 +13,9 @@ from shapeshift.runtime_models.files.blocks import block_of, each_block
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import column_names, column_offset
+from shapeshift.runtime_models.splats.moving_splats import with_motion_columns
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
 from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
-from shapeshift.runtime_models.splats.still_frame import still
 
 PLACE = ("x", "y", "z")
 SCALES = ("scale_0", "scale_1", "scale_2")
@@ -44,7 +44,7 @@ def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
         read_text(path, begins, splats, reading)
     else:
         read_records(path, begins, splats, reading)
-    return still(splats.raw, 0.0)
+    return with_motion_columns(splats.raw)
 
 
 def shades_in(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -10,7 +10,10 @@ from PIL import Image
 
 import shapeshift as ss
 from shapeshift.app import cli
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.write_cameras import write_cameras
 from shapeshift.scene.change.similarity import Similarity, rotation_of
+from shapeshift.scene.pose import View, look_at, perspective
 from tests.support.scene.visited_table import (
     AFTER,
     BEFORE,
@@ -177,6 +180,56 @@ def test_another_world_is_found_and_its_places_are_the_same(visits, tmp_path):
     rows = [{"kind": p.kind, "amount": p.amount, **dict(zip("xyz", p.centre, strict=True))}
             for p in changed.places]  # fmt: skip
     check_places(rows)
+
+
+def test_a_world_that_is_nearly_the_same_is_moved_by_closest_points(visits, tmp_path):
+    """Turned by 1.1 degrees, corners 8 to 25 mm off: closest points alone find it."""
+    turn = rotation_of(np.array([0.003, 0.019, 0.002]))
+    world = Similarity(turn, np.array([0.008, 0.004, 0.007]))
+    write_visit(tmp_path / "near", AFTER, 1, world)
+    changed = ss.change(visits / "before", tmp_path / "near", size=SIZE, context="none")
+    found = changed.registration
+    assert found.how == "icp" and found.residual_m < 0.001 and found.a_from_b.scale == 1
+    corners = np.array([(x, 0, z) for x in (-0.6, 0.6) for z in (-0.5, 0.5)])
+    was = np.linalg.norm(world.apply(corners) - corners, axis=1)
+    left = np.linalg.norm(found.a_from_b.apply(world.apply(corners)) - corners, axis=1)
+    assert left.max() < 0.001 and was.min() > 0.008  # 0.24 mm were measured
+    rows = [{"kind": p.kind, "amount": p.amount, **dict(zip("xyz", p.centre, strict=True))}
+            for p in changed.places]  # fmt: skip
+    check_places(rows)
+
+
+def test_a_table_alone_that_could_slide_stays_where_it_is(tmp_path):
+    """Closest points of a bare plane may lie anywhere along it, so they move no world."""
+    write_visit(tmp_path / "one", (TABLE,))
+    write_visit(tmp_path / "two", (TABLE,), seed=1)
+    found = ss.change(tmp_path / "one", tmp_path / "two", size=SIZE, context="none").registration
+    assert found.how == "common" and np.array_equal(found.a_from_b.rotation, np.eye(3))
+
+
+def test_cameras_of_a_file_see_what_they_see(visits, tmp_path, capsys):
+    """All in front of the table's right half: changes there are found, the others are not."""
+    views, size = [], SIZE
+    for turn in np.linspace(-0.5, 0.5, 8):
+        for height in (0.35, 0.7):
+            eye = np.array([0.3 + 0.9 * np.sin(turn), height, 0.9 * np.cos(turn)])
+            pose = look_at(eye, np.array([0.3, 0.05, 0.0]))
+            views.append(View(pose, perspective(0.35, size), 0.05, 50.0, size))
+    file = tmp_path / "walk.json"
+    names = tuple(f"{i:02}.png" for i in range(len(views)))
+    write_cameras(CameraList(tuple(views), names, "ours"), file, "ours")
+    words = ["change", str(visits / "before"), str(visits / "after"), "--camera", str(file),
+             "--json", "--size", "192x144", *NO_GL]  # fmt: skip
+    assert cli.main(words) == 0
+    places = json.loads(capsys.readouterr().out)["places"]
+    seen = {place["kind"]: np.array([place["x"], place["y"], place["z"]]) for place in places}
+    assert np.linalg.norm(seen["vanished"] - BLUE.centre) < 3 * CELL
+    assert "colder" not in seen  # the tall one stands outside of all pictures
+    assert all(place["x"] > -0.2 for place in places)
+    (tmp_path / "none.json").write_text("{}")
+    words[4] = str(tmp_path / "none.json")
+    assert cli.main(words) == 2
+    assert "none.json" in capsys.readouterr().err
 
 
 def test_scenes_that_share_nothing_are_refused(visits, tmp_path, capsys):

@@ -74,6 +74,14 @@ def test_settings_are_pressed_on_the_panel(wearer):
     np.testing.assert_allclose(wearer.menu.carried.plane.size_m, 1.5 * np.array(before))
 
 
+def test_the_sharp_middle_is_pressed_on_the_panel(wearer):
+    wearer.unfold("Comfort")
+    wearer.scroll_to("Performance")
+    for label, level in (("15\u00b0", "high"), ("35\u00b0", "low"), ("All over", "off")):
+        wearer.press(label)
+        assert wearer.state.worn.now.foveation == level
+
+
 def test_the_room_is_behind_the_scene_where_it_can_be(wearer):
     wearer.unfold("Comfort")
     wearer.scroll_to("Performance")

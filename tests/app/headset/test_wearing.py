@@ -47,6 +47,9 @@ class Played:
         self.framebuffers, self.textures = ["left", "right"], ["left", "right"]
         self.ctx, self.scenes, self.views = None, [], []
         self.layers, self.scales, self.written = SimpleNamespace(last=[]), [], []
+        self.gaze = SimpleNamespace(wanted=False)
+        nothing = np.zeros((0, 4), np.float32), np.zeros((0, 8), np.float32)
+        self.drawing = SimpleNamespace(read_splats=lambda i: nothing)
 
     def frames(self, resting):
         for frame in self.queue:
@@ -246,3 +249,14 @@ def test_over_the_room_there_is_no_floor_and_no_background(scene):
     played.sees_through, xr_app.state.sees_through = False, False
     xr_app.frame(frame_at(2 * PERIOD))
     assert played.settings.background == document.background_or(DARK)
+
+
+def test_the_gaze_is_asked_for_while_only_its_surroundings_are_sharp(scene):
+    played = Played([])
+    parts = (played, played, played, played, *scene, Pacing(DARK, "best"), Report())
+    xr_app = XrApp(*parts, worn=KeptSettings(foveation="high"))
+    xr_app.frame(frame_at(0.0))
+    assert played.settings.foveation == "high" and played.gaze.wanted
+    xr_app.state.worn.choose(foveation="off")
+    xr_app.frame(frame_at(PERIOD))
+    assert played.settings.foveation == "off" and not played.gaze.wanted

@@ -19,7 +19,8 @@ from shapeshift.app.editor.panels.widgets.panel_rows import (
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
 from shapeshift.app.editor.texts.table import said
-from shapeshift.renderer.settings import ORDERS, TARGETS, RenderSettings
+from shapeshift.renderer.foveation import RADIUS_DEGREES
+from shapeshift.renderer.settings import FOVEATIONS, ORDERS, TARGETS, RenderSettings
 
 MAX_LAMBDA = 512.0  # pixels; the slider's end means no limit
 FAR_RADII = 12.0  # scene radii; the distance slider's end means no limit
@@ -30,7 +31,7 @@ GROUPS = {  # heading -> the settings below it
     "Culls": ("max_pixels", "max_distance", "min_pixels", "fade"),
     "Order": ("order", "key_bits", "resort_frames", "resort_degrees"),
     "Colour": ("recolor_degrees", "skip_unseen"),
-    "Pixels": ("render_scale", "target", "min_transmittance"),
+    "Pixels": ("render_scale", "foveation", "target", "min_transmittance"),
 }
 ORDER_NAMES = {"depth": "order: along the view", "distance": "order: distance to the eye"}
 
@@ -202,6 +203,13 @@ def _pixels(settings: RenderSettings, drawing: str, ui_scale: float) -> RenderSe
         "scale", settings.render_scale * 100, 25.0, 200.0, "render scale: %.0f %%"
     )  # fmt: skip
     tip("Of width and height: 50 % draws a quarter of the pixels; details blur.", ui_scale)
+    radii = [said("sharp all over")]
+    radii += [said("sharp within {degrees:.0f}\u00b0", degrees=r) for r in RADIUS_DEGREES.values()]
+    fovea = choice("fovea", settings.foveation, FOVEATIONS, radii)
+    tip(
+        "Farther from the middle a quarter of the pixels are drawn. Pays where a scene fills a "
+        "wide view.", ui_scale,
+    )  # fmt: skip
     tiles = not drawing.startswith("quads")
     imgui.begin_disabled(tiles)
     labels = [said("blend into {name}", name=name) for name in TARGETS]
@@ -223,4 +231,7 @@ def _pixels(settings: RenderSettings, drawing: str, ui_scale: float) -> RenderSe
         "dense scenes; dark pixels change by as much at most." if tiles
         else "Quads blend every splat: there is nothing to stop.", ui_scale,
     )  # fmt: skip
-    return replace(settings, render_scale=percent / 100, target=target, min_transmittance=through)
+    return replace(
+        settings, render_scale=percent / 100, target=target, min_transmittance=through,
+        foveation=fovea,
+    )  # fmt: skip

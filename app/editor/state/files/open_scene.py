@@ -13,21 +13,40 @@ from shapeshift.app.editor.state.files.edited_file import (
 )
 from shapeshift.app.editor.state.files.opened import OpenedFiles
 from shapeshift.app.editor.state.scene_objects import scene_of
+from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import ReadingOptions, sentence
 from shapeshift.scene.cameras.framing import common_side
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import scene_of as scene_of_file
 from shapeshift.scene.scene import Scene
+from shapeshift.scene.sections.section import SceneSection
 
 MOST_NOTES = 2  # findings that the note at opening spells out; the status line has them all
 
 
-def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, EditedFile]:
+def opened_scene(
+    found: OpenedFiles, x: str = "", cuts: tuple[SceneSection, ...] = ()
+) -> tuple[Scene, EditedFile]:
     """What is drawn of what was opened, and its file: each at its own x, or where the text x says.
 
-    Raises BadFile for a scene file whose objects cannot be as it says, UsageError for x.
+    cuts: of all objects, in addition to those of a scene file.  Raises BadFile for a scene file
+    whose objects cannot be as it says, UsageError for x.
     """
+    scene, edited = _opened_at(found, x)
+    if not cuts:
+        return scene, edited
+    try:
+        file = edits.set_sections(edited.file, "", (*edited.file.sections, *cuts))
+    except ValueError as error:
+        raise UsageError(f"--section: {error}") from None
+    edited.history = edits.History.of(file)  # asked for at the start: nothing to be undone
+    if edited.path is None:
+        edited.saved = file  # nor to be saved, where no file could have it
+    return scene_of_file(file, edited.models_by_name()), edited
+
+
+def _opened_at(found: OpenedFiles, x: str) -> tuple[Scene, EditedFile]:
     if found.file is None:
         scene = scene_of(found.sources)
         scene = Scene(placed(scene.objects, x)) if x else scene

@@ -51,6 +51,21 @@ def test_screenshot_of_the_whole_window(display, scene_file, tmp_path):
     assert out.parent.exists() and [p.name for p in out.parent.iterdir()] == ["window.png"]
 
 
+def test_a_section_cuts_from_the_start(display, scene_file, tmp_path):
+    """The ball's half with x above 0 is gone, and nothing waits to be saved or undone."""
+    pictures = []
+    for more in ((), ("--section", "plane:1,0,0,0")):
+        out = tmp_path / "window.png"
+        done = start(display, "view", scene_file, "--screenshot", out, "--size", "640x400", *more)
+        assert done.returncode == 0, done.stderr
+        pictures.append(np.asarray(Image.open(out)).astype(int)[:280])
+    green = [(p[..., 1] > 120) & (p[..., 0] < 90) & (p[..., 2] < 90) for p in pictures]
+    whole, half = green[0].sum(), green[1].sum()
+    assert 0.4 < half / whole < 0.6 and not (green[1] & ~green[0]).sum() > 0.02 * whole
+    wrong = start(display, "view", scene_file, "--section", "plane:1,0,0")
+    assert wrong.returncode == 2 and "has not the numbers of plane" in wrong.stderr
+
+
 @pytest.mark.parametrize("percent", [100, 150, 200])
 def test_a_desktop_that_is_scaled_has_the_same_window_in_more_pixels(
     display, scene_file, tmp_path, percent

@@ -1,0 +1,120 @@
+"""launch.py update: a part of a scene trained anew from a later visit, the rest as it was."""
+
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from shapeshift.app.command_line import POSITIONAL, FieldsOf, Opt
+from shapeshift.app.opening import ReadingOptions, open_capture, open_model
+from shapeshift.app.paths import full
+from shapeshift.app.program import program
+from shapeshift.app.terminal import say
+from shapeshift.app.training.run_loop import INTERRUPTED, decibels, time_unit, train
+from shapeshift.app.training.train_options import Asked, MachineOptions, settings_of
+from shapeshift.training.settings import TrainSettings
+
+if TYPE_CHECKING:
+    from shapeshift.training.update.update_trainer import UpdateTrainer
+
+USUAL = ("seconds", "iterations", "points", "downscale", "masks", "background")
+EXPERTS = ("seed", "max_anchors", "depth_share", "min_scale_px")
+READING = "reading photos, finding the first points"
+
+
+@dataclass(frozen=True)
+class Options(MachineOptions):
+    """Train a part of a scene anew from the photos of a later visit; all else stays as it was.
+
+    The networks and all anchors outside stay to the bit.
+    """
+
+    scene: Annotated[Path, POSITIONAL]
+    """The scene of the earlier visit: a package of train."""
+    capture: Annotated[Path, POSITIONAL]
+    """The photos of the later visit, posed: what train takes, with photos of every stop."""
+    out: Path
+    """The package to write: NAME.shift or a folder."""
+    where: Annotated[tuple[str, ...], Opt(metavar="BOX")] = ()
+    """What may change, metres of the scene's world: box:x,y,z:hx,hy,hz (centre, half its sides),
+    one or several.  Default: the places that --change names."""
+    change: Path | None = None
+    """The folder that `change SCENE LATER --out` wrote: its places, and how the capture's world
+    lies in the scene's.  Default: both are one world."""
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
+    resume: bool = False
+    """Continue from the checkpoint beside --out, with the same scene, capture and places."""
+    overwrite: bool = False
+    """Replace an existing file."""
+
+
+def run(options: Options) -> int:
+    from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.progress import working
+    from shapeshift.app.training.saving import (
+        check_writable,
+        memory_for_training,
+        save,
+        save_checkpoint,
+        saved_when_memory_ends,
+    )
+    from shapeshift.app.training.update_region import base_of, region_of
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
+    from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.update.begin_update import begin_update
+    from shapeshift.training.update.regions import moved_capture
+
+    check_output(options.out, [options.scene], options.overwrite or options.resume)
+    check_writable(options.out)
+    refuse_foreign(options.out)
+    region, a_from_b = region_of(options.where, options.change)
+    checkpoint = checkpoint_path(options.out)
+    resume = read_checkpoint(checkpoint) if options.resume else None
+    settings = settings_of(options.asked, resume[1]["settings"] if resume else None)
+    base = base_of(open_model(options.scene, ReadingOptions()), region)
+    capture = open_capture(options.capture, options.memory)
+    if a_from_b is not None:
+        capture = moved_capture(capture, a_from_b)
+    device = open_device(options.device)
+    say(f"{device.name}, {device.platform}")
+    with memory_for_training(), working(READING) as shown:
+        try:
+            trainer = begin_update(device, base, capture, settings, resume, shown)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+    say(describe(trainer), *trainer.warnings)
+    before = trainer.psnr_before()
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    with saved_when_memory_ends(trainer, options.out, checkpoint):
+        interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
+    save(trainer, options.out, checkpoint)
+    say(*summary(trainer, options.out, before, interrupted))
+    return INTERRUPTED if interrupted else 0
+
+
+def describe(trainer: "UpdateTrainer") -> str:
+    photos = sum(len(found) for found in trainer.schedule.photos.values())
+    return (
+        f"{len(trainer.inside.anchors):,} anchors in the region, {trainer.fixed:,} outside stay; "
+        f"{trainer.anchors_count - trainer.fixed:,} begin; {photos} photos see it, "
+        f"{len(trainer.held_out)} held out"
+    )
+
+
+def summary(
+    trainer: "UpdateTrainer", out: Path, before: dict[str, float], interrupted: bool
+) -> list[str]:
+    state = "interrupted, --resume goes on" if interrupted else "done"
+    lines = [
+        f"{full(out)}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} "
+        f"{time_unit(trainer.device)}; {trainer.anchors_count - trainer.fixed:,} anchors in the "
+        f"region, all else as it was"
+    ]
+    if after := trainer.held_out_psnr(most=len(trainer.held_out)):
+        lines.append(
+            f"held-out photos where they see the region: {decibels(before)} before, "
+            f"{decibels(after)} now"
+        )
+    return [*lines, f"look: {program()} {full(out)}"]

@@ -1,0 +1,42 @@
+"""Views of one size, projected and put into lists, as pictures in memory."""
+
+import logging
+from collections.abc import Sequence
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.rasterizer.bin import Tiles
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.fovea.foveate import rasterize_foveated
+from shapeshift.rasterizer.project import Projected
+from shapeshift.rasterizer.raster import rasterize_with_heat
+from shapeshift.renderer.foveation import foveas_of
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import View
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
+
+
+def blend_views(
+    device: Device, drawn: "list[tuple[Projected, Tiles]]", heats: "list[Array]",
+    views: Sequence[View], settings: RenderSettings,
+) -> tuple[list[np.ndarray], list[np.ndarray]]:  # fmt: skip
+    """(H, W, 4) of each view, and (H, W, 2) of its heat where any is given."""
+    size, least = views[0].size, settings.min_transmittance
+    foveas = foveas_of(views, settings)
+    if foveas and device.kind == "gpu":
+        say_whole()
+    elif foveas:
+        return rasterize_foveated(device, drawn, heats, size, foveas, least)
+    return rasterize_with_heat(device, drawn, heats, size, min_transmittance=least)
+
+
+@cache
+def say_whole() -> None:
+    """Once."""
+    logging.getLogger("renderer").warning(
+        "tiles on an OpenCL GPU are drawn in all pixels, whatever foveation says; quads follow it."
+    )
