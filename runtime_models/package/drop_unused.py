@@ -55,10 +55,25 @@ def drop_unused(model: AnchorModel, alive: np.ndarray | None = None) -> tuple[An
         for n in HEADS
         if len(networks[n].weights) > 1
     )
-    smaller = replace(smaller, networks=networks)
+    smaller = without_unseen_light(replace(smaller, networks=networks))
     return smaller, Removed(
         int((~anchors).sum()), int((~slots).sum()), units, model.splat_count - smaller.splat_count
     )
+
+
+def without_unseen_light(model: AnchorModel) -> AnchorModel:
+    """The model without light by direction where no unit of the colour network looks at it."""
+    color = model.networks["color"]
+    if model.light is None:
+        return model
+    at = np.repeat(color.inputs, [model.input_widths[part] for part in color.inputs]) == "light"
+    first = color.weights[0]
+    if first[:, at].any():
+        return model
+    weights = np.ascontiguousarray(first[:, ~at]), *color.weights[1:]
+    inputs = tuple(part for part in color.inputs if part != "light")
+    networks = model.networks | {"color": replace(color, weights=weights, inputs=inputs)}
+    return replace(model, networks=networks, light=None)
 
 
 def without_slots(mlp: Mlp, keep: np.ndarray, size: int) -> Mlp:

@@ -311,6 +311,8 @@ def test_units_that_carry_light_go_only_where_there_is_none(size):
     gated = replace(model, networks=model.networks | {"color": replace(color, biases=biases)})
     for each in (model, gated):
         smaller, _ = drop_unused(each, np.ones((30, 5), bool))
+        assert (smaller.light is None) == (size == 0)
+        assert ("light" in smaller.networks["color"].inputs) == (size > 0)
         assert len(smaller.networks["color"].biases[0]) == (34 if size else 32)
         for eye in (EYE, -EYE, np.array([0.1, 3.0, 0])):
             np.testing.assert_allclose(
