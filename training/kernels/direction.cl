@@ -1,5 +1,8 @@
 // direction: where an anchor lies, seen from the eye.
-// Units: metres in; the direction is a unit vector.
+//
+// Reads:   an anchor's three numbers.
+// Defines: float4 direction_and_inverse(float3 eye, anchor).
+// Units:   metres in; the direction is a unit vector, or 0; 1 / metres.
 
 // Unit vector from the eye to an anchor (paper eq. 4) and 1 / distance; finite when they coincide.
 inline float4 direction_and_inverse(float3 eye, __global const float *anchor) {

@@ -1,7 +1,7 @@
 // light: what an anchor's light by direction gives, the same for all channels.
 // Reads:   nothing.
-// Defines: float light_along(vec4 low, vec4 high, vec3 d): coefficients of the spherical harmonics of
-//          degree 1 and 2, in units of those of degree 1, along a direction: light_harmonics.py.
+// Defines: float light_along(vec4 low, vec4 high, vec3 d): coefficients of the spherical harmonics
+//          of degree 1 and 2, in units of those of degree 1, along d: light_harmonics.py.
 // Units:   d is a unit vector from the eye, or zero; light has none.
 
 float light_along(vec4 low, vec4 high, vec3 d) {

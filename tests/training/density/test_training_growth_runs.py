@@ -76,7 +76,7 @@ def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
 
 def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
     root, out = Path(__file__).resolve().parents[3], tmp_path / "light.csv"
-    program = [sys.executable, "tools/training/light.py", str(balls.folder), "--out", str(out)]
+    program = [sys.executable, "tools/colors/light.py", str(balls.folder), "--out", str(out)]
     program += ["--iterations", "40", "--max-anchors", "300"]
     subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)
     rows = list(csv.DictReader(out.read_text().splitlines()[2:]))

@@ -1,6 +1,6 @@
 """Anchors with light by direction and without: decibels, steps and bytes in the same core seconds.
 
-    python3 tools/training/light.py CAPTURE ... --seconds 120 --seeds 0 1 --out docs/bench/light.csv
+    python3 tools/colors/light.py CAPTURE ... --seconds 120 --seeds 0 1 --out docs/bench/light.csv
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  Both
 ways of a capture and seed have the same photos, cap and budget, by defaults else.  psnr_db is the
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1])]
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "training")]
 
 from ways import Turn, asked, parser_of, settings_of, table, turns  # noqa: E402
 
