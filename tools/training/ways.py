@@ -1,6 +1,7 @@
 """What tables of ways to train share: options, captures by name, and runs of which ways take turns.
 
-Imported by growth.py, blended_shapes.py and ../colors/light.py, which have put the project's folder on the path.
+Imported by growth.py, blended_shapes.py and ../colors/light.py, which have put the project's folder
+on the path.
 """
 
 import argparse

@@ -8,9 +8,9 @@
 // and what its light l adds, logits; rotation is left as it comes, wxyz.
 // A frame (A, 7) is an anchor's own sizes, as logarithms s, and axes, as a quaternion q of any
 // length: mean = anchor + R(q) (exp(s) * offset), scale = exp(s) * scale, rotation = q times it.
-// Light (A, 8) makes an anchor lighter or darker by the direction d from the eye to it: coefficients
-// of the spherical harmonics of degrees 1 and 2, in units of those of degree 1, so that these are
-// x, y and z:  l = sum of light_j Y_j(d), the same for the three channels.
+// Light (A, 8) makes an anchor lighter or darker by the direction d from the eye to it:
+// coefficients of the spherical harmonics of degrees 1 and 2, in units of those of degree 1, so
+// that these are x, y and z:  l = sum of light_j Y_j(d), the same for the three channels.
 // Reads:   raw (A, RAW), anchors (A, 3), frames, base colours, light, the eye; backward the
 //          Gaussians' gradients.
 // Writes:  means, scales, wxyz, opacity, color; backward grad_raw and gradients of what it read.
