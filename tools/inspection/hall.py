@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import shapeshift as ss  # noqa: E402
-from shapeshift.runtime_models.files.whole_file import write_text  # noqa: E402
+from shapeshift.app.charts.chart_rows import write_text  # noqa: E402
 from shapeshift.scene.cameras.camera_list import moved  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.training.synthetic.hall.hall import (  # noqa: E402
