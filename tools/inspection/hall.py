@@ -106,7 +106,7 @@ def best_view(views: list[View], fault: Fault) -> tuple[View, np.ndarray, float]
 
 
 def readings(package: Path, size: tuple[int, int]) -> list[str]:
-    scene = ss.open(package)
+    scene = ss.load(package)
     views = photo_views(OTHER_POSES, size)[1]
     rows, errors = [], []
     for fault in faults():
