@@ -15,7 +15,7 @@ from shapeshift.runtime_models.files.whole_file import make_folders
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
-from shapeshift.scene.pose import View, look_at
+from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.training.synthetic.hall import machines, pipes, vessels
 from shapeshift.training.synthetic.hall.building import HALF_X, HALF_Z, HEIGHT, building
 from shapeshift.training.synthetic.openness import Clearance
@@ -154,7 +154,7 @@ def degrees(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.where(hits.index >= 0, celsius, -30.0), hits.index
 
 
-def walk(count: int) -> list[View]:
+def walk(count: int) -> list[Pose]:
     """`count` poses of the camera in two laps along both walkways, at eye height.
 
     The first lap looks to the left, ahead and to the right in turn; the second goes the other way
