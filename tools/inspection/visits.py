@@ -18,7 +18,13 @@ from shapeshift.scene.pose import Pose
 from shapeshift.training.synthetic.balls import save_png
 from shapeshift.training.synthetic.furniture import MOTOR, MUG
 from shapeshift.training.synthetic.placing import box, bump
-from shapeshift.training.synthetic.tracer import Material, Solid, photograph, surface_points
+from shapeshift.training.synthetic.tracer import (
+    Material,
+    Solid,
+    color_of,
+    photograph,
+    surface_points,
+)
 from shapeshift.training.synthetic.workshop import (
     GREY,
     STOPS,
@@ -131,11 +137,7 @@ def make_visit(
             pose = Pose.from_matrix(moved @ view.world_from_eye.matrix())
             photos.append(Photo(replace(view, world_from_eye=pose), path, stop.name, None, split))
     points, solids = surface_points(here, dome(24, turn + 0.4, size), 20000, 0.0015)
-    colors = np.full(points.shape, 0.5)
-    for i in np.unique(solids):
-        color = here.solids[i].surface.color
-        mine = points[solids == i]
-        colors[solids == i] = color(here.solids[i].local(mine)) if callable(color) else color
+    colors = color_of(here, points, solids)
     points = points @ moved[:3, :3].T + moved[:3, 3]
     capture = Capture(
         folder, STOPS_OF_A_VISIT, tuple(photos), points.astype(np.float32),

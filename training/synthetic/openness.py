@@ -10,8 +10,8 @@ import numpy as np
 from shapeshift.training.synthetic.solids import length
 from shapeshift.training.synthetic.tracer import Hits, Place
 
-FAR = 0.15  # metres; more free space than this makes no difference
-STEPS = ((0.012, 0.3), (0.03, 0.3), (0.07, 0.25), (0.14, 0.15))  # metres above, weight
+FAR = 0.15  # metres at scale 1; more free space than this makes no difference
+STEPS = ((0.012, 0.3), (0.03, 0.3), (0.07, 0.25), (0.14, 0.15))  # metres above at 1, weight
 
 
 def corner_weight(f: np.ndarray, corner: tuple[int, int, int]) -> np.ndarray:
@@ -26,16 +26,19 @@ class Clearance:
 
     low: np.ndarray  # (3,) metres
     cell: float  # metres
-    grid: np.ndarray  # (X, Y, Z) metres, at most FAR
+    grid: np.ndarray  # (X, Y, Z) metres, at most FAR * scale
+    scale: float = 1.0  # of FAR and STEPS: larger for larger things
 
     @staticmethod
-    def of(place: Place, low: tuple, high: tuple, cell: float = 0.01) -> "Clearance":
-        corner = np.asarray(low, float)
+    def of(
+        place: Place, low: tuple, high: tuple, cell: float = 0.01, scale: float = 1.0
+    ) -> "Clearance":
+        corner, far = np.asarray(low, float), FAR * scale
         shape = np.ceil((high - corner) / cell).astype(int) + 1
-        grid = np.full(shape, FAR)
+        grid = np.full(shape, far)
         for solid in place.solids:
-            # Only cells that are nearer than FAR to the ball round the solid can change.
-            around = solid.shape.reach + FAR
+            # Only cells that are nearer than `far` to the ball round the solid can change.
+            around = solid.shape.reach + far
             first = np.clip(np.floor((solid.centre - around - corner) / cell), 0, shape).astype(int)
             last = np.clip(np.ceil((solid.centre + around - corner) / cell) + 1, 0, shape).astype(
                 int
@@ -48,7 +51,7 @@ class Clearance:
             nearest = block.ravel()
             nearest[close] = np.minimum(nearest[close], solid.distance(points[close]))
             block[...] = nearest.reshape(block.shape)
-        return Clearance(corner, cell, grid)
+        return Clearance(corner, cell, grid, scale)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(n,) metres, trilinear; outside the grid as at its border."""
@@ -66,7 +69,8 @@ class Clearance:
         """(n,) 0..1; 1 under a free sky.  Zero where nothing was hit."""
         here = np.flatnonzero(hits.index >= 0)
         out = np.zeros(len(hits.index))
-        for above, weight in STEPS:
+        for above_at_1, weight in STEPS:
+            above = above_at_1 * self.scale
             free = self.at(hits.points[here] + above * hits.normals[here])
             out[here] += weight * np.clip(free / above, 0, 1)
         return out

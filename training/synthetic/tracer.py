@@ -6,7 +6,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shapeshift.scene.pose import View
-from shapeshift.training.synthetic.solids import Ball, Cuboid, Cylinder, Disc, Ring, dot, unit
+from shapeshift.training.synthetic.solids import (
+    Ball,
+    Cuboid,
+    Cylinder,
+    Disc,
+    Ring,
+    dot,
+    unit,
+)
 
 Pattern = Callable[[np.ndarray], np.ndarray]  # local points (n, 3) metres -> (n, 3) or (n,)
 NEAREST = 1e-4  # metres; a hit nearer than this is the surface the ray starts on
@@ -62,7 +70,7 @@ class Tree:
 
     centre: np.ndarray
     reach: float
-    branches: tuple = ()  # two Trees, or
+    branches: tuple = ()  # Trees, or
     leaf: int = -1  # the index of one solid
 
 
@@ -72,8 +80,11 @@ class Place:
     tree: Tree
 
     @staticmethod
-    def of(solids: list[Solid]) -> "Place":
-        return Place(tuple(solids), grow_tree(solids, np.arange(len(solids))))
+    def of(solids: list[Solid], first: int = 0) -> "Place":
+        """`first`: how many of them, walls that would make every ball large, are met first."""
+        large = tuple(grow_tree(solids, np.array([i])) for i in range(first))
+        tree = grow_tree(solids, np.arange(first, len(solids)))
+        return Place(tuple(solids), Tree(np.zeros(3), np.inf, (*large, tree)) if first else tree)
 
 
 @dataclass(frozen=True)
@@ -109,11 +120,17 @@ def grow_tree(solids: list[Solid], which: np.ndarray) -> Tree:
     return Tree(middle, reach, (grow_tree(solids, order[:half]), grow_tree(solids, order[half:])))
 
 
-def may_hit(tree: Tree, o: np.ndarray, d: np.ndarray) -> np.ndarray:
+def may_hit(tree: Tree, o: np.ndarray, d: np.ndarray, best: np.ndarray | None = None) -> np.ndarray:
+    """(n,) whether rays meet the ball; best (n,) metres: and not behind what they have met."""
+    if tree.reach == np.inf:
+        return np.ones(len(d), bool)
     to_centre = tree.centre - o
     along = dot(to_centre, d)
     across2 = dot(to_centre, to_centre) - along**2
-    return (across2 <= tree.reach**2 * (1 + 1e-9)) & (along > -tree.reach)
+    met = (across2 <= tree.reach**2 * (1 + 1e-9)) & (along > -tree.reach)
+    if best is not None:
+        met &= along - tree.reach < best  # the ball begins nearer
+    return met
 
 
 def trace(place: Place, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -121,7 +138,7 @@ def trace(place: Place, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.nd
     best, index = np.full(len(d), np.inf), np.full(len(d), -1)
 
     def visit(tree: Tree, rays: np.ndarray) -> None:
-        rays = rays[may_hit(tree, o[rays], d[rays])]
+        rays = rays[may_hit(tree, o[rays], d[rays], best[rays])]
         if not len(rays):
             return
         for branch in tree.branches:
@@ -288,3 +305,13 @@ def surface_points(
     pick = random.permutation(sum(map(len, points)))[:count]
     scatter = noise * random.standard_normal((len(pick), 3))
     return np.concatenate(points)[pick] + scatter, np.concatenate(solids)[pick]
+
+
+def color_of(place: Place, points: np.ndarray, solids: np.ndarray) -> np.ndarray:
+    """(n, 3) the unlit paint of points (n, 3) that lie on solids (n,)."""
+    out = np.zeros(points.shape)
+    for i in np.unique(solids):
+        solid, mine = place.solids[i], solids == i
+        color = solid.surface.color
+        out[mine] = color(solid.local(points[mine])) if callable(color) else color
+    return out

@@ -152,12 +152,13 @@ def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
     return out
 
 
-def write_photo(job: tuple[View, Callable[[str], Radiance], str, Path, Path]) -> None:
-    """One photo and its mask, written to their files."""
+def write_photo(job: tuple[View, Callable[[str], Radiance], str, Path, Path | None]) -> None:
+    """One photo, and its mask where one is asked for, written to their files."""
     view, radiance_of, stop, path, mask_path = job
     image, mask = photograph(view, radiance_of(stop))
     save_png(path, image)
-    save_png(mask_path, mask)
+    if mask_path is not None:
+        save_png(mask_path, mask)
 
 
 def write_photos(jobs: list[tuple], processes: int) -> Iterator[int]:

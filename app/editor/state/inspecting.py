@@ -17,6 +17,7 @@ from shapeshift.app.paths import is_bundled
 from shapeshift.renderer.colors.palette import ALL_VALUES, LEAST_SHARE
 from shapeshift.runtime_models.files.plain_text import name_line
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks import (
     MOST_MARKS,
@@ -207,10 +208,12 @@ class Inspecting:
         else:
             self.edit(file)
 
-    def radiate(self, surface: SurfaceRadiation | None) -> None:
-        """Values become temperatures of such surfaces; None: they are as photographed."""
+    def radiate(self, surface: SurfaceRadiation | None, air: Air | None = None) -> None:
+        """Values become temperatures of such surfaces, behind this air (None: behind what they
+        were); without a surface they are as photographed.
+        """
         known = self.file.emission or Emission()
-        emission = replace(known, surface=surface) if surface else None
+        emission = replace(known, surface=surface, air=air or known.air) if surface else None
         file = replace(self.file, emission=emission)
         before, now = self._before[-1] if self._before else None, self.file
         same = before and before.marks is now.marks and before.isotherms is now.isotherms

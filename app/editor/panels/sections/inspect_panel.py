@@ -11,6 +11,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import button_row, item_label, tip
 from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.texts.table import said
+from shapeshift.scene.inspection.air import FARTHEST_M, Air
 from shapeshift.scene.inspection.emissivity import (
     KELVINS,
     LEAST_EMISSIVITY,
@@ -173,6 +174,37 @@ def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:
             tool.radiate(SurfaceRadiation(share, back if moved else surface.reflected))
         except ValueError:  # typed and out of bounds: what was there stays
             return
+    _air(tool, wanted, ui_scale)
+
+
+def _air(tool: Inspecting, wanted: str, ui_scale: float) -> None:
+    """What lies between the camera and the surfaces: metres, per cent of humidity, temperature."""
+    emission = tool.file.emission
+    assert emission is not None  # _emissivity has seen to it
+    air, width = emission.air, imgui.get_window_size().x
+    imgui.align_text_to_frame_padding()
+    imgui.text(said("air"))
+    tip("The air takes some of the radiation of what is far, and adds its own.", ui_scale)
+    imgui.same_line(0.3 * width)
+    imgui.set_next_item_width(0.22 * width)
+    far, metres = imgui.drag_float("##air metres", air.distance_m, 0.2, 0.0, FARTHEST_M, "%.1f m")
+    tip("From the camera to what is seen, at the photos; 0: as if there were no air.", ui_scale)
+    imgui.same_line()
+    imgui.set_next_item_width(0.2 * width)
+    wet, humidity = imgui.drag_float("##humidity", air.humidity, 0.5, 0.0, 100.0, "%.0f %%")
+    tip("Relative humidity.", ui_scale)
+    imgui.same_line()
+    imgui.set_next_item_width(-1)
+    unit, shown, _ = in_unit("°C", air.celsius, air.celsius, wanted)
+    warm, typed = imgui.drag_float("##air temperature", shown, 0.2, 0, 0, f"%.1f {unit}")
+    tip("Of the air.", ui_scale)
+    back = in_unit(unit, typed, typed, "°C")[1] if unit != "°C" else typed
+    if far or wet or warm:
+        try:
+            between = Air(metres, humidity, back if warm else air.celsius)
+        except ValueError:  # typed and out of bounds: what was there stays
+            return
+        tool.radiate(emission.surface, between)
 
 
 def _bound(tool: Inspecting, kind: Bound, words: str, wanted: str, ui_scale: float) -> None:

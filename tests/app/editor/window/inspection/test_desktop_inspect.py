@@ -18,6 +18,7 @@ from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from tests.support.desktop.desktop_stand import run_frames
@@ -215,6 +216,32 @@ def test_emissivity_by_hand(viewer, hands, monkeypatch):
     hands.move(*on_wall(viewer, 0.2))
     run_frames(viewer, 2)
     assert tool.pointed[0] == pytest.approx(want, abs=3 * NEAR_C)  # twice the slope of what is seen
+    hands.move(*on_wall(viewer, 0.0, 0.25))
+    hands.key("z", "Control_L")
+    assert tool.file.emission is None and tool.readings["Sp1"].mean == pytest.approx(seen, abs=0.01)
+
+
+def test_air_by_hand(viewer, hands, monkeypatch):
+    """Typed metres of air: readings are those of the formula, one step back takes them away."""
+    tool, widgets = viewer.inspecting, Widgets(monkeypatch)
+    hands.key("y")
+    settle(viewer)
+    hands.click(*on_wall(viewer, 0.2))
+    seen = tool.readings["Sp1"].mean
+    hands.click(*widgets.middle("emissivity"))
+    run_frames(viewer, 2)
+    for name, typed in (("##air metres", "40"), ("##humidity", "80"), ("##air temperature", "5")):
+        hands.hold_key("Control_L", True)
+        hands.click(*widgets.middle(name))
+        hands.hold_key("Control_L", False)
+        hands.type(typed)
+        hands.key("Return")
+    wanted = Emission(SurfaceRadiation(0.95, 20.0), air=Air(40.0, 80.0, 5.0))
+    assert tool.file.emission == wanted
+    want = float(wanted.corrected(np.array(seen), "°C"))
+    bare = float(Emission(SurfaceRadiation(0.95, 20.0)).corrected(np.array(seen), "°C"))
+    assert want > bare + 0.5  # the wall is warmer than the air: what the air adds is less
+    assert tool.readings["Sp1"].mean == pytest.approx(want, abs=0.02)
     hands.move(*on_wall(viewer, 0.0, 0.25))
     hands.key("z", "Control_L")
     assert tool.file.emission is None and tool.readings["Sp1"].mean == pytest.approx(seen, abs=0.01)
