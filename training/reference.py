@@ -84,10 +84,9 @@ def decode_reference(
     features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
     networks = layout.unpack(parameters["weights"])
     heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
-    own = (parameters.get(name) for name in ATTRIBUTE_WIDTH)
-    own = (None if rows is None else np.asarray(rows, np.float64) for rows in own)
+    own = {n: np.asarray(parameters[n], np.float64) for n in ATTRIBUTE_WIDTH if n in parameters}
     raw = {name: outputs for name, (_, outputs) in heads.items()}
-    return activate_reference(raw, anchors, voxel, *own, directions(anchors, eye))
+    return activate_reference(raw, anchors, voxel, **own, direction=directions(anchors, eye))
 
 
 def image_loss_reference(image, photo, share: float, weight=None) -> float:

@@ -104,8 +104,8 @@ def read_head(name: str, entry: Fields, lit: bool) -> Head:
     file, inputs = entry.text("file"), entry.value("inputs")
     if "/" in file or "\\" in file or not file.endswith(".onnx"):
         raise entry.error("file", "the name of a .onnx in the package")
-    parts = PARTS if name == "color" else ("feature", "control")  # only colour sees the eye
-    parts = tuple(part for part in parts if lit or part != LIGHT)
+    known = PARTS if name == "color" else ("feature", "control")  # only colour sees the eye
+    parts = tuple(part for part in known if lit or part != LIGHT)
     if not (
         isinstance(inputs, list)
         and inputs
