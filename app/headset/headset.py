@@ -41,8 +41,9 @@ class Options(ReadingOptions):
     frames last, and fewer pixels while frames are late; best: exact, always."""
     foveation: Literal["off", "low", "medium", "high", "quad"] | None = None
     """Draw all pixels only within 35 (low), 25 or 15 degrees of what is looked at, or of straight
-    on, and a quarter of them beyond; quad: four views as the runtime offers them, a wide one and a
-    sharp inset for each eye, else as medium.  Default: as the panel was set last, at first off."""
+    on, and a quarter of them beyond; quad: the runtime's quad views, a wide one and a sharp inset
+    for each eye, and where it offers none as medium.  Default: as the panel was set last, at first
+    off."""
     posture: Literal["standing", "seated"] | None = None
     """seated: the room is raised so that your eyes are 1.6 m over its floor; Recentre measures
     anew.  Default: as the panel was set last, at first standing."""
@@ -235,7 +236,7 @@ def say_missing(link: "HeadsetLink", options: Options, worn: "KeptSettings") -> 
         say(f"{name} shows no room behind pictures; the scene has its own.")
     if worn.now.wants_insets and not session.shown.has_insets:
         level = worn.now.sharp(has_insets=False)
-        say(f"{name} offers no four views, one an eye alone; --foveation {level} is used instead.")
+        say(f"{name} offers no quad views, one view an eye; --foveation {level} is used instead.")
     for profile in session.hands.refused:
         say(f"{name} does not know {profile}.")
 

@@ -19,10 +19,10 @@ MODEL_NAMES = {"gloves": "Gloves", "controllers": "Controllers"}
 TURN_NAMES = {"snap": "Snap turns", "smooth": "Smooth", "none": "By body"}
 SHARP = "sharp around the gaze"
 SHARP_NAMES = {
-    "off": "All over", "low": "35°", "medium": "25°", "high": "15°", INSETS: "4 views",
+    "off": "All over", "low": "35°", "medium": "25°", "high": "15°", INSETS: "Quad views",
 }  # fmt: skip
-LATER = "Four views a frame begin with the next session; until then 25°."
-NO_INSETS = "The runtime offers no four views a frame; 25° instead."
+LATER = "Quad views begin with the next session; until then 25°."
+NO_INSETS = "The runtime offers no quad views; 25° instead."
 ROOM, NO_ROOM = "the room behind the scene", "The runtime shows no room behind pictures."
 EDGE, TEXT = "dark edge while moving", "size of this panel"
 
