@@ -10,7 +10,7 @@ import numpy as np
 from shapeshift.renderer.backends import choose_backends, open_drawing
 from shapeshift.renderer.colors.color_cache import ColorCache, centre_of, forget_colors
 from shapeshift.renderer.colors.decode_colors import decode_colors
-from shapeshift.renderer.colors.eye_colors import drawn_together, eyes_among
+from shapeshift.renderer.colors.eye_colors import by_eye, drawn_together, eyes_among
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
     PICTURE,
@@ -269,13 +269,7 @@ class Renderer:
 
         Returns the sets of the views, where there is another one that is none of theirs.
         """
-        eyes = eyes_among(views) if own else [0] * len(views)
-        if self.keeps_beside and max(eyes) >= BESIDE_SET:  # no room for that many
-            eyes = [0] * len(views)
-        groups = [
-            [view for view, eye in zip(views, eyes, strict=True) if eye == which]
-            for which in range(max(eyes) + 1)
-        ]
+        eyes, groups = by_eye(views, own, BESIDE_SET if self.keeps_beside else len(views))
         count = BESIDE_SET + 1 if self.keeps_beside else len(groups)
         for decoded in self._decoded:
             fresh = (ColorCache(decoded.colored[0].centre) for _ in range(count))

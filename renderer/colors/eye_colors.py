@@ -70,6 +70,19 @@ def eyes_among(views: list[View]) -> list[int]:
     return [int(np.flatnonzero(np.unique(first) == each)[0]) for each in first]
 
 
+def by_eye(views: list[View], own: bool, most: int) -> tuple[list[int], list[list[View]]]:
+    """Which set of colours each view has, and the views of each set: own: one an eye, where these
+    are no more than `most`; else one for all.
+    """
+    eyes = eyes_among(views) if own else [0] * len(views)
+    if max(eyes) >= most:
+        eyes = [0] * len(views)
+    groups: list[list[View]] = [[] for _ in range(max(eyes) + 1)]
+    for eye, view in zip(eyes, views, strict=True):
+        groups[eye].append(view)
+    return eyes, groups
+
+
 def drawn_together(scene: Scene, views: int, own_colors: bool) -> list[slice]:
     """Which views of a frame are decoded and drawn at once: all of them, but one by one where each
     eye is to see its own splats of a model whose shape follows the eye.
