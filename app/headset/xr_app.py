@@ -127,7 +127,7 @@ class XrApp:
             glass=GlassState(stop_now(editor, self._wearing.glass)),
         )
         self._parts_hand = PartsHand(parts)
-        self.state.tools.open(self._probe.measure)
+        self.state.tools.open(self._probe.measure, self._probe.inspect)
         actions = MenuActions(
             self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start,
             self.shutter.recorder,
