@@ -10,7 +10,7 @@ import numpy as np
 from shapeshift.renderer.backends import choose_backends, open_drawing
 from shapeshift.renderer.colors.color_cache import ColorCache, centre_of, forget_colors
 from shapeshift.renderer.colors.decode_colors import decode_colors
-from shapeshift.renderer.colors.eye_colors import drawn_together
+from shapeshift.renderer.colors.eye_colors import by_eye, drawn_together, eyes_among
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
     PICTURE,
@@ -191,7 +191,7 @@ class Renderer:
             with self._timer.time("resolve"):
                 for i, framebuffer in enumerate(targets):
                     self.present(framebuffer, i)
-        return self._stats_of(sorts, len(full) if own else 1)
+        return self._stats_of(sorts, len(set(eyes_among(full))) if own else 1)
 
     def draw_two(self, views: tuple[View, View], other: Scene) -> FrameStats:
         """Draws one view of the scene that `update` took over, and another one of a scene that
@@ -264,11 +264,12 @@ class Renderer:
         return replace(self.settings, target=target)
 
     def _decode_colors(self, views: list[View], own: bool = False) -> tuple[int, ...]:
-        """Runs the colours of the visible objects for the middle of the eyes; own: for each eye.
+        """Runs the colours of the visible objects for the middle of the eyes; own: for each eye,
+        whose views have them together.
 
         Returns the sets of the views, where there is another one that is none of theirs.
         """
-        groups = [[view] for view in views] if own else [views]
+        eyes, groups = by_eye(views, own, BESIDE_SET if self.keeps_beside else len(views))
         count = BESIDE_SET + 1 if self.keeps_beside else len(groups)
         for decoded in self._decoded:
             fresh = (ColorCache(decoded.colored[0].centre) for _ in range(count))
@@ -279,7 +280,7 @@ class Renderer:
                 at_once = self._false_colors.way == SPLATS
                 self._decode_set((which, count), group, self._scene, looks, at_once)
             self.drawing.wait_decoded()
-        return tuple(range(len(views)) if own else [0] * len(views)) if self.keeps_beside else ()
+        return tuple(eyes) if self.keeps_beside or len(groups) != len(views) else ()
 
     def _decode_set(
         self, color_set: tuple[int, int], views: list[View], scene: Scene, looks: list[Look],

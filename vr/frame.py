@@ -15,6 +15,11 @@ SIDES = ("left", "right")
 NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a PlaySpace
 
 
+def view_names(count: int) -> tuple[str, ...]:
+    """Of the views of a frame, in their order."""
+    return (*SIDES, *(f"{side}-inset" for side in SIDES))[:count]
+
+
 @dataclass(frozen=True)
 class Hand:
     """One controller, or a hand without one, as it is at the time that the frame will be seen.
@@ -78,7 +83,9 @@ class Pulse:
 class Frame:
     """What a frame loop gives: where the eyes and hands will be, and when."""
 
-    views: tuple[View, ...]  # play_from_eye, one an eye, off-centre tangents, pixels of its target
+    # play_from_eye, one an eye, then where there are any its insets; off-centre tangents, pixels of
+    # its target
+    views: tuple[View, ...]
     head: Pose  # play_from_head
     hands: dict[str, Hand]  # of SIDES
     seen_s: float  # the runtime's predicted display time, seconds since the session began

@@ -26,6 +26,7 @@ MIRROR = {"right": np.array([1.0, 1.0, 1.0]), "left": np.array([-1.0, 1.0, 1.0])
 PALM_JOINT, WRIST_JOINT, CHAINS = 0, 1, ((2, 5), (6, 10), (11, 15), (16, 20), (21, 25))
 INDEX_JOINTS = (9, 10)  # the last two of the pointing finger
 JOINT_M = (0.006, 0.024)  # radii that look like a hand's
+SHORTEST_M = 1e-6  # of a bone that has a direction
 MOST_ASIDE = 0.8  # radians from straight ahead that the pointing finger turns to the aim
 
 
@@ -153,4 +154,6 @@ def _beside(place: np.ndarray, y: float, z: float) -> np.ndarray:
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
+    """Of length 1; of no length where the two joints it lies between are in one place."""
+    length = np.linalg.norm(vector)
+    return vector / length if length > SHORTEST_M else np.zeros(3)

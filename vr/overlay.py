@@ -32,6 +32,7 @@ NAMES = ("a", "b", "radii", "color_a", "color_b")
 ROOM = 256  # capsules that the buffer has room for at first
 CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])  # of a flat picture, halves of its sides
 SPARE = 3  # pixels around what is drawn: lines are widened to nearly one
+MOST_SIZES = 2  # of an eye's wide picture, and of its inset
 PANEL_CORNER_M = 0.011  # radius
 OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
 CUT = (moderngl.ZERO, moderngl.ONE_MINUS_SRC_ALPHA)
@@ -57,8 +58,8 @@ class Overlay:
         self._instances = ctx.buffer(reserve=ROOM * 16 * 4)
         self._capsules = self._vertices()
         self._triangle = ctx.vertex_array(self._over, [])
-        self._target: moderngl.Framebuffer | None = None  # several samples a pixel
-        self._resolved: moderngl.Framebuffer | None = None  # one
+        # Of a size: with several samples a pixel, and with one; the last few are kept.
+        self._targets: dict[tuple[int, int], tuple[moderngl.Framebuffer, moderngl.Framebuffer]] = {}
 
     def draw(
         self, framebuffer: moderngl.Framebuffer, play_view: View, drawn: Drawn,
@@ -232,17 +233,18 @@ class Overlay:
     def _targets_of(
         self, size: tuple[int, int]
     ) -> tuple[moderngl.Framebuffer, moderngl.Framebuffer]:
-        """With several samples a pixel, and with one; made anew when the eyes' size changes."""
-        if self._target is not None and self._resolved is not None:
-            if self._target.size == tuple(size):
-                return self._target, self._resolved
+        """With several samples a pixel, and with one; made anew when the views' sizes change."""
+        kept = self._targets.get(size)
+        if kept is not None:
+            return kept
+        if len(self._targets) == MOST_SIZES:
             self._release_targets()
         ctx, samples = self._ctx, min(self.detail.samples, self._ctx.max_samples)
         depth = ctx.depth_renderbuffer(size, samples=samples)
         target = resolved = ctx.framebuffer([ctx.texture(size, 4)], None if samples else depth)
         if samples:
             target = ctx.framebuffer([ctx.renderbuffer(size, 4, samples=samples)], depth)
-        self._target, self._resolved = target, resolved
+        self._targets[size] = target, resolved
         return target, resolved
 
     def _vertices(self) -> moderngl.VertexArray:
@@ -250,14 +252,12 @@ class Overlay:
         return self._ctx.vertex_array(self._capsule, parts, self._faces)
 
     def _release_targets(self) -> None:
-        for framebuffer in {self._target, self._resolved}:
-            if framebuffer is None:
-                continue
+        for framebuffer in {each for pair in self._targets.values() for each in pair}:
             for part in (*framebuffer.color_attachments, framebuffer.depth_attachment):
                 if part is not None:
                     part.release()
             framebuffer.release()
-        self._target = self._resolved = None
+        self._targets.clear()
 
     def __enter__(self) -> "Overlay":
         return self

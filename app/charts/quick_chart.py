@@ -70,13 +70,15 @@ class QuickChart:
 
     `step` draws one frame; `rows` is complete once `done`.  The exact setting is timed again
     before each other one, so that a machine that slows down slows both.  `eyes` gives the views
-    that are drawn together with one; errors are of the first.
+    that are drawn together with one; errors are the worst of those that are `judged`, by number.
     """
 
     def __init__(
         self, renderer: Renderer, scene: Scene, view: View, centre: np.ndarray,
         finish: Callable[[], None], eyes: Callable[[View], list[View]] = lambda view: [view],
+        judged: Sequence[int] = (0,),
     ) -> None:  # fmt: skip
+        self._judged = tuple(judged)
         self._renderer, self._scene, self._finish, self._eyes = renderer, scene, finish, eyes
         self._views = [turned(view, centre, STEP * i) for i in range(FRAMES + 1)]
         drawing = renderer.backends["drawing"]
@@ -86,7 +88,7 @@ class QuickChart:
             for name, changes in QUICK.items()
             if "min_transmittance" not in changes or not drawing.startswith("quads")
         }
-        self._pictures: list[np.ndarray] = []
+        self._pictures: list[list[np.ndarray]] = []  # of each frame those that are judged
         self._exact_ms: list[float] = []
         self.rows: list[QuickRow] = []
         self.frame, self.frames = 0, frames_for(self._settings)
@@ -111,7 +113,7 @@ class QuickChart:
         """Yields after every frame."""
         for number, view in enumerate(self._views):
             ms = self._draw(self._exact, view)
-            self._pictures.append(self._renderer.resolved(0))
+            self._pictures.append(self._seen())
             if number:
                 self._exact_ms.append(ms)
             yield True
@@ -127,10 +129,14 @@ class QuickChart:
                 ms = self._draw(settings, view)
                 if number:
                     times.append(ms)
-                    errors.append(psnr(self._renderer.resolved(0), self._pictures[number]))
+                    pairs = zip(self._seen(), self._pictures[number], strict=True)
+                    errors.append(min(psnr(*pair) for pair in pairs))
                 yield True
             ms = median(times) / median(now[1:]) * base
             self.rows.append(QuickRow(name, settings, ms, float(np.min([*errors, MOST_DB]))))
+
+    def _seen(self) -> list[np.ndarray]:
+        return [self._renderer.resolved(i) for i in self._judged]
 
     def _draw(self, settings: RenderSettings, view: View) -> float:
         """Milliseconds of a whole frame, decoding of colours included."""

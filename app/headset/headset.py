@@ -39,9 +39,11 @@ class Options(ReadingOptions):
     quality: Literal["auto", "best", "balanced", "fast"] = "auto"
     """auto: shortcuts only where the exact picture of both eyes takes longer than the headset's
     frames last, and fewer pixels while frames are late; best: exact, always."""
-    foveation: Literal["off", "low", "medium", "high"] | None = None
+    foveation: Literal["off", "low", "medium", "high", "quad"] | None = None
     """Draw all pixels only within 35 (low), 25 or 15 degrees of what is looked at, or of straight
-    on, and a quarter of them beyond.  Default: as the panel was set last, at first off."""
+    on, and a quarter of them beyond; quad: the runtime's quad views, a wide one and a sharp inset
+    for each eye, and where it offers none as medium.  Default: as the panel was set last, at first
+    off."""
     posture: Literal["standing", "seated"] | None = None
     """seated: the room is raised so that your eyes are 1.6 m over its floor; Recentre measures
     anew.  Default: as the panel was set last, at first standing."""
@@ -189,8 +191,9 @@ def wear(options: Options) -> int:
     from shapeshift.vr.locomotion.locomotion import Rules
     from shapeshift.vr.openxr.instance import Lost
 
-    with HeadsetLink(partial(open_session, options), options.reopen) as link:
-        worn = worn_settings(options)
+    worn = worn_settings(options)
+    how = (partial(open_session, options, worn), options.reopen, lambda: worn.now.wants_insets)
+    with HeadsetLink(*how) as link:
         document, editor = open_xr(options.scene or DEMO, options, options.x)
         wearing = wearing_of(options, editor)
         speak_first(ProgramSettings.read(config_folder()), editor.messages)
@@ -208,7 +211,7 @@ def wear(options: Options) -> int:
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
             rules = Rules(obstacles=options.obstacles)
-            say_missing(link, options)
+            say_missing(link, options, worn)
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
                 worn, shelf_of(options), shutter_of(options),
@@ -224,13 +227,16 @@ def wear(options: Options) -> int:
     return 0
 
 
-def say_missing(link: "HeadsetLink", options: Options) -> None:
+def say_missing(link: "HeadsetLink", options: Options, worn: "KeptSettings") -> None:
     """What was asked for and the runtime does not have."""
     name, session = link.instance.runtime, link.session
     if not (options.controllers or session.bare_hands.there):
         say(f"{name} sees no hands; controllers are taken.")
     if options.passthrough and not session.sees_through:
         say(f"{name} shows no room behind pictures; the scene has its own.")
+    if worn.now.wants_insets and not session.shown.has_insets:
+        level = worn.now.sharp(has_insets=False)
+        say(f"{name} offers no quad views, one view an eye; --foveation {level} is used instead.")
     for profile in session.hands.refused:
         say(f"{name} does not know {profile}.")
 
@@ -277,11 +283,12 @@ def shelf_of(options: Options) -> "SceneShelf":
     return SceneShelf(config_folder(), options, options.scene or DEMO, keeps=not measured)
 
 
-def open_session(options: Options, instance, ctx):
-    """The session that the options ask for.  Raises NoHeadset, Lost."""
+def open_session(options: Options, worn: "KeptSettings", instance, ctx):
+    """The session that the options and the panel's settings ask for.  Raises NoHeadset, Lost."""
     from shapeshift.vr.openxr.session import Session
 
-    return Session(instance, ctx, options.eye_part, options.pixels, options.controllers)
+    how = (options.eye_part, options.pixels, options.controllers, worn.now.wants_insets)
+    return Session(instance, ctx, *how)
 
 
 @contextmanager
@@ -321,6 +328,7 @@ def describe(link: "HeadsetLink") -> dict:
         "hand_tracking": session.bare_hands.there,
         "pixels": session.pixels.name,
         "eyes": session.sizes,
+        "insets": session.shown.has_insets,
         "depth": session.layers.depth,
         "hidden": session.hidden_parts(),
         "passthrough": session.sees_through,

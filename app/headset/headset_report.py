@@ -17,7 +17,7 @@ from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.files.whole_file import open_lines, write_whole
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.record import Record
-from shapeshift.vr.frame import SIDES, Area, Frame, Hand
+from shapeshift.vr.frame import SIDES, Area, Frame, Hand, view_names
 from shapeshift.vr.glove import fingertip
 from shapeshift.vr.openxr.life import Life
 from shapeshift.vr.openxr.swapchain import read
@@ -58,15 +58,15 @@ class Report:
             self._lines = open_lines(lines)
 
     def note(self, done: DoneFrame, eyes: Sequence[moderngl.Framebuffer]) -> None:
-        """A frame that has been handed over, and the pictures of both eyes."""
+        """A frame that has been handed over, and the pictures of its views."""
         frame, number = done.frame, done.pace.frames
         if self._lines is not None:
             row = frame_row(done)
             self._lines.write(json.dumps(row, allow_nan=False, separators=(",", ":")) + "\n")
             self._lines.flush()
         if self._pictures is not None and frame.drawn and number % self._every == 0:
-            for side, framebuffer in zip(SIDES, eyes, strict=True):
-                save_png(read(framebuffer), self._pictures / f"{side}-{number:05d}.png")
+            for name, framebuffer in zip(view_names(len(eyes)), eyes, strict=True):
+                save_png(read(framebuffer), self._pictures / f"{name}-{number:05d}.png")
 
     def write(self, facts: dict) -> None:
         """The report itself; and a word on what has been written."""

@@ -7,7 +7,7 @@ import glfw
 import moderngl
 
 from shapeshift.renderer.gl.context import NEEDED, NoContext, open_context
-from shapeshift.vr.shown import Blit, middle
+from shapeshift.vr.shown import Blit, Inset, draw_eye
 
 TITLE = "Shapeshift in the headset"
 SIZE = (960, 720)
@@ -31,17 +31,15 @@ class Mirror:
         pressed = glfw.get_key(self._handle, glfw.KEY_ESCAPE) == glfw.PRESS
         return pressed or bool(glfw.window_should_close(self._handle))
 
-    def show(self, texture: moderngl.Texture) -> None:
-        """An eye's picture, its middle where the window has another shape."""
+    def show(self, texture: moderngl.Texture, inset: Inset | None = None) -> None:
+        """An eye's picture, its middle where the window has another shape, and its sharp inset."""
         glfw.poll_events()
         if not self._visible or glfw.get_window_attrib(self._handle, glfw.ICONIFIED):
             return
         width, height = glfw.get_framebuffer_size(self._handle)
         if not (width and height):
             return
-        screen = self.ctx.screen
-        screen.viewport = (0, 0, width, height)
-        self._shown.draw(texture, screen, middle(texture.size, (width, height)))
+        draw_eye(self._shown, self.ctx.screen, (width, height), texture, inset)
         glfw.swap_buffers(self._handle)
 
     def rest(self) -> None:
@@ -62,7 +60,7 @@ class NoMirror:
     def __init__(self) -> None:
         self.ctx = _open_without_window()
 
-    def show(self, texture: moderngl.Texture) -> None:
+    def show(self, texture: moderngl.Texture, inset: Inset | None = None) -> None:
         pass
 
     def rest(self) -> None:

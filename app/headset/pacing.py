@@ -18,6 +18,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Background
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
+from shapeshift.vr.frame import SIDES
 from shapeshift.vr.pace import FramePace
 
 AUTO = "auto"
@@ -185,21 +186,26 @@ class Pacing:
 
 
 class StereoChart:
-    """Prices the quick settings with both eyes, before anything is shown."""
+    """Prices the quick settings with all views of a frame, before anything is shown; dB are those
+    of the left eye, of its inset where that is worse.
+    """
 
     def __init__(
         self, renderer: Renderer, scene: Scene, views: Sequence[View], centre: np.ndarray,
         finish: Callable[[], None],
     ) -> None:  # fmt: skip
-        left, right = views
-        apart = np.linalg.inv(left.world_from_eye.matrix()) @ right.world_from_eye.matrix()
+        left, *others = views
+        left_from_world = np.linalg.inv(left.world_from_eye.matrix())
+        apart = [left_from_world @ view.world_from_eye.matrix() for view in others]
         self._renderer = renderer
 
         def eyes(view: View) -> list[View]:
-            pose = Pose.from_matrix(view.world_from_eye.matrix() @ apart)
-            return [view, replace(right, world_from_eye=pose)]
+            moved = [Pose.from_matrix(view.world_from_eye.matrix() @ each) for each in apart]
+            pairs = zip(others, moved, strict=True)
+            return [view, *(replace(other, world_from_eye=pose) for other, pose in pairs)]
 
-        self._chart = QuickChart(renderer, scene, left, centre, finish, eyes)
+        judged = range(0, len(views), len(SIDES))  # the left eye's
+        self._chart = QuickChart(renderer, scene, left, centre, finish, eyes, judged)
 
     def exact_ms(self) -> float:
         """Median of a few exact frames of both eyes."""

@@ -20,6 +20,8 @@ VIGNETTES = (0.0, 0.4, 0.8, 1.0)  # that the panel offers
 LEAST_SIZE, MOST_SIZE = 0.75, 2.0  # of the panel's text
 SIZES = (0.8, 1.0, 1.25, 1.5)  # that the panel offers
 HAND_MODELS = ("gloves", "controllers")  # how a hand is drawn that holds a controller
+INSETS = "quad"  # foveation by the runtime's own four views, two of them sharp insets
+INSTEAD = "medium"  # where a session has none
 WORDS: dict[str, tuple[str, ...]] = {
     "posture": POSTURES,
     "hands": HANDS,
@@ -27,7 +29,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "walking_hand": SIDES,
     "turning": TURNINGS,
     "hand_model": HAND_MODELS,
-    "foveation": FOVEATIONS,
+    "foveation": (*FOVEATIONS, INSETS),
 }
 
 
@@ -41,7 +43,7 @@ class WornSettings:
     walking_hand: str = "left"  # whose stick walks
     turning: str = "snap"
     hand_model: str = "gloves"
-    foveation: str = "off"  # how near to what one looks at all pixels are drawn
+    foveation: str = "off"  # how near to what one looks at all pixels are drawn; or INSETS
     vignette: float = 0.8  # 0: none, 1: black
     text_size: float = 1.0  # of the panel, with all that is on it
     passthrough: bool = False  # the room itself is behind the scene, where the runtime shows it
@@ -50,6 +52,16 @@ class WornSettings:
     def one_hand(self) -> str:
         """The side of the only one; "" for both."""
         return self.hands if self.hands in SIDES else ""
+
+    @property
+    def wants_insets(self) -> bool:
+        return self.foveation == INSETS
+
+    def sharp(self, has_insets: bool) -> str:
+        """RenderSettings.foveation of a session that has the four views, or has not."""
+        if not self.wants_insets:
+            return self.foveation
+        return "off" if has_insets else INSTEAD
 
     @property
     def carries(self) -> str:

@@ -232,7 +232,7 @@ class WristMenu:
     def _draw_comfort(self, _: float) -> None:
         state = self._state
         draw_comfort(state.worn.now, self._choose)
-        draw_foveation(state.worn.now, self._choose)
+        draw_foveation(state.worn.now, state.has_insets, state.offers_insets, self._choose)
         draw_see_through(state.through, state.sees_through, self._choose)
 
     def _draw_scenes(self, actions: SceneActions, scale: float) -> None:

@@ -12,7 +12,6 @@ from shapeshift.app.editor.state.arrange import poll_bodies
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
-from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.in_hand.probe import Probe
@@ -25,7 +24,6 @@ from shapeshift.app.headset.pacing import Pacing, choose_quality
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import SceneShelf
-from shapeshift.app.headset.sections.comfort_section import NO_ROOM
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.session.comeback import Comeback
 from shapeshift.app.headset.shutter import Shutter
@@ -129,7 +127,7 @@ class XrApp:
             glass=GlassState(stop_now(editor, self._wearing.glass)),
         )
         self._parts_hand = PartsHand(parts)
-        self.state.tools.open(self._probe.measure)
+        self.state.tools.open(self._probe.measure, self._probe.inspect)
         actions = MenuActions(
             self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start,
             self.shutter.recorder,
@@ -213,10 +211,7 @@ class XrApp:
         self._seconds = seconds = self._time_passed(frame)
         self.pulses.clear()
         state = self.state
-        if state.sees_through and not self.session.sees_through:  # the vendor's cameras failed
-            state.editor.messages.fail(said(NO_ROOM))
-        state.sees_through = self.session.sees_through
-        state.see_objects_alone()
+        state.follow(self.session)
         frame, moves = state.fit.worn(frame, seconds)
         stops = self._obstacles and not state.through  # the room's own are seen
         state.user.rules = replace(state.worn.now.rules(state.user.rules), obstacles=stops)
@@ -239,7 +234,7 @@ class XrApp:
                 over = replace(over, panel=None, lines=(), cards=())
             self._hand_over(frame.views, over, self.draw(views, frame.views, over))
             self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
-            self.mirror.show(self.eyes.textures[0])
+            self.mirror.show(self.eyes.textures[0], self.eyes.inset(frame.views))
             left, messages = self.eyes.framebuffers[0], state.editor.messages
             self.shutter.keep(self.shelf, left, messages, frame.seen_s)
             if frame.seen_s - self._figured_s >= FIGURES_EVERY_S:
@@ -307,7 +302,7 @@ class XrApp:
         through = self.state.through
         self.background = BLACK if through else look.background
         settings = replace(self.state.pacing.settings(), debug=look.debug)
-        fovea = self.state.worn.now.foveation
+        fovea = self.state.worn.now.sharp(self.state.has_insets)
         self.session.gaze.wanted = fovea != "off"
         settings = replace(settings, depth_scale=DEPTH_SCALE if deep else 0.0, foveation=fovea)
         settings = replace(settings, heat_ends=look.heat_ends)

@@ -6,10 +6,12 @@ from dataclasses import dataclass, field, replace
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.fitting import Fitting
 from shapeshift.app.headset.in_hand.hand_tools import HandTools
 from shapeshift.app.headset.over.glass_state import GlassState
 from shapeshift.app.headset.pacing import Pacing
+from shapeshift.app.headset.sections.comfort_section import NO_ROOM
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.scene.four_views import ALONE, FULL, has_objects
@@ -22,6 +24,7 @@ from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import play_space_before, underfoot
 from shapeshift.vr.locomotion.teleport import ground_of
 from shapeshift.vr.obstacles import Sight, look
+from shapeshift.vr.openxr.session import Session
 from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
 
 
@@ -93,6 +96,8 @@ class XrState:
     floor_shown: bool = True
     figures: Figures | None = None  # of the last second
     sees_through: bool = False  # the runtime can show the room behind pictures
+    has_insets: bool = False  # the session has a sharp inset for each eye
+    offers_insets: bool = False  # the runtime would have them
     worn: KeptSettings = field(default_factory=KeptSettings)
     glass: GlassState = field(default_factory=GlassState)
     shadows: tuple[str, ...] = ()  # of these objects, on one's own table, in this frame
@@ -104,6 +109,15 @@ class XrState:
     def __post_init__(self) -> None:
         self.fit = Fitting(self.worn)
         self.tools = HandTools(self.editor, self.parts)
+
+    def follow(self, session: Session) -> None:
+        """What the runtime can show in this frame."""
+        if self.sees_through and not session.sees_through:  # the vendor's cameras failed
+            self.editor.messages.fail(said(NO_ROOM))
+        self.sees_through = session.sees_through
+        self.has_insets = session.shown.has_insets
+        self.offers_insets = session.shown.offers_insets
+        self.see_objects_alone()
 
     @property
     def through(self) -> bool:

@@ -1,10 +1,13 @@
 """Emissivity as `thermal` is told of it: of all that is seen, and of single marks."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Protocol
 
 from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.air import Air
+from shapeshift.scene.inspection.camera_settings import camera_settings
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation, scale_of
 from shapeshift.scene.inspection.marks_file import MarksFile
 
@@ -22,6 +25,8 @@ class EmissionOptions(Protocol):
     def air(self) -> tuple[float, float, float] | None: ...
     @property
     def taken_air(self) -> tuple[float, float, float] | None: ...
+    @property
+    def taken_as(self) -> Path | None: ...
 
 
 def choose_emission(
@@ -47,22 +52,50 @@ def choose_emission(
             of_all = share
     marked = own or any(mark.emissivity is not None for mark in file.marks)
     before = file.emission
-    given = (of_all, options.reflected, options.taken_with, options.air, options.taken_air)
+    given = (
+        of_all, options.reflected, options.taken_with, options.air, options.taken_air,
+        options.taken_as,
+    )  # fmt: skip
     if not (before or marked or any(each is not None for each in given)):
         return None, own
+    camera = _camera(options, unit)
     try:
         scale_of(unit)
-        known = before or Emission()
+        known = before or as_set(camera)
         surface = SurfaceRadiation(
             known.surface.emissivity if of_all is None else of_all,
             known.surface.reflected if options.reflected is None else options.reflected,
         )
-        taken = SurfaceRadiation(*options.taken_with) if options.taken_with else known.taken
+        taken, camera_air = camera or (known.taken, known.taken_air)
+        taken = SurfaceRadiation(*options.taken_with) if options.taken_with else taken
         air = Air(*options.air) if options.air else known.air
-        camera_air = Air(*options.taken_air) if options.taken_air else known.taken_air
+        camera_air = Air(*options.taken_air) if options.taken_air else camera_air
     except ValueError as error:
         raise UsageError(str(error)) from None
     return Emission(surface, taken, air, camera_air), own
+
+
+def _camera(options: EmissionOptions, unit: str) -> tuple[SurfaceRadiation, Air] | None:
+    """What the camera of a radiometric photo was set to.  Raises UsageError, one sentence."""
+    if options.taken_as is None:
+        return None
+    if unit not in ("°C", "C"):
+        raise UsageError(
+            f"--taken-as is of values in °C, as radiometric photos have them; the stop's are in "
+            f"'{unit}': give --taken-with and --taken-air."
+        )
+    try:
+        return camera_settings(options.taken_as)
+    except BadFile as refused:
+        raise UsageError(f"--taken-as: {refused}") from None
+
+
+def as_set(camera: tuple[SurfaceRadiation, Air] | None) -> Emission:
+    """What changes no value: surfaces and air as the camera was set to."""
+    if camera is None:
+        return Emission()
+    surface, air = camera
+    return Emission(surface, surface, air, air)
 
 
 def with_emissivities(file: MarksFile, own: dict[str, float]) -> MarksFile:

@@ -66,6 +66,10 @@ class Options(ReadingOptions):
     taken_air: tuple[float, float, float] | None = None
     """The same as the camera was set to, of which its values are free already, as those of
     radiometric JPEG.  Default: that of the file of marks, else none."""
+    taken_as: Path | None = None
+    """One of the radiometric JPEGs that the scene was trained from, which says what the camera was
+    set to; --emissivity, --reflected and --air are then as there, too, where they are not given.
+    Default: none."""
     level: float | None = None
     """The value in the middle of the palette.  Default: that of the stop's range."""
     span: float | None = None

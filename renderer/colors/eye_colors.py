@@ -15,6 +15,7 @@ from shapeshift.scene.scene import Scene
 # and on networks they were 5 to 14 dB better over the pixels that are covered (docs/vr.md); the 8
 # bits of a headset's pictures cost 58.9 dB.
 SHARED_DB = 55.0
+SAME_PLACE_M = 1e-4  # views nearer to each other are one eye's, whose insets have its place
 NEAREST = 1.0  # percent of the splats: how far these are is how near the object is
 SAMPLE = 4096  # splats or anchors that tell
 
@@ -56,6 +57,30 @@ def shared_is_enough(scene: Scene, looks: list[EyeColors], views: list[View]) ->
             if not look.shared_db(eyes) >= SHARED_DB:
                 return False
     return True
+
+
+def eyes_among(views: list[View]) -> list[int]:
+    """Of each view the number of its eye: those from one place, a wide view and an inset in it,
+    see the same colours.
+    """
+    places = np.array([view.world_from_eye.position for view in views])
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    alike = apart <= SAME_PLACE_M
+    first = np.argmax(alike, axis=1)  # of each view, the first one from its place
+    return [int(np.flatnonzero(np.unique(first) == each)[0]) for each in first]
+
+
+def by_eye(views: list[View], own: bool, most: int) -> tuple[list[int], list[list[View]]]:
+    """Which set of colours each view has, and the views of each set: own: one an eye, where these
+    are no more than `most`; else one for all.
+    """
+    eyes = eyes_among(views) if own else [0] * len(views)
+    if max(eyes) >= most:
+        eyes = [0] * len(views)
+    groups: list[list[View]] = [[] for _ in range(max(eyes) + 1)]
+    for eye, view in zip(eyes, views, strict=True):
+        groups[eye].append(view)
+    return eyes, groups
 
 
 def drawn_together(scene: Scene, views: int, own_colors: bool) -> list[slice]:

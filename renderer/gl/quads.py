@@ -146,8 +146,8 @@ class QuadsDrawing(Drawing):
         plan = self._sort_policy.plan(views, settings, *asked)
         self._changed = False
         self.sorts, self.order_age = plan.sorts, plan.age
-        at_once = len(views) <= MOST_VIEWS and arena.holds_views(len(views)) and not canted
-        groups = [views] if at_once else [[view] for view in views]
+        at_once = MOST_VIEWS if arena.holds_views(MOST_VIEWS) and not canted else 1
+        groups = [views[n : n + at_once] for n in range(0, len(views), at_once)]
         # One order for views that are projected one by one must hold what the first does not see.
         keep_outside = plan.keep_outside or (len(groups) > 1 and not canted)
         i = 0

@@ -116,6 +116,24 @@ def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
 
     Emissivity, distance and air are those that the camera was set to.  Raises BadFile.
     """
+    celsius, _ = read_radiometric(path)
+    height, width = celsius.shape
+    if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
+        raise BadFile(
+            f"{path_end(path)}: {width}x{height} numbers in a picture of {size[0]}x{size[1]}; both "
+            "must show the same field of view"
+        )
+    picture = Image.fromarray(celsius)
+    if picture.size != size:
+        picture = picture.resize(size, Image.Resampling.BILINEAR)
+    return np.asarray(picture, np.float32)
+
+
+def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
+    """(H, W) float32 °C of a radiometric JPEG as its camera was set, and to what, by flyr's names.
+
+    Raises BadFile.
+    """
     where = path_end(path)
     try:
         import flyr
@@ -133,18 +151,10 @@ def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
     most = max([len(data) // 2, *(width * height for width, height in sides)])
     Memory().of(path).charge(RAW * most, f"{most:,} numbers")
     try:
-        celsius = np.asarray(flyr.unpack(io.BytesIO(data)).celsius, np.float32)
+        opened = flyr.unpack(io.BytesIO(data))
+        with np.errstate(all="ignore"):  # of a camera set to nonsense: NaN stays
+            return np.asarray(opened.celsius, np.float32), dict(opened.metadata)
     except Exception as error:  # of a parser that checks nothing: any
         raise BadFile(
             f"{where}: its thermal numbers cannot be read ({error}); copy it again"
         ) from None
-    height, width = celsius.shape
-    if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
-        raise BadFile(
-            f"{where}: {width}x{height} numbers in a picture of {size[0]}x{size[1]}; both must "
-            "show the same field of view"
-        )
-    picture = Image.fromarray(celsius)
-    if picture.size != size:
-        picture = picture.resize(size, Image.Resampling.BILINEAR)
-    return np.asarray(picture, np.float32)

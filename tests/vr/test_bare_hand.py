@@ -145,3 +145,24 @@ def test_joints_in_one_place_are_numbers_all_the_same():
     for pose in (hand.grip, hand.aim):
         assert np.isfinite(pose.matrix()).all()
     assert 0 <= hand.squeeze <= 1 and 0 <= hand.trigger <= 1
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_joints_in_one_place_have_no_direction_and_divide_by_nothing(side):
+    """What runtimes say of a finger that they lose, and of a hand of one point: lines of a report
+    have no room for NaN.
+    """
+    joints = joints_of(side)
+    joints[9] = joints[10]
+    np.testing.assert_array_equal(fingertip(side, Hand(joints=joints)), joints[10, :3])
+    joints[9, :3] += 1e-12  # nearer than a bone
+    np.testing.assert_array_equal(fingertip(side, Hand(joints=joints)), joints[10, :3])
+    joints = joints_of(side)
+    joints[9, :3] = joints[10, :3] - (0.0, 0.0, 2e-6)
+    tip = joints[10, :3] + (0.0, 0.0, joints[10, 3])
+    np.testing.assert_allclose(fingertip(side, Hand(joints=joints)), tip, atol=1e-12)
+    joints[:, :3] = joints[0, :3]
+    hand = Hand(True, grip=Pose(joints[0, :3], np.array([1.0, 0, 0, 0])), joints=joints)
+    for part in glove(side, hand):
+        assert np.isfinite([*part.a, *part.b, *part.radii]).all()

@@ -139,7 +139,7 @@ def test_nothing_to_draw_leaves_the_picture_and_the_context_alone(ctx, overlay, 
     other = ctx.framebuffer([ctx.texture((8, 8), 4)])
     other.use()
     image = picture(overlay, target, Drawn())
-    assert (image == GROUND).all() and overlay._target is None  # no memory
+    assert (image == GROUND).all() and not overlay._targets  # no memory
     drawn = drawn_of({"left": LEFT, "right": RIGHT}, shown(right=RIGHT))
     assert (picture(overlay, target, drawn) != GROUND).any()
     assert ctx.fbo is other and ctx.error == "GL_NO_ERROR"

@@ -4,8 +4,18 @@ import moderngl
 import numpy as np
 import pytest
 
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import IDENTITY
 from shapeshift.vr.openxr.swapchain import FORMATS, choose_format, read
-from shapeshift.vr.shown import WHOLE, Blit, middle
+from shapeshift.vr.shown import (
+    WHOLE,
+    Blit,
+    Inset,
+    draw_eye,
+    middle,
+    part_of_whole,
+    pixels_of,
+)
 
 SIZE = (64, 48)
 GL_SRGB8_ALPHA8, GL_FRAMEBUFFER_SRGB = 0x8C43, 0x8DB9
@@ -124,3 +134,36 @@ def test_display_values_are_wanted_first_and_light_only_with_enough_bits():
         choose_format([0x1234])
     with pytest.raises(ValueError, match="no format of RGBA16 among"):
         choose_format([0x8C43], "RGBA16")
+
+
+def test_an_inset_lies_in_its_place_over_an_eye_s_picture(ctx, shown):
+    """Blocks of one colour each: where one ends and the other begins is counted in pixels."""
+    wide = ctx.texture((32, 24), 4, bytes([0, 0, 255, 255]) * (32 * 24))
+    fine = ctx.texture((40, 40), 4, bytes([255, 0, 0, 255]) * (40 * 40))
+    target = ctx.framebuffer([ctx.texture((64, 48), 4)])
+    draw_eye(shown, target, (64, 48), wide, Inset(fine, (0.25, 0.5, 0.5, 0.25)))
+    seen = read(target)
+    red = (seen == (1, 0, 0)).all(-1)
+    wanted = np.zeros((48, 64), bool)
+    wanted[48 - 36 : 48 - 24, 16:48] = True  # from below 0.5 to 0.75, rows on top first
+    np.testing.assert_array_equal(red, wanted)
+    assert (seen[~red] == (0, 0, 1)).all()
+    draw_eye(shown, target, (64, 48), wide)
+    assert (read(target) == (0, 0, 1)).all()
+
+
+def test_an_inset_is_cut_where_the_window_is():
+    """A window half as wide shows the middle half: what is left of it has negative pixels."""
+    seen = middle((200, 100), (100, 100))
+    assert seen == (0.25, 0.0, 0.5, 1.0)
+    assert pixels_of((0.25, 0.5, 0.5, 0.25), seen, (100, 100)) == (0, 50, 100, 25)
+    assert pixels_of((0.0, 0.0, 0.5, 0.5), seen, (100, 100)) == (-50, 0, 100, 50)
+    assert pixels_of((0.5, 0.5, 1e-9, 1e-9), seen, (100, 100)) == (50, 50, 1, 1)
+
+
+def test_a_part_lies_where_its_tangents_say():
+    whole = View(IDENTITY, (-0.9, 0.6, -0.7, 0.8), 0.05, 50.0, (150, 150))
+    assert part_of_whole(whole) is None
+    part = whole.part(30, 45, (60, 15))
+    assert part_of_whole(part) == pytest.approx((0.2, 0.6, 0.4, 0.1))
+    assert part_of_whole(whole.part(0, 0, (150, 150))) == pytest.approx(WHOLE)

@@ -84,23 +84,18 @@ def frame_of(glass: HeldGlass) -> list[Capsule]:
 
 
 def boxes_of(glass: HeldGlass, views: Sequence[View]) -> list[PixelBox] | None:
-    """The pixels of each eye, in the room, that the glass may cover: equally many in all, so that
-    both are drawn at once; None where no eye sees it.
+    """The pixels of each view, in the room, that the glass may cover: equally many in those of one
+    size, so that both eyes are drawn at once, few where none of them sees it; None where no view
+    does.
     """
     spans = [_span(glass, view) for view in views]
-    seen = [span for span in spans if span is not None]
-    if not seen:
+    if all(span is None for span in spans):
         return None
-    sizes = [view.size for view in views]
-    size = [
-        min(
-            -(-max(span[axis + 2] for span in seen) // STEP_PX) * STEP_PX,
-            min(s[axis] for s in sizes),
-        )
-        for axis in (0, 1)
-    ]
     boxes = []
     for span, view in zip(spans, views, strict=True):
+        alike = [s for s, v in zip(spans, views, strict=True) if s and v.size == view.size]
+        most = [max((s[axis + 2] for s in alike), default=1) for axis in (0, 1)]
+        size = [min(-(-most[i] // STEP_PX) * STEP_PX, view.size[i]) for i in (0, 1)]
         low = [0, 0]
         if span is not None:
             low = [min(span[axis], view.size[axis] - size[axis]) for axis in (0, 1)]

@@ -4,14 +4,16 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 NAME = "Shapeshift"
 API = (1, 0, 34)  # every runtime still in use speaks it
+API_OF_INSETS = (1, 1, 0)  # from it on four views a frame need no extension
 DRAWING = ("XR_KHR_opengl_enable", "XR_MNDX_egl_enable")  # one of them is needed
 LOCAL_FLOOR, DISPLAY_RATE = "XR_EXT_local_floor", "XR_FB_display_refresh_rate"
 DEPTH_LAYER, HAND_TRACKING = "XR_KHR_composition_layer_depth", "XR_EXT_hand_tracking"
 VISIBILITY_MASK, PASSTHROUGH = "XR_KHR_visibility_mask", "XR_FB_passthrough"
-EYE_GAZE = "XR_EXT_eye_gaze_interaction"
+EYE_GAZE, QUAD_VIEWS = "XR_EXT_eye_gaze_interaction", "XR_VARJO_quad_views"
 WANTED = (
     LOCAL_FLOOR,
     DISPLAY_RATE,
@@ -20,6 +22,7 @@ WANTED = (
     VISIBILITY_MASK,
     PASSTHROUGH,
     EYE_GAZE,
+    QUAD_VIEWS,
 )  # good to have
 HOW_TO = (
     "start SteamVR, WiVRn or Monado and make it the active OpenXR runtime, "
@@ -40,19 +43,18 @@ class Instance:
 
     `xr`: pyopenxr, loaded only here; `handle`, `system`: what its functions want; `runtime`: name
     and version, `headset`: what the runtime calls it; `extensions`: those that are switched on.
+
+    insets: four views a frame are wanted, which the newer OpenXR has without an extension.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, insets: bool = False) -> None:
         self.xr = xr = load()
         self.runtime = "the active OpenXR runtime"
         self.extensions = self._choose_extensions()
-        info = xr.InstanceCreateInfo(
-            application_info=xr.ApplicationInfo(NAME, 1, NAME, 0, xr.Version(*API)),
-            enabled_extension_names=list(self.extensions),
-        )
+        newer = insets and QUAD_VIEWS not in self.extensions
         try:
             with self.asked("open"):
-                self.handle = xr.create_instance(info)
+                self.handle = self._create(newer)
         except xr.exception.ErrorResult as error:
             raise NoHeadset(
                 f"{self.runtime} refuses us ({type(error).__name__}); update it, or {HOW_TO}."
@@ -63,6 +65,21 @@ class Instance:
         except BaseException:
             self.close()
             raise
+
+    def _create(self, newer: bool) -> Any:
+        """By the newer OpenXR where the runtime speaks it, else by the one that all speak."""
+        xr = self.xr
+        for version in (API_OF_INSETS, API) if newer else (API,):
+            info = xr.InstanceCreateInfo(
+                application_info=xr.ApplicationInfo(NAME, 1, NAME, 0, xr.Version(*version)),
+                enabled_extension_names=list(self.extensions),
+            )
+            try:
+                return xr.create_instance(info)
+            except xr.exception.ApiVersionUnsupportedError:
+                if version == API:
+                    raise
+        raise AssertionError("the last version is API")
 
     def _choose_extensions(self) -> tuple[str, ...]:
         with self.asked("list its extensions"):

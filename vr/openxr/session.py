@@ -2,7 +2,7 @@
 
     with Instance() as instance, Session(instance, ctx) as session:
         for frame in session.frames():
-            session.submit(textures)  # one an eye, display-encoded, of session.sizes
+            session.submit(textures)  # one a view, display-encoded, of session.sizes
 
 The order of a frame is the runtime's: wait, begin, locate, draw, hand over, end.
 """
@@ -42,6 +42,7 @@ from shapeshift.vr.openxr.life import BEGIN, END, LOST, Life
 from shapeshift.vr.openxr.passthrough import Passthrough
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import choose_format
+from shapeshift.vr.openxr.view_configuration import choose_views, with_insets
 from shapeshift.vr.openxr.visibility import VisibilityMasks
 from shapeshift.vr.pace import FramePace
 
@@ -52,7 +53,8 @@ MOST_ERRORS = 16  # of GL that a runtime may have left behind
 class Session:
     """One session on the GL context that is current; use it in a `with`.
 
-    `sizes`: (width, height) of each eye's picture; `play`, `hands`, `life`, `pace` as named.
+    `sizes`: (width, height) of each view's picture; `shown`: which views there are; `play`,
+    `hands`, `life`, `pace` as named.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Session:
         part: float = 1.0,  # of the runtime's width and height of an eye
         pixels: str = "",  # name of a Format; "": the best
         controllers: bool = True,  # False: hands are seen without, even where there are any
+        insets: bool = False,  # for each eye a sharp inset too, where the runtime has that
     ) -> None:
         self._instance, self._ctx, self._xr = instance, ctx, instance.xr
         self.life, self.pace = Life(), FramePace()
@@ -70,10 +73,11 @@ class Session:
         self._pending: list[Recentred] = []
         self._open: Any | None = None  # the runtime's state of the frame under way
         self._views: tuple = ()  # the runtime's, of the open frame
-        self._shown: list[View] = []  # the same, ours
+        self._located: tuple[View, ...] = ()  # the same, ours
         self._start_ns: int | None = None
         self._before_s = self._seen_s = 0.0  # at the first frame; of the last one
-        self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
+        self.shown = choose_views(instance, insets)
+        self._head, self._eyes = IDENTITY, [IDENTITY] * len(self.shown.views)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
         self.hands, self.gaze = Hands(instance.handle), Gaze(instance)
@@ -86,7 +90,7 @@ class Session:
         self._controllers, self.bare_hands = controllers, HandTrackers(instance, self._handle)
         self.pace.display_s = display_period(instance, self._handle)
         self.layers = self._make_layers(part, pixels)
-        self.masks = VisibilityMasks(instance, self._handle, len(self.layers.sizes))
+        self.masks = VisibilityMasks(instance, self._handle, self.shown)
 
     def _create(self) -> Any:
         xr, instance = self._xr, self._instance
@@ -105,19 +109,17 @@ class Session:
 
     def _make_layers(self, part: float, pixels: str) -> FrameLayers:
         xr, instance = self._xr, self._instance
-        stereo = xr.ViewConfigurationType.PRIMARY_STEREO
-        system = (instance.handle, instance.system, stereo)
+        system = (instance.handle, instance.system, self.shown.kind)
         blends = xr.enumerate_environment_blend_modes(*system)
         self._blend, self._alpha = choose_blend(xr, blends), xr.EnvironmentBlendMode.ALPHA_BLEND
         self._blends_alpha = int(self._alpha) in map(int, blends)
         self._passthrough = Passthrough(instance, self._handle, not self._blends_alpha)
-        views = xr.enumerate_view_configuration_views(*system)
         offered = [int(each) for each in xr.enumerate_swapchain_formats(self._handle)]
         try:
             self.pixels = choose_format(offered, pixels)
         except ValueError as none:
             raise NoHeadset(f"{instance.runtime}: {none}") from None
-        sizes = [eye_size(view, part) for view in views]
+        sizes = [eye_size(view, part) for view in self.shown.views]
         return FrameLayers(instance, self._handle, self._ctx, sizes, self.pixels)
 
     @property
@@ -156,9 +158,9 @@ class Session:
         quad: QuadPicture | None = None,
         see_through: bool = False,
     ) -> None:
-        """Shows one display-encoded RGBA8 picture an eye, of `sizes`, row 0 at the bottom.
+        """Shows one display-encoded RGBA8 picture a view, of `sizes`, row 0 at the bottom.
 
-        write_depth: draws how deep an eye's picture is.  quad: lies behind the eyes' pictures,
+        write_depth: draws how deep a view's picture is.  quad: lies behind the eyes' pictures,
         where their alpha is below 1.  see_through: there the room itself is seen.
         """
         through = see_through and self.sees_through
@@ -170,8 +172,8 @@ class Session:
         self._end([ctypes.byref(layer) for layer in every], through)
 
     def hidden_parts(self) -> list[float]:
-        """Of each eye's picture the share that its lens does not show, as the runtime tells it."""
-        return [round(float(hidden_pixels(view).mean()), 4) for view in self._shown]
+        """Of each view's picture the share that its lens does not show, as the runtime tells it."""
+        return [round(float(hidden_pixels(view).mean()), 4) for view in self._located]
 
     def leave(self) -> None:
         """Asks the runtime to end the session; frames() goes on until it has."""
@@ -212,8 +214,7 @@ class Session:
     def _enter_state(self, state: str) -> None:
         xr, act = self._xr, self.life.enter(state)
         if act == BEGIN:
-            stereo = xr.ViewConfigurationType.PRIMARY_STEREO
-            xr.begin_session(self._handle, xr.SessionBeginInfo(stereo))
+            xr.begin_session(self._handle, xr.SessionBeginInfo(self.shown.kind))
         elif act == END:
             xr.end_session(self._handle)
             self.pace.pause()
@@ -258,17 +259,15 @@ class Session:
             self._head = known_part(pose, self._head, placed, turned)
 
     def _locate_eyes(self, now: int) -> tuple[tuple[View, ...], bool]:
-        """play_from_eye of both, and whether the runtime knows how they are turned."""
+        """play_from_eye of all views, and whether the runtime knows how they are turned."""
         xr = self._xr
-        stereo = xr.ViewConfigurationType.PRIMARY_STEREO
-        asked = xr.ViewLocateInfo(stereo, now, self.play.handle)
+        asked = xr.ViewLocateInfo(self.shown.kind, now, self.play.handle)
         state, self._views = xr.locate_views(self._handle, asked)
         placed, turned = valid(xr.ViewStateFlags, state.view_state_flags)
-        left, right = (
+        self._eyes = [
             known_part(pose_of(view.pose), old, placed, turned)
             for view, old in zip(self._views, self._eyes, strict=True)
-        )
-        self._eyes = left, right
+        ]
         ahead = self.gaze.direction(self.play.handle, now) if self.life.focused else None
         views = [
             View(
@@ -284,8 +283,8 @@ class Session:
                 zip(self._eyes, self._views, self.sizes, strict=True)
             )
         ]
-        self._shown = views
-        return tuple(views), turned
+        self._located = with_insets(views)
+        return self._located, turned
 
     def _recentred(self, now: int) -> bool:
         """Whether play space has had another origin since the last frame."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.scene.pose import HiddenMesh
 from shapeshift.vr.openxr.instance import VISIBILITY_MASK, Instance
+from shapeshift.vr.openxr.view_configuration import ViewConfiguration
 
 HIDDEN = 1  # XR_VISIBILITY_MASK_TYPE_HIDDEN_TRIANGLE_MESH_KHR
 MOST = 1 << 20  # corners: a mesh with more is no mesh
@@ -16,18 +17,18 @@ CRASHES = "Monado"
 
 
 class VisibilityMasks:
-    """`of(i)`: the hidden mesh of eye i, None where the runtime tells none."""
+    """`of(i)`: the hidden mesh of view i, None where the runtime tells none."""
 
-    def __init__(self, instance: Instance, session: Any, eyes: int) -> None:
-        self._instance, self._session, self._eyes = instance, session, eyes
-        self._meshes: list[HiddenMesh | None] = [None] * eyes
+    def __init__(self, instance: Instance, session: Any, shown: ViewConfiguration) -> None:
+        self._instance, self._session, self._shown = instance, session, shown
+        self._meshes: list[HiddenMesh | None] = [None] * len(shown.views)
         self.ask()
 
     def of(self, i: int) -> HiddenMesh | None:
         return self._meshes[i]
 
     def ask(self) -> None:
-        """Reads the meshes of all eyes anew."""
+        """Reads the meshes of all views anew."""
         xr, instance = self._instance.xr, self._instance
         if VISIBILITY_MASK not in instance.extensions or CRASHES in instance.runtime:
             return
@@ -35,12 +36,12 @@ class VisibilityMasks:
         ask = ctypes.CFUNCTYPE(
             ctypes.c_int, xr.Session, ctypes.c_int, ctypes.c_uint32, ctypes.c_int, ctypes.c_void_p
         )(ctypes.cast(address, ctypes.c_void_p).value or 0)
-        stereo = int(xr.ViewConfigurationType.PRIMARY_STEREO)
+        kind, views = int(self._shown.kind), range(len(self._meshes))
 
         def fill(i: int, mask: Any) -> bool:
-            return ask(self._session, stereo, i, HIDDEN, ctypes.addressof(mask)) == 0
+            return ask(self._session, kind, i, HIDDEN, ctypes.addressof(mask)) == 0
 
-        self._meshes = [read_mask(xr, lambda mask, i=i: fill(i, mask)) for i in range(self._eyes)]
+        self._meshes = [read_mask(xr, lambda mask, i=i: fill(i, mask)) for i in views]
 
 
 def read_mask(xr: Any, fill: Any) -> HiddenMesh | None:

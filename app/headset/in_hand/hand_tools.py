@@ -1,26 +1,37 @@
 """The tools that a hand of the headset can have, in their order; one of them has its trigger."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
+from shapeshift.app.document import Document
 from shapeshift.app.editor.state.arrange import undo
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.view_report import write_view_report
 from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.section_tool import SectionTool
 from shapeshift.app.editor.state.user.settings import ProgramSettings
+from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.in_hand.finger_brush import FingerBrush
 from shapeshift.app.headset.in_hand.held_shapes import HeldShapes
+from shapeshift.app.headset.in_hand.probe import REPORT_PX, before_head
 from shapeshift.app.headset.in_hand.ray_marks import Measure, RayMarks
-from shapeshift.app.paths import config_folder
+from shapeshift.app.inspection.draw_values import ThermalScene
+from shapeshift.app.inspection.inspect_view import InspectedView
+from shapeshift.app.paths import WorkFolders, config_folder
 from shapeshift.runtime_models.files.json_fields import control_row
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.sections.section import PlaneShape
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.panel.carried import Carried
 
+Inspect = Callable[[Document, ThermalScene, View], InspectedView]
 AHEAD_M, BELOW_M = 0.45, 0.2  # of the room, from the head: where a section is brought to
 DECIMALS = 6
 
@@ -37,6 +48,9 @@ class HandTools:
     shapes: HeldShapes = field(init=False)
     brush: FingerBrush = field(init=False)
     marks: RayMarks = field(init=False)
+    inspect: Inspect | None = None  # None: nothing can be drawn
+    wants_report: bool = False  # of what the head has before it in the next frame
+    folder: Path | None = None  # of reports; None: the exports
     _pulled: str = ""  # which of them had the trigger in the frame before
     _before: tuple[np.ndarray, np.ndarray] | None = None  # a place before the head, its right
 
@@ -46,9 +60,9 @@ class HandTools:
         self.brush = FingerBrush(self.editor)
         self.marks = RayMarks(self.inspecting)
 
-    def open(self, measure: Measure) -> None:
+    def open(self, measure: Measure, inspect: Inspect | None = None) -> None:
         """A scene that was opened, with the marks beside it."""
-        self.marks.measure = measure
+        self.marks.measure, self.inspect = measure, inspect
         self.unit = ProgramSettings.read(config_folder()).temperature
         self.inspecting.opened()
 
@@ -65,7 +79,24 @@ class HandTools:
         frame = self.brush.act(frame, play_space, carried, seconds)
         frame = self.marks.act(frame, play_space, carried, shown)
         self.editor.record_regions()
+        if self.wants_report:
+            self.wants_report = False
+            self._report(before_head(frame.head, play_space, REPORT_PX))
         return frame
+
+    def _report(self, view: View) -> None:
+        """One HTML file of a view with all its marks; the session waits for it."""
+        tool, thermal = self.inspecting, self.inspecting.thermal
+        if thermal is None or self.inspect is None:
+            return
+        folder, title = self.folder or WorkFolders.of().exports, self.editor.title
+        try:
+            inspected = self.inspect(tool.document, thermal, view)
+            path = write_view_report(tool, thermal, title, inspected, folder)
+        except (BadFile, ValueError, OSError) as error:
+            tool.fail(said("No report was written: {error}", error=error))
+            return
+        tool.note(said("Saved {path}", path=path))
 
     def _one_trigger(self) -> None:
         """What was taken last has it; the others are put away."""

@@ -38,7 +38,7 @@ class Looking:
 
     glass: HeldGlass
     scene: Scene  # behind it
-    boxes: list[PixelBox]  # pixels, one an eye
+    boxes: list[PixelBox]  # pixels, one a view
     views: list[View]  # of these, in the world
     together: bool  # nothing but colours differs: from the order of the eyes
 

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import item_label
 from shapeshift.app.editor.texts.table import said
-from shapeshift.app.headset.worn_settings import SIZES, VIGNETTES, WornSettings
+from shapeshift.app.headset.worn_settings import INSETS, SIZES, VIGNETTES, WornSettings
 
 Vec = imgui.ImVec2
 POSTURE_NAMES = {"standing": "Standing", "seated": "Seated"}
@@ -18,7 +18,11 @@ WALK_NAMES = {"left": "Walk: left", "right": "Walk: right"}
 MODEL_NAMES = {"gloves": "Gloves", "controllers": "Controllers"}
 TURN_NAMES = {"snap": "Snap turns", "smooth": "Smooth", "none": "By body"}
 SHARP = "sharp around the gaze"
-SHARP_NAMES = {"off": "All over", "low": "35°", "medium": "25°", "high": "15°"}
+SHARP_NAMES = {
+    "off": "All over", "low": "35°", "medium": "25°", "high": "15°", INSETS: "Quad views",
+}  # fmt: skip
+LATER = "Quad views begin with the next session; until then 25°."
+NO_INSETS = "The runtime offers no quad views; 25° instead."
 ROOM, NO_ROOM = "the room behind the scene", "The runtime shows no room behind pictures."
 EDGE, TEXT = "dark edge while moving", "size of this panel"
 
@@ -38,22 +42,32 @@ def draw_comfort(settings: WornSettings, choose: Callable[..., None]) -> None:
         _row(name, offered, labels, settings, choose)
 
 
-def draw_foveation(settings: WornSettings, choose: Callable[..., None]) -> None:
-    """How far from what one looks at all pixels are drawn."""
+def draw_foveation(
+    settings: WornSettings, has_insets: bool, offered: bool, choose: Callable[..., None]
+) -> None:
+    """How far from what one looks at all pixels are drawn; and where the runtime's own insets are
+    wanted and not there, what is done instead.
+    """
     imgui.text_disabled(said(SHARP))
     _words("foveation", SHARP_NAMES, settings, choose)
+    if settings.wants_insets and not has_insets:
+        _sentence(LATER if offered else NO_INSETS)
 
 
 def draw_see_through(shown: bool, offered: bool, choose: Callable[..., None]) -> None:
     """A box to check where the runtime shows the room; else that it does not."""
     if not offered:
-        imgui.push_text_wrap_pos(0)
-        imgui.text_disabled(said(NO_ROOM))
-        imgui.pop_text_wrap_pos()
+        _sentence(NO_ROOM)
         return
     changed, wanted = imgui.checkbox(item_label(ROOM), shown)
     if changed:
         choose(passthrough=wanted)
+
+
+def _sentence(text: str) -> None:
+    imgui.push_text_wrap_pos(0)
+    imgui.text_disabled(said(text))
+    imgui.pop_text_wrap_pos()
 
 
 def _words(

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 from imgui_bundle import imgui
 
@@ -76,7 +77,9 @@ def _draw_inspect(tools: HandTools, scale: float) -> None:
         if changed:
             tool.on = on
     else:
-        actions = InspectActions(_toggle(tools), lambda: setattr(marks, "wants_auto", True))
+        auto = partial(setattr, marks, "wants_auto", True)
+        report = partial(setattr, tools, "wants_report", True) if tools.inspect else None
+        actions = InspectActions(_toggle(tools), auto, report)
         draw_inspect(tool, actions, tools.unit, scale)
         _ends(tools)
     if tool.on:

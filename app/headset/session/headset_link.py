@@ -37,12 +37,14 @@ class Wearer(Protocol):
 class HeadsetLink:
     """`instance` and `session`: those in use now; `reopened`: how often.  Use it in a `with`.
 
-    patience_s: how long a lost one is tried for.  Raises NoHeadset, Lost where the first cannot be
-    had.
+    patience_s: how long a lost one is tried for.  insets: whether four views a frame are wanted
+    now.  Raises NoHeadset, Lost where the first cannot be had.
     """
 
-    def __init__(self, make: Open, patience_s: float) -> None:
-        self._make, self._patience_s = make, patience_s
+    def __init__(
+        self, make: Open, patience_s: float, insets: Callable[[], bool] = lambda: False
+    ) -> None:
+        self._make, self._patience_s, self._insets = make, patience_s, insets
         self.reopened = 0
         self.session: Session
         self._ctx: moderngl.Context
@@ -60,7 +62,7 @@ class HeadsetLink:
             self._ends.close()
 
     def _find(self) -> Instance:
-        return self._ends.enter_context(Instance())
+        return self._ends.enter_context(Instance(self._insets()))
 
     def _open(self) -> Session:
         return self._ends.enter_context(self._make(self.instance, self._ctx))

@@ -82,6 +82,20 @@ def test_the_sharp_middle_is_pressed_on_the_panel(wearer):
         assert wearer.state.worn.now.foveation == level
 
 
+@pytest.mark.parametrize("has", [False, True])
+def test_quad_views_are_pressed_on_the_panel(wearer, has):
+    """Until the next session has them, 25 degrees stand for them; in one all is left to them."""
+    wearer.state.has_insets = wearer.state.offers_insets = has
+    wearer.unfold("Comfort")
+    wearer.scroll_to("Performance")
+    wearer.press("Quad views")
+    worn = wearer.state.worn.now
+    assert worn.wants_insets and worn.foveation == "quad"
+    assert worn.sharp(wearer.state.has_insets) == ("off" if has else "medium")
+    wearer.press("15\u00b0")
+    assert wearer.state.worn.now.sharp(has) == "high", "within four views, too"
+
+
 def test_the_room_is_behind_the_scene_where_it_can_be(wearer):
     wearer.unfold("Comfort")
     wearer.scroll_to("Performance")

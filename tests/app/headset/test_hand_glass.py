@@ -20,6 +20,7 @@ from shapeshift.scene.selectors.selector import Sphere
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.frame import LOST, SIDES
 from shapeshift.vr.glass.held import RADIUS_M
+from shapeshift.vr.openxr.view_configuration import with_insets
 from shapeshift.vr.panel.carried import Carried
 from shapeshift.vr.touching import Touched
 from tests.support.renderer.frames import texture_target
@@ -32,6 +33,9 @@ from tests.support.vr.vr_panel import Wearer, a_state, some_things
 RENDERERS = EITHER_ON_GL
 SIZE = (320, 290)  # of away_of, too
 EYES = eyes(SIZE)
+# With insets in which the glass lies off the middle, a third as wide as the eyes see.
+INSETS = [replace(view, tangents=(-0.42, 0.28, -0.35, 0.40)) for view in EYES]
+FOUR = with_insets([*EYES, *INSETS])
 ALIKE = model(40, "offset", "scale", "rotation", "opacity")  # networks that see no control
 OTHER = model(40)  # its shape follows the control
 
@@ -150,7 +154,10 @@ def pixels(framebuffer: moderngl.Framebuffer) -> np.ndarray:
 
 
 @pytest.mark.parametrize("what", [ALIKE, OTHER], ids=["other colours", "another shape"])
-def test_each_eye_sees_the_other_stop_from_its_own_place_within_the_disc(ctx, renderer, what):
+@pytest.mark.parametrize("views", [EYES, FOUR], ids=["eyes", "insets"])
+def test_each_eye_sees_the_other_stop_from_its_own_place_within_the_disc(
+    ctx, renderer, what, views
+):
     """Against whole pictures of both stops, of a renderer that knows no glass."""
     renderer.settings = RenderSettings(background=(0.1, 0.2, 0.3), stereo_colors="shared")
     state, scene = a_world(what)
@@ -159,32 +166,32 @@ def test_each_eye_sees_the_other_stop_from_its_own_place_within_the_disc(ctx, re
     with texture_target(ctx, SIZE) as target:
         for each in (scene, hot):
             renderer.update(each)
-            renderer.draw(list(EYES))
-            for i in range(2):
+            renderer.draw(list(views))
+            for i in range(len(views)):
                 renderer.present(target, i)
                 wanted.append(pixels(target))
         glass = HandGlass(ctx, renderer)
         glass.hold(a_frame(upright()), state, Carried(PANEL))
         for _ in range(2):
-            looking = glass.look(state, EYES, EYES)
+            looking = glass.look(state, views, views)
             assert looking.together == (what is ALIKE)
             renderer.update(scene)
-            renderer.draw(list(EYES))
+            renderer.draw(list(views))
             assert glass.draw(looking, state) is looking
             changed = []
-            for i, view in enumerate(EYES):
+            for i, view in enumerate(views):
                 renderer.present(target, i)
                 glass.lay(looking, i, target, view, None, shown)
                 image, away = pixels(target), away_of(state.glass.held, view)
                 slack = 0.008  # metres: two pixels of the soft edge
                 inside, outside = away < RADIUS_M - slack, away > RADIUS_M + slack
                 # Parts add up as the whole does, but for a rounding of floats at a pixel's edge.
-                assert np.abs(image - wanted[2 + i])[inside].max() <= 1
+                assert np.abs(image - wanted[len(views) + i])[inside].max() <= 1
                 assert np.abs(image - wanted[i])[outside].max() <= 1
-                changed.append(np.abs(wanted[2 + i] - wanted[i])[inside].max())
+                changed.append(np.abs(wanted[len(views) + i] - wanted[i])[inside].max())
             assert min(changed) > 60, "or there was nothing to see"
         state.glass.held = None
-        assert glass.look(state, EYES, EYES) is None and not renderer.keeps_beside
+        assert glass.look(state, views, views) is None and not renderer.keeps_beside
         glass.close()
 
 

@@ -223,3 +223,32 @@ def test_the_panel_offers_what_there_is():
     """As many as the command line knows."""
     assert set(get_args(get_type_hints(Options)["quality"])) == set(QUALITIES)
     assert QUALITIES[0] == AUTO
+
+
+def test_a_chart_prices_all_four_views_by_the_worse_of_the_left_eye_s(monkeypatch):
+    """The inset differs by more than the wide view: its dB is the row's; right eyes have none."""
+    clock = SimpleNamespace(now=0.0, each=0.001)
+    monkeypatch.setattr("time.perf_counter", lambda: clock.now)
+    renderer, off = SlowRenderer(clock), {0: 0.01, 1: 0.9, 2: 0.05, 3: 0.8}
+
+    def resolved(i):
+        exact = renderer.settings.render_scale == 1 and not renderer.settings.min_pixels
+        exact &= renderer.settings.resort_frames == 1
+        return np.full((4, 4, 3), 0.0 if exact else off[i], np.float32)
+
+    renderer.resolved = resolved
+    eye = look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0))
+    poses = [Pose(eye.position + np.array([x, 0, 0]), eye.wxyz) for x in (0.0, 0.06) * 2]
+    views = [
+        View(pose, (-w, w, -w, w), 0.1, 10.0, (8, 8))
+        for pose, w in zip(poses, (1, 1, 0.2, 0.2), strict=True)
+    ]
+    rows = StereoChart(renderer, Scene(()), views, np.zeros(3), lambda: None).rows()
+    assert [row.name for row in rows] == ["exact", *PRICED]
+    for row in rows[1:]:
+        assert row.db == pytest.approx(-20 * np.log10(0.05), abs=1e-4)
+    for places in renderer.eyes:
+        left, right, left_inset, right_inset = places
+        assert np.linalg.norm(left - right) == pytest.approx(0.06)
+        np.testing.assert_allclose(left, left_inset, atol=1e-12)
+        np.testing.assert_allclose(right, right_inset, atol=1e-12)

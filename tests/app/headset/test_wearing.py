@@ -48,6 +48,7 @@ class Played:
         self.ctx, self.scenes, self.views = None, [], []
         self.layers, self.scales, self.written = SimpleNamespace(last=[]), [], []
         self.gaze = SimpleNamespace(wanted=False)
+        self.shown = SimpleNamespace(has_insets=False, offers_insets=False)
         nothing = np.zeros((0, 4), np.float32), np.zeros((0, 8), np.float32)
         self.drawing = SimpleNamespace(read_splats=lambda i: nothing)
 
@@ -83,7 +84,10 @@ class Played:
     def pulse(self, side, strength, seconds) -> None:
         self.asked.append(f"pulse {side}")
 
-    def show(self, texture) -> None:
+    def inset(self, play_views) -> None:
+        return None
+
+    def show(self, texture, inset=None) -> None:
         self.asked.append("mirror")
 
     def rest(self) -> None:

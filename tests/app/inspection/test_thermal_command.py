@@ -37,6 +37,7 @@ from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks import Isotherm, Mark, read_mark, spot_at
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.models import make_random_model
+from tests.support.scene.flir_files import write_flir
 from tests.support.scene.warm_wall import STOPS, celsius_at, traced, wall_view, write_wall
 from tests.support.splat_scenes import one_splat
 
@@ -150,6 +151,24 @@ def test_emissivity_is_of_all_or_of_one_mark_and_is_kept(wall, cameras, tmp_path
     assert thermal(wall, *words) == 0  # kept
     again = capsys.readouterr().out
     assert [read_of(again, n) for n in "ab"] == [read_of(said, n) for n in "ab"]
+
+
+def test_what_the_camera_was_set_to_comes_from_its_photo(wall, cameras, tmp_path, capsys):
+    """Alone it changes no value; another emissivity is then instead of the camera's own."""
+    pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
+    photo = write_flir(tmp_path / "a.jpg", np.full((3, 4), 30.0), (4, 3))
+    words = ("--camera", cameras, "--spot", "a=48,36")
+    readings = []
+    for more in ((), ("--taken-as", photo), ("--taken-as", photo, "--emissivity", "0.8")):
+        assert thermal(wall, *words, *more) == 0
+        readings.append(read_of(capsys.readouterr().out, "a"))
+    assert readings[0] == readings[1]
+    want = Emission(SurfaceRadiation(0.8, 20.0)).corrected(np.array(readings[0]), "°C")
+    assert readings[2] == pytest.approx(float(want), abs=0.2)  # printed tenths
+    assert thermal(wall, *words, "--taken-as", photo, "--unit", "K") == 2
+    assert "'K': give --taken-with and --taken-air" in capsys.readouterr().err
+    assert thermal(wall, *words, "--taken-as", tmp_path / "no.jpg") == 2
+    assert "--taken-as: " in capsys.readouterr().err
 
 
 def read_of(said: str, name: str) -> float:

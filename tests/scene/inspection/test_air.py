@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.air import NO_AIR, Air
+from shapeshift.scene.inspection.camera_settings import camera_settings
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks_file import MarksFile, read_marks_file, write_marks_file
 from tests.support.scene import flir_files
@@ -34,6 +36,16 @@ def test_more_of_it_and_wetter_lets_less_through():
     assert 0 < Air(1000, 100, 60).transmission < 0.5
 
 
+def set_to(monkeypatch, surface: tuple[float, float], air: tuple[float, float, float]) -> None:
+    """The camera of radiometric photos: emissivity, °C reflected; metres, 0..1 of humidity, °C."""
+    record = bytearray(flir_files.camera_record())
+    values = ((32, surface[0]), (36, air[0]), (40, surface[1] + 273.15), (44, air[2] + 273.15),
+              (48, air[2] + 273.15), (60, air[1]))  # fmt: skip
+    for offset, value in values:
+        flir_files.struct.pack_into("<f", record, offset, value)
+    monkeypatch.setattr(flir_files, "camera_record", lambda: bytes(record))
+
+
 @pytest.mark.parametrize(
     ("celsius", "off"), [(0.0, 0.15), (35.0, 0.15), (60.0, 0.15), (120.0, 0.3)]
 )
@@ -44,12 +56,7 @@ def test_surfaces_are_what_flyr_makes_of_the_same_air(tmp_path, monkeypatch, cel
     """
     flyr = pytest.importorskip("flyr")
     metres, humidity, air_c, emissivity, mirrored = 20.0, 0.7, 12.0, 0.9, 15.0
-    record = bytearray(flir_files.camera_record())
-    values = ((32, emissivity), (36, metres), (40, mirrored + 273.15), (44, air_c + 273.15),
-              (48, air_c + 273.15), (60, humidity))  # fmt: skip
-    for offset, value in values:
-        flir_files.struct.pack_into("<f", record, offset, value)
-    monkeypatch.setattr(flir_files, "camera_record", lambda: bytes(record))
+    set_to(monkeypatch, (emissivity, mirrored), (metres, humidity, air_c))
     path = flir_files.write_flir(tmp_path / "a.jpg", np.full((3, 4), celsius), (4, 3))
     want = float(flyr.unpack(str(path)).celsius[0, 0])
 
@@ -100,3 +107,39 @@ def test_marks_keep_it(tmp_path):
         path.write_text(head + bad + "}}")
         with pytest.raises(BadFile):
             read_marks_file(path)
+
+
+RAMP = np.linspace(10.0, 60.0, 12).reshape(3, 4)
+
+
+def test_what_a_camera_was_set_to_is_read_from_its_photo(tmp_path, monkeypatch):
+    pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
+    set_to(monkeypatch, (0.93, 17.0), (4.0, 0.6, 11.0))
+    surface, air = camera_settings(flir_files.write_flir(tmp_path / "a.jpg", RAMP, (4, 3)))
+    assert vars(surface) == pytest.approx({"emissivity": 0.93, "reflected": 17.0}, abs=1e-4)
+    assert vars(air) == pytest.approx(
+        {"distance_m": 4.0, "humidity": 60.0, "celsius": 11.0}, abs=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("surface", "air"),
+    [
+        ((0.0, 17.0), (4.0, 0.6, 11.0)), ((0.93, math.nan), (4.0, 0.6, 11.0)),
+        ((0.93, 17.0), (math.inf, 0.6, 11.0)), ((0.93, 17.0), (4.0, 1.7, 11.0)),
+    ],
+)  # fmt: skip
+def test_a_photo_of_a_camera_set_to_nonsense_is_one_sentence(tmp_path, monkeypatch, surface, air):
+    pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
+    set_to(monkeypatch, surface, air)
+    path = flir_files.write_flir(tmp_path / "a.jpg", RAMP, (4, 3))
+    with pytest.raises(BadFile, match=r"a\.jpg: [^\n]+\.$"):
+        camera_settings(path)
+
+
+def test_other_files_say_nothing_of_a_camera(tmp_path):
+    with pytest.raises(BadFile, match="no such photo"):
+        camera_settings(tmp_path / "none.jpg")
+    Image.new("RGB", (4, 3)).save(tmp_path / "b.jpg")
+    with pytest.raises(BadFile, match="no radiometric JPEG"):
+        camera_settings(tmp_path / "b.jpg")

@@ -51,7 +51,7 @@ HEADSET_TABLES = {
     "sections.comfort_section": {
         "POSTURE_NAMES": VALUES, "HAND_NAMES": VALUES, "PANEL_NAMES": VALUES, "WALK_NAMES": VALUES,
         "TURN_NAMES": VALUES, "MODEL_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL, "ROOM": ALL,
-        "NO_ROOM": ALL, "SHARP": ALL, "SHARP_NAMES": VALUES,
+        "NO_ROOM": ALL, "SHARP": ALL, "SHARP_NAMES": VALUES, "LATER": ALL, "NO_INSETS": ALL,
     },
     "sections.glass_section": {"NONE": ALL, "HELP": ALL},
     "sections.tool_sections": {"HOW": VALUES},

@@ -1,6 +1,7 @@
 """Where a hand holds the glass, when its edge hides it, and which pixels of the eyes it covers."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,3 +123,22 @@ def test_the_rim_is_around_it_and_the_handle_reaches_into_the_hand():
     np.testing.assert_array_equal(rim[0].a, rim[-1].b)
     low, high = sorted((handle.a[1], handle.b[1]))
     assert low < BEFORE[1] < high and neck.b[1] > high
+
+
+def test_boxes_of_insets_are_their_own():
+    """As many pixels of a glass as an inset has more than a wide view, and few where it sees none.
+
+    The wide views' boxes are those that they have alone.
+    """
+    glass = held_glass(upright(), HEAD)
+    wide = boxes_of(glass, EYES)
+    near = [replace(view.resized((900, 800)), whole=view.tangents) for view in EYES]
+    boxes = boxes_of(glass, [*EYES, *near])
+    assert boxes[:2] == wide
+    for box, (_, _, width, height) in zip(boxes[2:], wide, strict=True):
+        assert box[2] > 1.2 * width and box[3] > 1.2 * height
+    away = [replace(view, tangents=(0.8, 0.9, 0.9, 1.0)) for view in near]
+    boxes = boxes_of(glass, [*EYES, *away])
+    assert boxes[:2] == wide and [box[2:] for box in boxes[2:]] == [(STEP_PX, STEP_PX)] * 2
+    small = [view.resized((5, 7)) for view in away]
+    assert [box[2:] for box in boxes_of(glass, [*EYES, *small])[2:]] == [(5, 7)] * 2

@@ -293,3 +293,30 @@ def test_a_machine_without_pyopenxr_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "xr", None)
     with pytest.raises(NoHeadset, match=r"pyopenxr cannot be loaded .*pip install pyopenxr"):
         load()
+
+
+@pytest.mark.parametrize("extension", [False, True])
+@pytest.mark.parametrize("insets", [False, True])
+@pytest.mark.parametrize("newer", [False, True])
+def test_the_newer_openxr_is_asked_for_where_quad_views_have_no_extension(
+    fake, extension, insets, newer
+):
+    """And the one that every runtime speaks where it is refused."""
+    names = ("XR_KHR_opengl_enable", *(["XR_VARJO_quad_views"] if extension else []))
+    xr = fake(extensions=names)
+    tried: list[tuple[int, int, int]] = []
+
+    def create(version):
+        tried.append(version.asked)
+        if len(tried) == 1 and not newer and insets and not extension:
+            raise xr.exception.ApiVersionUnsupportedError
+        return "instance"
+
+    xr.create_instance = create
+    xr.InstanceCreateInfo = lambda application_info, enabled_extension_names: application_info
+    xr.ApplicationInfo = lambda *given: given[-1]
+    xr.Version = lambda *given: SimpleNamespace(asked=given, major=25, minor=0, patch=1)
+    asked = [(1, 1, 0)] if insets and not extension else []
+    wanted = [*asked, *([] if asked and newer else [(1, 0, 34)])]
+    Instance(insets)
+    assert tried == wanted

@@ -3,22 +3,19 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.panel import Section
 from shapeshift.app.editor.panels.sections.inspect_panel import InspectActions, draw_inspect
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.view_report import write_view_report
 from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.inspection.mouse_marks import KEYS, MouseMarks, Seen
 from shapeshift.app.editor.window.window import Window
-from shapeshift.app.inspection.inspect_view import first_photo, inspect_view, with_readings
-from shapeshift.app.inspection.report import ReportHead, report_of
-from shapeshift.app.inspection.report_pdf import write_report
-from shapeshift.app.paths import file_name
+from shapeshift.app.inspection.inspect_view import first_photo, inspect_view
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile
 
@@ -78,27 +75,10 @@ class Reports:
         try:
             view = replace(view, size=(width, height))
             inspected = inspect_view(renderer, document, thermal, photo, view)
-            source = tool.source or Path(state.title)
-            head = ReportHead(f"{thermal.stop.name}: {state.title}")
-            report = report_of(
-                head, source, thermal.stop, [with_readings(inspected, tool.file)], tool.file,
-                tool.scale, document.origin,
-            )  # fmt: skip
-            make_folder(self.folder)
-            path = self._free_path(file_name(state.title))
-            write_report(report, path)
+            path = write_view_report(tool, thermal, state.title, inspected, self.folder)
         except (BadFile, ValueError, OSError) as error:
             state.problem = said("No report was written: {error}", error=error)
             return
         finally:
             self.seen.forget()
         state.say(said("Saved {path}", path=path))
-
-    def _free_path(self, name: str) -> Path:
-        """A name that no report or its cameras have yet."""
-        number = 1
-        while True:
-            path = self.folder / f"{name} report {number}.html"
-            if not path.exists():
-                return path
-            number += 1
