@@ -217,12 +217,12 @@ typedef struct {
   floatn w, x, y, z;
 } Quaternion;
 
-// A quaternion that tiny and huge entries do not cost its length; one without a length is no turn;
-// NaN stays NaN, and project drops it.
-inline Quaternion held(Quaternion q) {
+// A quaternion that tiny and huge entries do not cost its length, but where it is `fine` as it is;
+// one without a length is no turn; NaN stays NaN, and project drops it.
+inline Quaternion held(Quaternion q, intn fine) {
   const floatn largest = fmax(fmax(fabs(q.w), fabs(q.x)), fmax(fabs(q.y), fabs(q.z)));
   const intn none = (q.w == 0.0f) & (q.x == 0.0f) & (q.y == 0.0f) & (q.z == 0.0f);
-  const floatn by = 1.0f / select(largest, TO_FLOATN 1.0f, none);
+  const floatn by = 1.0f / select(largest, TO_FLOATN 1.0f, none | fine);
   const Quaternion r = {select(q.w * by, TO_FLOATN 1.0f, none), q.x * by, q.y * by, q.z * by};
   return r;
 }
@@ -347,8 +347,9 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
       Quaternion q = {rotation[4 * j], rotation[4 * j + 1], rotation[4 * j + 2],
                       rotation[4 * j + 3]};
       floatn square = squares(q);
-      if (!ALL((square > 1e-30f) & (square < 1e30f))) {
-        q = held(q);
+      const intn fine = (square > 1e-30f) & (square < 1e30f);
+      if (!ALL(fine)) {
+        q = held(q, fine);
         square = squares(q);
       }
       if (frames) {
