@@ -30,7 +30,7 @@ TABLE = np.dtype(
 
 
 @dataclass(frozen=True)
-class Head:
+class HeadWeights:
     """One hidden layer with ReLU, then gain * activation(clip(z)); Psi(x) is none of its inputs."""
 
     feature: np.ndarray  # (hidden, F) columns of the first layer
@@ -54,7 +54,7 @@ class AnchorHeads:
     """
 
     def __init__(
-        self, device: Device, anchors: np.ndarray, features: np.ndarray, heads: list[Head],
+        self, device: Device, anchors: np.ndarray, features: np.ndarray, heads: list[HeadWeights],
         splats: int, frames: np.ndarray | None = None, width: int | None = None,
     ) -> None:  # fmt: skip
         """anchors (A, 3) metres, features (A, F); splats: k; frames (A, 7): of every anchor's own
@@ -149,14 +149,14 @@ def padded(units: int) -> int:
     return -(-units // UNITS) * UNITS
 
 
-def _reach(head: Head) -> np.ndarray:
+def _reach(head: HeadWeights) -> np.ndarray:
     """(units,) how much a direction of length 1 can add to each unit of a head."""
     if head.look is None:
         return np.zeros(head.units, np.float32)
     return np.linalg.norm(head.look, axis=1)
 
 
-def _flat(heads: list[Head]) -> tuple[np.ndarray, np.ndarray]:
+def _flat(heads: list[HeadWeights]) -> tuple[np.ndarray, np.ndarray]:
     """The table of the heads, and the weights that it points into: first layers, then last ones."""
     table = np.zeros(len(heads), TABLE)
     parts: list[np.ndarray] = []

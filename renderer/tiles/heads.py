@@ -10,7 +10,7 @@ from shapeshift.rasterizer.decode.decode_heads import (
     MOST_SPLATS,
     NO_CLIP,
     AnchorHeads,
-    Head,
+    HeadWeights,
 )
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.model import HEADS, AnchorModel, Mlp
@@ -107,7 +107,7 @@ class _Folded:
         self.bias = mlp.biases[0].astype(np.float64)
         control = columns["control"] if "control" in mlp.inputs else nothing[:, :d]
         self.control = control.astype(np.float64)
-        self.head = Head(
+        self.head = HeadWeights(
             columns["feature"] if "feature" in mlp.inputs else nothing[:, :features],
             columns["direction"] if "direction" in mlp.inputs else None,
             last, mlp.biases[1], mlp.head, mlp.clip or NO_CLIP, mlp.gain,

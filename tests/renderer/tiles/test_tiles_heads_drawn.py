@@ -45,8 +45,8 @@ def assert_alike(both, scene: Scene, views: list[View]) -> None:
 def test_bundled_scenes_at_stops_and_between_them(both, path, x):
     model = read_model(path)
     centre = model.anchors.mean(axis=0)
-    view = View(look_at(centre + np.array([0.6, 0.5, 1.6]), centre), (-0.5, 0.5, -0.3, 0.3), 0.05, 50,
-                (256, 144))  # fmt: skip
+    pose = look_at(centre + np.array([0.6, 0.5, 1.6]), centre)
+    view = View(pose, (-0.5, 0.5, -0.3, 0.3), 0.05, 50, (256, 144))
     assert_alike(both, alone(model, x=x), [view])
 
 
