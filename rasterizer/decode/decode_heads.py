@@ -116,7 +116,7 @@ class AnchorHeads:
             whole = np.zeros(self._feature.shape[0] * self._width, bool)
             whole[: self._count] = seen
             blocks = whole.reshape(-1, self._width).any(axis=1)
-            wanted = self._device.constants(blocks.astype(np.uint8))
+            wanted = self._device.constants(np.asarray(blocks, np.uint8))
         x, y, z = (float(v) for v in eye)
         self._launch(
             "decode_colors", self._count, start, RUN[self._device.kind], self._splats,

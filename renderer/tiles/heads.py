@@ -14,7 +14,7 @@ from shapeshift.rasterizer.decode.decode_heads import (
 )
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.model import HEADS, AnchorModel, Mlp
-from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.runtime_models.stop_weights import Controls, is_each
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -62,7 +62,7 @@ class ModelHeads:
         )
 
     def geometry(
-        self, x: Control, start: int, mean_opacity: "Array", covariance: "Array", placed: bool
+        self, x: Controls, start: int, mean_opacity: "Array", covariance: "Array", placed: bool
     ) -> None:
         """Means, covariances and opacities at one control -> rows start... of the arena.
 
@@ -72,7 +72,7 @@ class ModelHeads:
         self._anchors.decode_shapes(self._folded(x), start, mean_opacity, covariance, shapes)
 
     def color_into(
-        self, color: "Array", start: int, x: Control, eye: np.ndarray,
+        self, color: "Array", start: int, x: Controls, eye: np.ndarray,
         seen: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         """Rows start... of color (N, 4) at one control, display sRGB towards an eye (3,) in the
@@ -81,7 +81,7 @@ class ModelHeads:
         self._anchors.decode_colors(self._folded(x), eye, start, color, seen)
 
     def color(
-        self, x: Control, eye: np.ndarray, seen: np.ndarray | None = None,
+        self, x: Controls, eye: np.ndarray, seen: np.ndarray | None = None,
         out: "Array | None" = None,
     ) -> "Array":  # fmt: skip
         """The same in an array (n, 4) of its own, or in `out`."""
@@ -89,8 +89,9 @@ class ModelHeads:
         self.color_into(out, 0, x, eye, seen)
         return out
 
-    def _folded(self, x: Control) -> np.ndarray:
+    def _folded(self, x: Controls) -> np.ndarray:
         """(units,) first biases with Psi(x) in them: the same for every anchor, so exact."""
+        assert not is_each(x), "one control for all"
         return self._bias + self._control @ self.model.psi(x)[0].astype(np.float64)
 
 
