@@ -22,6 +22,7 @@ UNITS = 16  # hidden units that are looked at at once: a head has a multiple of 
 MOST_HIDDEN = 128  # units of a head: they lie in private memory
 MOST_SPLATS = 16  # an anchor, likewise
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")  # their numbers in the kernel
+DIRECTION = 3  # inputs
 NO_CLIP = (-float("inf"), float("inf"))
 TABLE = np.dtype(
     [(name, np.int32) for name in ("hidden", "unit_at", "first_at", "last_at", "tiles", "act")]
@@ -34,12 +35,14 @@ class HeadWeights:
     """One hidden layer with ReLU, then gain * activation(clip(z)); Psi(x) is none of its inputs."""
 
     feature: np.ndarray  # (hidden, F) columns of the first layer
-    look: np.ndarray | None  # (hidden, 3) those that meet the direction from the eye
+    look: np.ndarray | None  # (hidden, 3) those that meet the direction from the eye, (hidden, 4)
+    #                          with the light along it as a fourth
     last: np.ndarray  # (out, hidden)
     last_bias: np.ndarray  # (out,)
     activation: str = "none"  # one of ACTIVATIONS
     clip: tuple[float, float] = NO_CLIP
     gain: float = 1.0
+    brightest: float = 0.0  # the most that any anchor's light is along any direction
 
     @property
     def units(self) -> int:
@@ -56,9 +59,11 @@ class AnchorHeads:
     def __init__(
         self, device: Device, anchors: np.ndarray, features: np.ndarray, heads: list[HeadWeights],
         splats: int, frames: np.ndarray | None = None, width: int | None = None,
+        light: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         """anchors (A, 3) metres, features (A, F); splats: k; frames (A, 7): of every anchor's own
         axes factors and unit wxyz.  width: anchors at a time, 16 or 1; by default the device's.
+        light (A, 8): by direction, where the last head looks at it.
         """
         self._device, self._count, self._splats = device, len(anchors), splats
         self._width = width or WIDTH[device.kind]
@@ -70,7 +75,9 @@ class AnchorHeads:
             [start + np.arange(head.units) for start, head in zip(starts, heads, strict=False)]
         )
         self._reach = np.concatenate([_reach(head) for head in heads])
-        self._looks = 0 if heads[-1].look is None else 3
+        self._looks = 0 if heads[-1].look is None else heads[-1].look.shape[1]
+        if (self._looks == DIRECTION + 1) != (light is not None):
+            raise ValueError("light by direction and the colour head's columns for it go together.")
         self._kernels = device.program(
             KERNEL, WIDTH=self._width, TILE=TILE, ROWS=ROWS, UNITS=UNITS,
             MAX_HIDDEN=MOST_HIDDEN, MAX_SPLATS=MOST_SPLATS,
@@ -79,6 +86,7 @@ class AnchorHeads:
         self._heads, self._weights = device.constants(table), device.upload(weights)
         self._feature, self._places = self._blocks(features), self._blocks(anchors)
         self._frames = None if frames is None else self._blocks(frames)
+        self._light = None if light is None else self._blocks(light)
         first = np.zeros((self._units, self._features), np.float32)
         first[self._at] = np.concatenate([head.feature for head in heads])
         self._bounds = device.empty((self._feature.shape[0], self._units))
@@ -121,7 +129,8 @@ class AnchorHeads:
         self._launch(
             "decode_colors", self._count, start, RUN[self._device.kind], self._splats,
             self._features, self._units, self._looks, x, y, z, self._heads, self._weights,
-            *self._biases(bias), self._bounds, self._feature, self._places, wanted, color,
+            *self._biases(bias), self._bounds, self._feature, self._places, self._light,
+            wanted, color,
         )  # fmt: skip
 
     def _launch(self, kernel: str, *arguments) -> None:
@@ -150,10 +159,11 @@ def padded(units: int) -> int:
 
 
 def _reach(head: HeadWeights) -> np.ndarray:
-    """(units,) how much a direction of length 1 can add to each unit of a head."""
+    """(units,) how much a direction of length 1, and light along it, can add to a head's units."""
     if head.look is None:
         return np.zeros(head.units, np.float32)
-    return np.linalg.norm(head.look, axis=1)
+    light = np.abs(head.look[:, DIRECTION:]).sum(axis=1) * head.brightest
+    return np.linalg.norm(head.look[:, :DIRECTION], axis=1) + light
 
 
 def _flat(heads: list[HeadWeights]) -> tuple[np.ndarray, np.ndarray]:

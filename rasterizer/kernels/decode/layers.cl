@@ -1,7 +1,7 @@
 // layers: the two layers of a head and its activation, for a block of WIDTH anchors at a time.
 // Reads:   WIDTH, TILE, ROWS, UNITS.
-// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL; Head, wake, first_layer,
-//          second_layer, exp2n.
+// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL, LIGHTS; Head, wake, first_layer,
+//          light_along, second_layer, exp2n.
 // Units:   none; a head's gain gives metres or display values.
 // A comparison of floatn gives intn: 0 or 1 of a scalar, 0 or -1 a lane; select() takes both.
 #if WIDTH == 1  // a GPU
@@ -24,6 +24,7 @@ typedef int16 intn;
 #define ALL(lanes) all(lanes)
 #endif
 #define UNROLL _Pragma("unroll")
+#define LIGHTS 8  // numbers of an anchor's light by direction
 #define LOG2E 1.44269504f  // log2(e): e^z = 2^(z log2(e))
 #define MOST 126.0f  // the largest exponent of 2
 // Activations, numbered as decode_heads.py has them.
@@ -137,7 +138,7 @@ inline void first_layer(int n, int* live, int features, int looks, __global cons
       const floatn f = LOADN(feature + i * WIDTH);
       UNROLL for (int u = 0; u < ROWS; u++) sum[u] = fma(f, TO_FLOATN w[u][i], sum[u]);
     }
-    // Only the colour looks at the direction: none, or three.
+    // Only the colour looks at the direction: none, three, or four with light along it.
     for (int i = 0; i < looks; i++) {
       UNROLL for (int u = 0; u < ROWS; u++)
         sum[u] = fma(look[i], TO_FLOATN w[u][features + i], sum[u]);
@@ -146,6 +147,19 @@ inline void first_layer(int n, int* live, int features, int looks, __global cons
     UNROLL for (int u = 0; u < ROWS; u++)
       unit[t + u] = select(sum[u], TO_FLOATN 0.0f, sum[u] < 0.0f);
   }
+}
+
+// What the block's light by direction (LIGHTS, WIDTH) gives along unit directions, or along none:
+// spherical harmonics of degree 1 and 2 in units of those of degree 1, light_harmonics.py.
+inline floatn light_along(__global const float* light, const floatn* d) {
+  const floatn xx = d[0] * d[0], yy = d[1] * d[1], zz = d[2] * d[2];
+  const floatn value[LIGHTS] = {d[0], d[1], d[2],
+                                2.2360680f * d[0] * d[1], 2.2360680f * d[1] * d[2],
+                                2.2360680f * d[2] * d[0], 0.6454972f * (2 * zz - xx - yy),
+                                1.1180340f * (xx - yy)};
+  floatn sum = 0;
+  UNROLL for (int i = 0; i < LIGHTS; i++) sum = fma(LOADN(light + i * WIDTH), value[i], sum);
+  return sum;
 }
 
 // Outputs of a head out of its units first to end of those that are awake.
@@ -163,7 +177,6 @@ inline void second_layer(Head head, int first, int end, const int* live, const f
       const floatn h = unit[t];
       UNROLL for (int o = 0; o < TILE; o++) sum[o] = fma(h, TO_FLOATN w[o], sum[o]);
     }
-    // What an anchor adds of its own to an output before the activation belongs here.
     activate(head, sum);
     UNROLL for (int o = 0; o < TILE; o++) out[c * TILE + o] = sum[o];
   }
