@@ -88,6 +88,18 @@ class Device:
         """A copy of a device array in numpy."""
         return array.get() if array.size else np.empty(array.shape, array.dtype)
 
+    def copy_rows(self, rows: "Array", into: "Array", start: int) -> None:
+        """Enqueue a copy of an array into rows `start` and on of another one of the same width."""
+        import pyopencl as cl
+
+        if rows.size:
+            at: Any = (rows.base_data, into.base_data)  # buffers: the pool has no other memory
+            offset = into.offset + start * into.strides[0]
+            cl.enqueue_copy(
+                self.queue, at[1], at[0], byte_count=rows.nbytes, src_offset=rows.offset,
+                dst_offset=offset,
+            )  # fmt: skip
+
     def view(self, array: "Array") -> np.ndarray:
         """The contents of a device array, read only; on a CPU without a copy.
 

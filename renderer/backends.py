@@ -6,7 +6,11 @@ from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.gpu import Gpu
 
-CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
+CHOICES = {
+    "drawing": ("quads", "tiles"),
+    "mlps": ("gl", "opencl", "onnxruntime"),
+    "sort": ("gl", "numpy"),
+}
 
 
 def choose_backends(
@@ -27,7 +31,11 @@ def choose_backends(
         )
     if drawing == "quads" and ctx is None:
         raise ValueError("quads are drawn with GL; open a context, or draw tiles.")
+    if drawing == "quads" and mlps == "opencl":
+        raise ValueError("quads decode without OpenCL; leave mlps at auto, or draw tiles.")
     by_default = ("gl", "gl") if gpu and drawing == "quads" else ("onnxruntime", "numpy")
+    if drawing == "tiles":
+        by_default = ("opencl", "numpy")
     return (
         drawing,
         by_default[0] if mlps == "auto" else mlps,
@@ -41,7 +49,7 @@ def open_drawing(drawing: str, gpu: Gpu | None, mlps: str, sort: str) -> Drawing
         # Needs OpenCL, which quads do without.
         from shapeshift.renderer.tiles.tiles import TilesDrawing
 
-        return TilesDrawing()
+        return TilesDrawing(mlps=mlps)
     from shapeshift.renderer.gl.quads import QuadsDrawing
 
     return QuadsDrawing(gpu, mlps, sort)

@@ -56,8 +56,8 @@ HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this p
 class Renderer:
     """Keeps a scene decoded and draws views of it.
 
-    drawing, mlps, sort: "auto" takes tiles, onnxruntime and numpy where GL is software or absent,
-    and quads, gl, gl on a GPU; `backends` says what is in use and it never changes by itself.
+    drawing, mlps, sort: "auto" takes tiles, opencl and numpy where GL is software or absent, and
+    quads, gl, gl on a GPU; `backends` says what is in use and it never changes by itself.
     target: what quads blend into whatever settings.target says (tiles: float32 in registers).
     ctx None: no GL at all, tiles only, present() is not there.
     """

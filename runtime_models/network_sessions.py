@@ -1,6 +1,7 @@
 """One network of a model as onnxruntime runs it: whole, or with Psi(x) folded into a bias."""
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,13 @@ class WholeNetwork:
 
     def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
         self._inputs = mlp.inputs
-        self._session = open_session(write_onnx(mlp, name), threads)
+        self._made_of = (name, mlp, threads)
+
+    @cached_property
+    def _session(self):
+        """Opened at the first run: another decoder may leave it nothing to do."""
+        name, mlp, threads = self._made_of
+        return open_session(write_onnx(mlp, name), threads)
 
     def feature_part(self, features: np.ndarray) -> None:
         """Nothing is kept."""
@@ -45,7 +52,13 @@ class FoldedNetwork:
         self._base: np.ndarray | None = None  # (A, hidden)
         rest = replace(mlp, weights=(first[:, ~np.isin(part_of, outside)], *mlp.weights[1:]))
         kind = "input and rows" if self._keeps else "input"
-        self._session = open_session(write_onnx(rest, name, first_bias=kind), threads)
+        self._made_of = (name, rest, kind, threads)
+
+    @cached_property
+    def _session(self):
+        """Opened at the first run."""
+        name, rest, kind, threads = self._made_of
+        return open_session(write_onnx(rest, name, first_bias=kind), threads)
 
     def feature_part(self, features: np.ndarray) -> np.ndarray | None:
         """(A, hidden) what the first layer makes of all features, from the first use on."""

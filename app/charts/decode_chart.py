@@ -96,7 +96,7 @@ def opened(back_end: str, ctx, model: AnchorModel) -> Iterator[tuple[Callable, C
     if back_end == "onnxruntime":
         from shapeshift.renderer.tiles.tiles import TilesDrawing
 
-        drawing = TilesDrawing()
+        drawing = TilesDrawing(mlps="onnxruntime")
         drawing.allocate([model])
         try:
             yield drawing.decode_geometry, drawing.decode_color, drawing.device.queue.finish

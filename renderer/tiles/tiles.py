@@ -6,7 +6,6 @@ What its methods mean: renderer/drawing.py.  No GL here.
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,13 +15,12 @@ from shapeshift.rasterizer.device import Device, open_device
 from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
-from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
+from shapeshift.rasterizer.pack import pack_color
 from shapeshift.rasterizer.project import CULL_REASONS, Projected
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
 from shapeshift.rasterizer.raster import compile_with_heat
 from shapeshift.rasterizer.resolve import resolve
-from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.rasterizer.splat_edges import draw_edges
 from shapeshift.rasterizer.surface import DepthFrame, rasterize_depth, surface_arena
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
@@ -42,48 +40,34 @@ from shapeshift.renderer.tiles.inputs import (
     read_rows,
     write_rows,
 )
+from shapeshift.renderer.tiles.slot import Slot, decoding_of
 from shapeshift.renderer.timing import PassTimer
-from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.evaluate import Evaluator, only_fades
-from shapeshift.runtime_models.model import Model, SplatLayers, is_antialiased
+from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View
 
 if TYPE_CHECKING:
-    from pyopencl.array import Array
-
-
-@dataclass
-class _Slot:
-    """One object's rows of the arena."""
-
-    start: int
-    count: int
-    evaluator: Evaluator
-    sh: "Array | None"  # of coefficients; None: the colour comes from a network
-    colors: ColorMemory
-    placed: bool = False  # layers: the control value changes nothing but their opacity
-
-    @property
-    def rows(self) -> slice:
-        return slice(self.start, self.start + self.count)
+    pass
 
 
 class TilesDrawing(Drawing):
-    """The arena of all objects on an OpenCL device, and the passes that draw it."""
+    """The arena of all objects on an OpenCL device, and the passes that draw it.
+
+    mlps "opencl": networks run in our kernel where it knows them; "onnxruntime": its twin.
+    """
 
     decodes_on_gpu = False
 
-    def __init__(self, device: Device | None = None) -> None:
-        self.device = device or open_device()
+    def __init__(self, device: Device | None = None, mlps: str = "opencl") -> None:
+        self.device, self._mlps = device or open_device(), mlps
         self.backends = {
             "drawing": f"tiles ({self.device.platform})",
-            "mlps": "onnxruntime",
+            "mlps": mlps,
             "sort": f"tiles ({self.device.platform})",
         }
         self.allocations = 0  # how often the arena was made: once for each set of objects
-        self._slots: list[_Slot] = []
+        self._slots: list[Slot] = []
         self._images: dict[int, np.ndarray] = {}
         self._projected: list[Projected] = []
         self._rooms: dict[int, list[Projected]] = {}  # arrays of projection, kept between frames
@@ -114,12 +98,13 @@ class TilesDrawing(Drawing):
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)
         )
-        evaluators = {id(model): Evaluator(model, keep=True) for model in models}
-        sh = {id(m): upload_sh(device, m.sh) for m in models if isinstance(m, SplatLayers)}
+        made = {id(model): decoding_of(device, model, self._mlps) for model in models}
         self._slots = [
-            _Slot(int(start), n, evaluators[id(m)], sh.get(id(m)), ColorMemory(evaluators[id(m)]))
-            for start, n, m in zip(starts, counts, models, strict=False)
+            Slot(int(start), n, made[id(model)])
+            for start, n, model in zip(starts, counts, models, strict=False)
         ]
+        others = dict.fromkeys(each.instead for each in made.values() if each.instead)
+        self.backends["mlps"] = ", ".join([self._mlps, *others])
         if with_heat := {m.splat_count for m in models if m.splat_count and has_heat(m)}:
             for count in {min(with_heat), max(with_heat)}:
                 compile_heat(device, count)
@@ -134,12 +119,8 @@ class TilesDrawing(Drawing):
     ) -> None:
         slot = self._slots[i]
         self._changed = True
-        splats = slot.evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
-        if slot.placed:
-            pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
-            return
-        pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
-        slot.placed = only_fades(slot.evaluator.model)
+        arena = (self._mean_opacity, self._covariance)
+        slot.decode_geometry(self.device, x, eye_object, seen, *arena)
 
     def color_set(self, which: int, count: int) -> None:
         self._colors = self._colors[:count]
@@ -161,32 +142,26 @@ class TilesDrawing(Drawing):
         rows = slot.rows
         if self._heats[self._set] is None and shade.heats:
             self._heats[self._set] = self.device.zeros((self.splats, 4))
-        kept = self._heats[self._set]
+        kept, arena = self._heats[self._set], (self._mean_opacity, self._color)
+
+        def mix(part: int, x: Controls) -> None:
+            key, again = (self._set, part), bool(shade.heats)
+            slot.decode_color(self.device, key, x, eye_object, seen, arena, again)
+
         for number, heat in enumerate(shade.heats):
-            self._decode_color(slot, number + 1, heat.control, eye_object, seen)
+            mix(number + 1, heat.control)
             palette = palette_colors(heat.palette) if at_once else None
             parts = (heat.weights, rows, self._color, kept, palette, number == 0)
             add_heat(self.device, *parts)
-        if shade.rest is not None and not (shade.heats and slot.sh is not None):
-            self._decode_color(slot, 0, shade.rest, eye_object, seen)
+        if shade.rest is not None and not (shade.heats and slot.decoding.sh is not None):
+            mix(0, shade.rest)
         if grade is not None and shade.rest is not None:
             grade_color(self.device, rows, self._color, grade.gain, grade.power)
-        slot.colors.forget_after(self._set, len(shade.heats))
+        slot.forget_colors(self._set, len(shade.heats))
         if shade.heats:
             blend_heat(self.device, rows, self._color, kept, at_once)
         elif kept is not None and slot.count:
             kept[rows].fill(0)
-
-    def _decode_color(
-        self, slot: _Slot, part: int, x: Controls, eye: np.ndarray, seen: np.ndarray | None
-    ) -> None:
-        """The colours of one object at x, as they are decoded."""
-        if slot.sh is not None:
-            rows = slot.rows
-            shade_sh(self.device, slot.sh, eye, rows, self._mean_opacity, self._color, seen)
-        else:
-            key = (self._set, part)
-            pack_color(self.device, slot.colors.at(key, x, eye, seen), slot.start, self._color)
 
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         arrays = (self._mean_opacity, self._covariance)

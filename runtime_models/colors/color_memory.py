@@ -1,13 +1,26 @@
 """Colours of a model at several controls for one eye, kept while neither changes."""
 
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
-from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
+from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Controls, same_controls
 
 Part = tuple[int, int]  # set of colours, one of all views or one a view; number in the mixture
+
+
+class DecodesColors(Protocol):
+    """Evaluator, or what does the same elsewhere: its arrays are of any kind."""
+
+    @property
+    def model(self) -> Model: ...
+
+    def color(
+        self, x: Any, eye: np.ndarray, seen: np.ndarray | None = None, out: Any = None
+    ) -> Any: ...
 
 
 class ColorMemory:
@@ -17,15 +30,15 @@ class ColorMemory:
     between the two and the eye stands still, so that a slider then costs the shapes alone.
     """
 
-    def __init__(self, evaluator: Evaluator) -> None:
+    def __init__(self, evaluator: DecodesColors) -> None:
         self._evaluator = evaluator
         self._parts: dict[Part, _KeptColors] = {}
 
     def at(
         self, part: Part, control: Controls, eye: np.ndarray, seen: np.ndarray | None = None
-    ) -> np.ndarray:
-        """(N, 3) display sRGB towards an eye (3,) in the object's frame; of anchors not `seen` (A,)
-        anything.  Read only, until the next call for this part.
+    ) -> Any:
+        """(N, 3) display sRGB, or as the evaluator gives it, towards an eye (3,) in the object's
+        frame; of anchors not `seen` (A,) anything.  Read only, until the next call for this part.
         """
         if follows_eye(self._evaluator.model):  # colours of the shapes decoded just now
             return self._evaluator.color(control, eye, seen)
@@ -52,7 +65,7 @@ class _KeptColors:
     control: Controls
     eye: np.ndarray
     seen: np.ndarray | None  # (A,) bool; None: all
-    colors: np.ndarray
+    colors: Any  # as the evaluator gives it
 
     def is_of(self, control: Controls, eye: np.ndarray) -> bool:
         return np.array_equal(eye, self.eye) and same_controls(control, self.control)

@@ -303,5 +303,5 @@ def test_without_gl_there_is_nothing_to_present_with(renderer):
 
 def test_the_names_of_what_is_in_use(renderer):
     assert renderer.backends["drawing"].startswith("tiles (")
-    assert renderer.backends["mlps"] == "onnxruntime"
-    assert renderer.backends["mlps"] == "onnxruntime"
+    assert renderer.backends["mlps"] == "opencl"
+    assert renderer.backends["mlps"] == "opencl"

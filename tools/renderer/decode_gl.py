@@ -109,7 +109,7 @@ def rows_of(gpu: Gpu, anchors: int) -> list[tuple]:
     try:
         from shapeshift.renderer.tiles.tiles import TilesDrawing
 
-        drawing = TilesDrawing()
+        drawing = TilesDrawing(mlps="onnxruntime")
     except NoDevice as reason:
         sys.stderr.write(f"no rows of the tiles: {reason}\n")
         return rows

@@ -29,7 +29,7 @@ from shapeshift.renderer.colors.palette import (
 )
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.renderer.tiles.heads import ModelHeads
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.scene import Scene, SceneObject
@@ -234,10 +234,13 @@ def test_a_pure_thermal_stop_is_the_palette_over_the_picture_of_values(renderer)
 
 
 def test_a_slider_that_moves_before_a_still_eye_decodes_colours_once(renderer, monkeypatch):
-    made, decode, controls = model(), Evaluator.color, []
-    monkeypatch.setattr(
-        Evaluator, "color", lambda self, x, *more: controls.append(x) or decode(self, x, *more)
-    )
+    made, decode, controls = model(), ModelHeads.color_into, []
+
+    def counted(self, color, start, x, *more):
+        controls.append(x)
+        decode(self, color, start, x, *more)
+
+    monkeypatch.setattr(ModelHeads, "color_into", counted)
     shown(renderer, scene_of(made, x=0.1))
     assert len(controls) == 2, "the photo's and those of the heat"
     for x in (0.2, 0.35, 0.49):

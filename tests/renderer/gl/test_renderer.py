@@ -315,7 +315,7 @@ def test_software_gl_takes_the_cpu_back_ends(opened, ctx):
         assert renderer.backends == {"drawing": "quads (rgba16)", "mlps": "gl", "sort": "gl"}
     else:
         assert renderer.backends["drawing"].startswith("tiles (")
-        assert renderer.backends["mlps"] == "onnxruntime"
+        assert renderer.backends["mlps"] == "opencl"
 
 
 @pytest.mark.parametrize("drawing", DRAWINGS)
