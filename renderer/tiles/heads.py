@@ -111,10 +111,10 @@ class _Folded:
         self.control = control.astype(np.float64)
         # (units, 3), or 4 with light behind the direction, or none of both.
         look = np.concatenate([columns["direction"], columns["light"]], axis=1)
-        lit = model.light is not None and "light" in mlp.inputs
+        light = model.light if "light" in mlp.inputs else None
         self.head = HeadWeights(
             columns["feature"] if "feature" in mlp.inputs else nothing[:, :features],
             look if "direction" in mlp.inputs else None,
             last, mlp.biases[1], mlp.head, mlp.clip or NO_CLIP, mlp.gain,
-            float(most_light(model.light).max()) if lit else 0.0,
+            0.0 if light is None else float(most_light(light).max()),
         )  # fmt: skip
