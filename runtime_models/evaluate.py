@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.light_harmonics import light_along
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.model import (
     HEADS,
@@ -63,6 +64,17 @@ def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
         delta *= np.repeat(1 / length, 3).reshape(-1, 3)  # 3 times faster than to broadcast
         return delta
     return np.divide(delta, length[:, None], out=np.zeros_like(delta), where=known[:, None])
+
+
+def looked_along(
+    model: AnchorModel, direction: np.ndarray, rows: np.ndarray | slice = slice(None)
+) -> dict[str, np.ndarray]:
+    """What a colour network takes of directions (n, 3): themselves, and where anchors have light,
+    what that of these rows of anchors gives along them (n, 1).
+    """
+    if model.light is None:
+        return {"direction": direction}
+    return {"direction": direction, "light": light_along(model.light[rows], direction)}
 
 
 class Evaluator:
@@ -257,6 +269,7 @@ class Evaluator:
             if len(x) and alike(x[~first], x[~first][:1]).all():  # two sides of a sharp border
                 return self._run_sides(name, x, first, direction, rows, out)
         network, features = self._network(name, not is_each(x)), every[rows]
+        looks = {} if direction is None else looked_along(self._anchored, direction, rows)
         out = self._room(name) if out is None else out
         psi = self._encoded(x)
         base = network.feature_part(every)
@@ -264,8 +277,7 @@ class Evaluator:
         for start in range(0, len(features), BATCH):
             part = slice(start, start + BATCH)
             parts = {"feature": features[part], "control": psi if len(psi) == 1 else psi[part]}
-            if direction is not None:
-                parts["direction"] = direction[part]
+            parts |= {name: values[part] for name, values in looks.items()}
             out[part] = network.run(parts, None if base is None else base[part])
         return out
 
@@ -284,13 +296,13 @@ class Evaluator:
         out = self._room(name) if out is None else out
         network, every = self._networks[name], self._anchored.features
         base, numbers = network.feature_part(every), np.arange(len(every))[rows]
+        looks = {} if direction is None else looked_along(self._anchored, direction, rows)
         for side in (np.flatnonzero(first), np.flatnonzero(~first)):
             for start in range(0, len(side), BATCH):
                 part = side[start : start + BATCH]
                 psi = self._anchored.psi(x[part[:1]])
                 parts = {"feature": every[numbers[part]], "control": psi}
-                if direction is not None:
-                    parts["direction"] = direction[part]
+                parts |= {name: values[part] for name, values in looks.items()}
                 out[part] = network.run(parts, None if base is None else base[numbers[part]])
         return out
 

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.light_harmonics import WIDTH as LIGHT_WIDTH
 from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.shapes import check
 from shapeshift.runtime_models.splat_motion import SplatMotion
@@ -48,8 +49,8 @@ class Finding:
 class Mlp:
     """Fully connected, ReLU between layers, then y = gain * head(clip(z)).
 
-    `inputs` names the concatenated parts in order, out of "feature", "direction" and "control";
-    of a ScaffoldModel out of "feature", "direction", "distance" and "level".
+    `inputs` names the concatenated parts in order, out of "feature", "direction", "light" and
+    "control"; of a ScaffoldModel out of "feature", "direction", "distance" and "level".
     """
 
     weights: tuple[np.ndarray, ...]  # each (out, in) float32
@@ -108,9 +109,12 @@ class AnchorModel:
     frames: AnchorFrames | None = None  # None: the object's axes and size 1 for all
     labels: np.ndarray | None = None  # (A,) uint8 object of each anchor; 0 = background
     objects: tuple[ObjectLabel, ...] = ()  # of every label above 0 that there is; maybe more
+    light: np.ndarray | None = None  # (A, 8) by direction, as light_harmonics.py says: what it
+    #                                  gives is the colour network's input "light"
 
     def __post_init__(self) -> None:
         check(anchors=(self.anchors, "A 3"), features=(self.features, "A F"))
+        check_light(self)
         check_labels(self.labels, self.objects, len(self.anchors))
         if self.frames is not None:
             check(anchors=(self.anchors, "A 3"), scales=(self.frames.scales, "A 3"))
@@ -118,6 +122,12 @@ class AnchorModel:
     @property
     def splat_count(self) -> int:
         return len(self.anchors) * self.splats_per_anchor
+
+    @property
+    def input_widths(self) -> dict[str, int]:
+        """How many numbers each part has that its networks may take."""
+        features = self.features.shape[1]
+        return {"feature": features, "direction": 3, "light": 1, "control": self.encoding.d}
 
     @cached_property
     def blend(self) -> StopBlend:
@@ -141,6 +151,20 @@ class AnchorModel:
             features=np.ascontiguousarray(self.features[rows]),
             frames=frames,
             labels=None if self.labels is None else np.ascontiguousarray(self.labels[rows]),
+            light=None if self.light is None else np.ascontiguousarray(self.light[rows]),
+        )
+
+
+def check_light(model: AnchorModel) -> None:
+    """ValueError where anchors have light that no colour network takes, or the other way round."""
+    takes = [part for part in ("direction", "light") if part in model.networks["color"].inputs]
+    if model.light is not None:
+        check(anchors=(model.anchors, "A 3"), light=(model.light, f"A {LIGHT_WIDTH}"))
+    if ("light" in takes) != (model.light is not None) or takes == ["light"]:
+        has = "no light" if model.light is None else "light"
+        raise ValueError(
+            f"anchors have {has}, but the colour network takes {' and '.join(takes) or 'neither'}; "
+            "light comes with an input 'light' beside 'direction'"
         )
 
 

@@ -27,7 +27,8 @@ class WholeNetwork:
         """Nothing is kept."""
 
     def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:
-        """(n, k * size) of features (n, F), directions (n, 3) and Psi, (1, d) or (n, d).
+        """(n, k * size) of features (n, F), directions (n, 3), light (n, 1) and Psi, (1, d) or
+        (n, d).
 
         base: None, as feature_part gives it.
         """
@@ -40,8 +41,7 @@ class FoldedNetwork:
     """The same network with Psi(x) in its first bias: only what differs from anchor to anchor."""
 
     def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
-        widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
-        part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
+        part_of = np.repeat(mlp.inputs, [model.input_widths[part] for part in mlp.inputs])
         first = mlp.weights[0]  # (hidden, inputs)
         self._keeps = {"feature", "direction"} <= set(mlp.inputs)
         outside = ("control", "feature") if self._keeps else ("control",)

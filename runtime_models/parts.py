@@ -58,8 +58,8 @@ def part_of(model: Model, label: int) -> tuple[Model, Place]:
     """The rows of one label in a frame of their own, and where its zero lies in the model's.
 
     The zero is the mean of the rows' places, and of the background the model's own: moving all
-    anchors is exact, since networks see features, control and direction alone.  `find_label` says
-    whether there are such rows.
+    anchors is exact, since networks see features, control, direction and light by direction alone.
+    `find_label` says whether there are such rows.
     """
     if isinstance(model, AnchorModel):
         part = labelled_anchors(model, label)

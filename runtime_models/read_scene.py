@@ -16,8 +16,9 @@ from shapeshift.runtime_models.model import (
     ScaffoldModel,
     SplatLayers,
 )
+from shapeshift.runtime_models.package.feature_codes import encode_features, exact_kind
 from shapeshift.runtime_models.package.lint_package import refuse_filling
-from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, format_name
+from shapeshift.runtime_models.package.package_files import ANCHORS, LIGHT, MANIFEST, format_name
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.refit_encoding import encoding_findings
 from shapeshift.runtime_models.parts import splat_labels
@@ -195,9 +196,19 @@ def describe(model: Model, path: str | Path) -> dict:
         | networks
         | {"encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing}}
         | {"between_stops": model.between_stops, "paced_pairs": len(model.pace)}
+        | describe_light(model)
         | describe_labels(model)
         | describe_findings(model)
     )
+
+
+def describe_light(model: AnchorModel) -> dict:
+    """Bytes of anchors' light by direction before they are deflated, where they have such."""
+    if model.light is None:
+        return {}
+    stored = encode_features(model.light, exact_kind(model.light), LIGHT)
+    size = sum(array.nbytes for array in stored.values())
+    return {"light_by_direction_bytes": size}
 
 
 def describe_findings(model: Model) -> dict:

@@ -1,5 +1,7 @@
 """A trained state as the AnchorModel that a package holds."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from shapeshift.runtime_models.model import (
@@ -31,11 +33,11 @@ def model_of(
     """The model of an optimiser's state; its networks give metres and colours, ready to draw.
 
     Base colours become the last three features, which every network takes and the colour network
-    alone looks at.
+    alone looks at; what light by direction gives becomes an input that it alone has.
     """
     gain = {"offset": REACH * voxel, "scale": UNIT * voxel}
     features = state["features.value"][:, : layout.features]
-    own_colors = "color" in layout.attributes
+    own_colors, own_light = ("color" in layout.attributes), ("light" in layout.per_anchor)
     if own_colors:
         features = np.concatenate([features, state["colors.value"]], axis=1)
     networks = {}
@@ -49,6 +51,8 @@ def model_of(
         if own_colors:
             extra = ATTRIBUTE_WIDTH["colors"] if name == "color" else 0
             mlp = with_skip(mlp, layout.features, ATTRIBUTE_WIDTH["colors"], extra)
+        if own_light and name == "color":
+            mlp = with_light(mlp, features.shape[1])
         networks[name] = mlp
     frames = None
     if "frame" in layout.attributes:
@@ -57,25 +61,44 @@ def model_of(
     return AnchorModel(
         state["anchors.value"], np.ascontiguousarray(features), networks, layout.splats, encoding,
         stops, provenance, frames=frames,
+        light=np.ascontiguousarray(state["light.value"]) if own_light else None,
     )  # fmt: skip
 
 
 def with_skip(mlp: Mlp, features: int, more: int, added: int) -> Mlp:
     """The network on `more` features after its `features` first inputs, which it ignores.
 
-    added: 0, or as many as `more`: what the last layer adds to the numbers of every splat.  They
-    go through the ReLUs as v = relu(v) - relu(-v), so the sum is exact up to its rounding.
+    added: 0, or as many as `more`: what the last layer adds to the numbers of every splat.
     """
     first = np.insert(mlp.weights[0], [features] * more, 0, axis=1)
-    weights, biases = [first, *mlp.weights[1:]], list(mlp.biases)
-    if added:
-        both = np.concatenate([np.eye(more), -np.eye(more)]).astype(np.float32)  # (2 more, more)
-        rows = np.zeros((2 * more, first.shape[1]), np.float32)
-        rows[:, features : features + more] = both
-        weights[0] = np.concatenate([first, rows])
-        splats = len(weights[-1]) // SIZE_PER_SPLAT["color"]
-        last = np.tile(both.T, (splats, 1))  # (k * 3, 2 more)
-        weights[-1] = np.concatenate([weights[-1], last], axis=1)
-        nothing = np.zeros(2 * more, np.float32)
-        biases[0] = np.concatenate([biases[0], nothing])
-    return Mlp(tuple(weights), tuple(biases), mlp.head, mlp.inputs, mlp.clip, mlp.gain)
+    wide = replace(mlp, weights=(first, *mlp.weights[1:]))
+    return with_carried(wide, features, np.eye(more)) if added else wide
+
+
+def with_light(mlp: Mlp, features: int) -> Mlp:
+    """The colour network with an input "light" behind the direction, which follows the features:
+    the last layer adds it to every number of every splat.
+    """
+    at = features + 3
+    first = np.insert(mlp.weights[0], at, 0, axis=1)
+    inputs = list(mlp.inputs)
+    inputs.insert(inputs.index("direction") + 1, "light")
+    wide = replace(mlp, weights=(first, *mlp.weights[1:]), inputs=tuple(inputs))
+    return with_carried(wide, at, np.ones((SIZE_PER_SPLAT["color"], 1)))
+
+
+def with_carried(mlp: Mlp, at: int, adds: np.ndarray) -> Mlp:
+    """A network of one hidden layer that adds inputs from `at` on to the numbers of every splat.
+
+    adds: (numbers a splat, inputs), how much of each.  They go through the ReLU as
+    v = relu(v) - relu(-v), so the sum is exact up to its rounding.
+    """
+    first, last = mlp.weights
+    more = adds.shape[1]
+    both = np.concatenate([np.eye(more), -np.eye(more)])  # (2 more, more)
+    rows = np.zeros((2 * more, first.shape[1]), np.float32)
+    rows[:, at : at + more] = both
+    columns = np.tile(adds @ both.T, (len(last) // len(adds), 1)).astype(np.float32)
+    weights = np.concatenate([first, rows]), np.concatenate([last, columns], axis=1)
+    first_bias = np.concatenate([mlp.biases[0], np.zeros(2 * more, np.float32)])
+    return replace(mlp, weights=weights, biases=(first_bias, mlp.biases[1]))

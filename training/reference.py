@@ -4,6 +4,7 @@ import numpy as np
 
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.reference import render_reference
+from shapeshift.runtime_models.colors.spherical_harmonics import C1, basis
 from shapeshift.runtime_models.model import HEADS
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.scene.metrics import ssim_map
@@ -45,14 +46,18 @@ def heads_reference(
 def activate_reference(
     raw: dict[str, np.ndarray], anchors: np.ndarray, voxel: float,
     frames: np.ndarray | None = None, colors: np.ndarray | None = None,
+    light: np.ndarray | None = None, direction: np.ndarray | None = None,
 ) -> tuple:  # fmt: skip
     """(means, scales, wxyz, opacity, color) of raw outputs (A, out) by head.
 
-    frames (A, 7) and base colours (A, 3), where anchors have such: see gaussians.cl.
+    frames (A, 7), base colours (A, 3) and light (A, 8), by directions (A, 3) from the eye, where
+    anchors have such: see gaussians.cl.
     """
     count, k = raw["opacity"].shape
     frames = np.tile([0.0, 0, 0, 1, 0, 0, 0], (count, 1)) if frames is None else frames
     colors = np.zeros((count, 3)) if colors is None else colors
+    if light is not None and direction is not None:
+        colors = colors + light_of(light, direction)[:, None]
     frames, base = np.repeat(frames, k, axis=0), np.repeat(colors, k, axis=0)
     size, turn = np.exp(frames[:, :3]), normalize(frames[:, 3:])
     offset = size * REACH * voxel * np.tanh(raw["offset"].reshape(-1, 3))
@@ -65,6 +70,12 @@ def activate_reference(
     )
 
 
+def light_of(light: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(A,) logits that coefficients (A, 8) add along directions (A, 3), by the table of 3DGS."""
+    there = basis(direction, 9)[:, [3, 1, 2, 4, 5, 7, 6, 8]] * [-1, -1, 1, 1, -1, -1, 1, 1] / C1
+    return (light * there).sum(axis=1)
+
+
 def decode_reference(
     layout: HeadLayout, parameters: dict[str, np.ndarray], control, eye, voxel: float
 ) -> tuple:
@@ -73,9 +84,9 @@ def decode_reference(
     features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
     networks = layout.unpack(parameters["weights"])
     heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
-    own = (parameters.get(name) for name in ATTRIBUTE_WIDTH)
-    own = (None if rows is None else np.asarray(rows, np.float64) for rows in own)
-    return activate_reference({n: raw for n, (_, raw) in heads.items()}, anchors, voxel, *own)
+    own = {n: np.asarray(parameters[n], np.float64) for n in ATTRIBUTE_WIDTH if n in parameters}
+    raw = {name: outputs for name, (_, outputs) in heads.items()}
+    return activate_reference(raw, anchors, voxel, **own, direction=directions(anchors, eye))
 
 
 def image_loss_reference(image, photo, share: float, weight=None) -> float:

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
-from shapeshift.training.heads.networks import ANCHOR_ATTRIBUTES, HeadLayout
+from shapeshift.training.heads.networks import HeadLayout
 
 Poses = Literal["stated", "refine"]
 Masks = Literal["object", "valid", "ignore"]
@@ -103,8 +103,9 @@ class TrainSettings:
     makes the picture between two stops their cross-fade."""
     view_dependent: bool = True
     """Let colours depend on the direction from which one looks."""
-    anchor_attributes: str = ",".join(ANCHOR_ATTRIBUTES)
-    """What each anchor has besides its features: frame (sizes and axes), color (a base colour)."""
+    anchor_attributes: str = "frame,color"
+    """What each anchor has besides its features, as frame,color,light: sizes and axes; a base
+    colour; light by direction, which makes it lighter or darker by the side it is seen from."""
     grow: bool = True
     """Add anchors and move the least useful ones to where pictures need them."""
     grow_every: int = 100

@@ -54,7 +54,7 @@ class TrainingStep:
                 adam["weights"], self.gathered["anchors"], self.gathered["features"], control, eye
             )
         with self.timed("activate"):
-            return self.activation.forward(raw, self.gathered)
+            return self.activation.forward(raw, self.gathered, eye)
 
     def draw(
         self, view: View, control: np.ndarray, background: Color, with_depth: bool = False,

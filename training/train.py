@@ -60,13 +60,12 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
     heads = (rates.offset, rates.scale, rates.rotation, rates.opacity, rates.color)
     for start, stop, rate in zip(layout.weights_at, layout.weights_at[1:], heads, strict=False):
         flat[start:stop] = rate
-    return {
-        "weights": flat * layout.rate_shares(),
-        "anchors": np.array([rates.anchor * voxel], np.float32),
-        "features": np.array([rates.feature], np.float32),
-        "frames": np.array([rates.frame], np.float32),
-        "colors": np.array([rates.color], np.float32),
-    }
+    each = {
+        "anchors": rates.anchor * voxel, "features": rates.feature, "frames": rates.frame,
+        "colors": rates.color, "light": rates.color,
+    }  # fmt: skip
+    shared = {name: np.array([rate], np.float32) for name, rate in each.items()}
+    return {"weights": flat * layout.rate_shares()} | shared
 
 
 class Trainer(Run):

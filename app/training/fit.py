@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 
 USUAL = ("max_anchors", "downscale", "masks", "background")
-EXPERTS = ("seed", "splats_per_anchor", "features", "hidden", "fixed")  # as of train
+EXPERTS = (  # as of train
+    "seed", "splats_per_anchor", "features", "hidden", "fixed", "anchor_attributes",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -50,10 +50,10 @@ class PackedMlp:
 
 
 def pack_mlp(mlp: Mlp, features: int, d: int, own_control: bool = False) -> PackedMlp:
-    """Pads and orders one network; its inputs become features, then direction; Psi is cut out, or
-    comes third with `own_control`.
+    """Pads and orders one network; its inputs become features, then direction and light; Psi is cut
+    out, or comes third with `own_control`.
     """
-    width_of = {"feature": features, "direction": DIRECTION, "control": d}
+    width_of = {"feature": features, "direction": DIRECTION, "light": 1, "control": d}
     at = np.cumsum([0, *(width_of[part] for part in mlp.inputs)])
     columns = {part: slice(at[i], at[i + 1]) for i, part in enumerate(mlp.inputs)}
     first = np.asarray(mlp.weights[0], np.float64)  # (hidden, inputs)
@@ -62,11 +62,13 @@ def pack_mlp(mlp: Mlp, features: int, d: int, own_control: bool = False) -> Pack
             f"the first layer takes {first.shape[1]} inputs, but {' + '.join(mlp.inputs)} "
             f"are {at[-1]}; write the network or the inputs anew."
         )
-    seen = np.zeros((len(first), 4 * (vecs(features) + 1)))  # features, then direction
+    seen = np.zeros((len(first), 4 * (vecs(features) + 1)))  # features, then direction, light
     if "feature" in columns:
         seen[:, :features] = first[:, columns["feature"]]
     if "direction" in columns:
         seen[:, -4:-1] = first[:, columns["direction"]]
+    if "light" in columns:
+        seen[:, -1:] = first[:, columns["light"]]
     control = first[:, columns["control"]] if "control" in columns else np.zeros((len(first), d))
 
     if own_control:
@@ -111,13 +113,17 @@ class GlNetworks:
             frames = np.zeros((count, 2, 4), np.float32)
             frames[:, 0, :3], frames[:, 1] = model.frames.scales, model.frames.wxyz
             self._frames = gpu.upload(frames, "the anchors' own axes")
+        self._light: moderngl.Buffer | None = None
+        if model.light is not None:
+            light = np.ascontiguousarray(model.light, np.float32)
+            self._light = gpu.upload(light, "the anchors' light")
         self._heads = {name: self._prepare(name) for name in HEADS}
         self._own: dict[str, _Head] = {}  # for a control an anchor, made when there is one
         self._control: moderngl.Buffer | None = None  # Psi of these
 
     def _prepare(self, name: str, own_control: bool = False) -> "_Head":
         model, gpu, mlp = self._model, self._gpu, self._model.networks[name]
-        if name != "color" and "direction" in mlp.inputs:
+        if name != "color" and not {"direction", "light"}.isdisjoint(mlp.inputs):
             raise ValueError(f"the {name} network takes the view direction; only color may.")
         wanted = model.splats_per_anchor * SIZE_PER_SPLAT[name]
         if mlp.width_out != wanted:
@@ -185,6 +191,7 @@ class GlNetworks:
     ) -> None:
         """Anchors first... through one network; splat j's numbers go to base + stride * j."""
         bind(anchors=self._anchors, features=self._features, output=output)
+        bind(light=self._light or self._anchors)
         if self._control is not None:
             bind(control=self._control)
         if head.stored:
@@ -196,7 +203,7 @@ class GlNetworks:
             head.program, groups_for(count, layout.DECODE_WORKGROUP),
             first=first, count=count, base=base, stride=stride, size=SIZE_PER_SPLAT[head.name],
             splats_per_anchor=self._model.splats_per_anchor, layers=head.packed.layers,
-            feature_vecs=vecs(self._model.features.shape[1]),
+            feature_vecs=vecs(self._model.features.shape[1]), has_light=self._light is not None,
             activation=ACTIVATIONS.index(head.mlp.head), low=low, high=high, gain=head.mlp.gain,
         )  # fmt: skip
 
@@ -205,8 +212,9 @@ class GlNetworks:
             head.weights.release()
         if self._control is not None:
             self._control.release()
-        if self._frames is not None:
-            self._frames.release()
+        for own in (self._frames, self._light):
+            if own is not None:
+                own.release()
         self._anchors.release()
         self._features.release()
 

@@ -1,19 +1,22 @@
-// decode_mlp: one network F for every anchor (paper eq. 5): feature, direction, Psi(x) -> k splats.
+// decode_mlp: one network F for every anchor (paper eq. 5): feature, direction, light, Psi(x) -> k
+// splats.
 // One invocation an anchor; a whole layer in registers.  Loops run over uniform counts: unrolled,
 // the compiler of a software driver takes a minute. Psi is the same for all anchors and folded into
 // the first bias, unless each has its own control.
 // Needs:   LAYER_VECS (vec4 of the widest layer), BLOCK_VECS (vec4 of a uniform block),
 //          STORED_WEIGHTS (1: too many for a uniform block), OWN_CONTROL (1: Psi of a control an
 //          anchor is an input as the others are).
-// Reads:   anchors, features, weights; with OWN_CONTROL control.
+// Reads:   anchors, features, weights; light of anchors that have it; with OWN_CONTROL control.
 // Writes:  outputs, a head's numbers of every splat, after its activation.
 // Units:   metres in the object; features and Psi have none.
 #include "common/activation.glsl"
 #include "common/direction.glsl"
+#include "common/light.glsl"
 layout(local_size_x = DECODE_WORKGROUP) in;
 
 layout(std430, binding = SLOT_ANCHORS) readonly buffer Anchors { vec4 anchors[]; };
 layout(std430, binding = SLOT_FEATURES) readonly buffer Features { vec4 features[]; };
+layout(std430, binding = SLOT_LIGHT) readonly buffer Light { vec4 light[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer Output { float outputs[]; };
 // One row a layer (inputs, outputs, in vec4), then per layer biases and weights: networks.py packs.
 #if STORED_WEIGHTS
@@ -32,6 +35,7 @@ uniform uint count;              // anchors in this run
 uniform uint feature_vecs;       // vec4 an anchor
 uniform uint layers;
 uniform vec3 eye;                // metres in the object; only the colour network looks at it
+uniform bool has_light;          // whether anchors have light by direction
 uniform uint splats_per_anchor;
 uniform uint size;               // numbers a splat
 uniform uint base, stride;       // splat j of the run goes to outputs[base + stride * j ...]
@@ -54,7 +58,12 @@ void main() {
     if (!(anchor < count)) return;
     for (uint v = 0u; v < feature_vecs; v++)
         values[v] = features[(first + anchor) * feature_vecs + v];
-    values[feature_vecs] = vec4(direction_from(eye, anchors[first + anchor].xyz), 0.0);
+    vec4 seen = vec4(direction_from(eye, anchors[first + anchor].xyz), 0.0);
+    if (has_light) {
+        uint at = 2u * (first + anchor);
+        seen.w = light_along(light[at], light[at + 1u], seen.xyz);
+    }
+    values[feature_vecs] = seen;
 #if OWN_CONTROL
     for (uint v = 0u; v < control_vecs; v++)
         values[feature_vecs + 1u + v] = control[(first + anchor) * control_vecs + v];

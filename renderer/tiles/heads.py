@@ -13,6 +13,7 @@ from shapeshift.rasterizer.decode.decode_heads import (
     HeadWeights,
 )
 from shapeshift.rasterizer.device import Device
+from shapeshift.runtime_models.colors.light_harmonics import most_light
 from shapeshift.runtime_models.model import HEADS, AnchorModel, Mlp
 from shapeshift.runtime_models.stop_weights import Controls, is_each
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 LAYERS = 2  # one hidden layer, as the paper and our trainer have it
-DIRECTION = 3  # inputs
 
 
 def uncovered(model: AnchorModel) -> str:
@@ -58,8 +58,9 @@ class ModelHeads:
         own = None if frames is None else np.hstack([frames.scales, frames.wxyz])
         heads = [part.head for part in parts]
         self._anchors = AnchorHeads(
-            device, model.anchors, model.features, heads, model.splats_per_anchor, own
-        )
+            device, model.anchors, model.features, heads, model.splats_per_anchor, own,
+            light=model.light,
+        )  # fmt: skip
 
     def geometry(
         self, x: Controls, start: int, mean_opacity: "Array", covariance: "Array", placed: bool
@@ -100,7 +101,7 @@ class _Folded:
 
     def __init__(self, model: AnchorModel, mlp: Mlp) -> None:
         features, d = model.features.shape[1], model.encoding.d
-        widths = {"feature": features, "direction": DIRECTION, "control": d}
+        widths = model.input_widths
         part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
         first, last = mlp.weights
         columns = {part: first[:, part_of == part] for part in widths}
@@ -108,8 +109,12 @@ class _Folded:
         self.bias = mlp.biases[0].astype(np.float64)
         control = columns["control"] if "control" in mlp.inputs else nothing[:, :d]
         self.control = control.astype(np.float64)
+        # (units, 3), or 4 with light behind the direction, or none of both.
+        look = np.concatenate([columns["direction"], columns["light"]], axis=1)
+        light = model.light if "light" in mlp.inputs else None
         self.head = HeadWeights(
             columns["feature"] if "feature" in mlp.inputs else nothing[:, :features],
-            columns["direction"] if "direction" in mlp.inputs else None,
+            look if "direction" in mlp.inputs else None,
             last, mlp.biases[1], mlp.head, mlp.clip or NO_CLIP, mlp.gain,
+            0.0 if light is None else float(most_light(light).max()),
         )  # fmt: skip

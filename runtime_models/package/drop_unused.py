@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.light_harmonics import most_light
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
 
@@ -54,10 +55,25 @@ def drop_unused(model: AnchorModel, alive: np.ndarray | None = None) -> tuple[An
         for n in HEADS
         if len(networks[n].weights) > 1
     )
-    smaller = replace(smaller, networks=networks)
+    smaller = without_unseen_light(replace(smaller, networks=networks))
     return smaller, Removed(
         int((~anchors).sum()), int((~slots).sum()), units, model.splat_count - smaller.splat_count
     )
+
+
+def without_unseen_light(model: AnchorModel) -> AnchorModel:
+    """The model without light by direction where no unit of the colour network looks at it."""
+    color = model.networks["color"]
+    if model.light is None:
+        return model
+    at = np.repeat(color.inputs, [model.input_widths[part] for part in color.inputs]) == "light"
+    first = color.weights[0]
+    if first[:, at].any():
+        return model
+    weights = np.ascontiguousarray(first[:, ~at]), *color.weights[1:]
+    inputs = tuple(part for part in color.inputs if part != "light")
+    networks = model.networks | {"color": replace(color, weights=weights, inputs=inputs)}
+    return replace(model, networks=networks, light=None)
 
 
 def without_slots(mlp: Mlp, keep: np.ndarray, size: int) -> Mlp:
@@ -73,13 +89,13 @@ def without_slots(mlp: Mlp, keep: np.ndarray, size: int) -> Mlp:
 def without_silent_units(mlp: Mlp, model: AnchorModel) -> Mlp:
     """The network without units of its first hidden layer that no anchor ever wakes.
 
-    Their largest sum is bounded part by part: features over all anchors, Psi over all controls, and
-    the direction by its length; so whatever the eye and x are, the network gives what it gave.
+    Their largest sum is bounded part by part: features over all anchors, Psi over all controls, the
+    direction by its length, light by its coefficients; so whatever the eye and x are, the network
+    gives what it gave.
     """
     if len(mlp.weights) < 2:
         return mlp
-    widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
-    part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
+    part_of = np.repeat(mlp.inputs, [model.input_widths[part] for part in mlp.inputs])
     first = mlp.weights[0].astype(np.float64)
     most, size = mlp.biases[0].astype(np.float64), np.abs(mlp.biases[0]).astype(np.float64)
     inputs = {
@@ -91,6 +107,8 @@ def without_silent_units(mlp: Mlp, model: AnchorModel) -> Mlp:
             sums = values @ first[:, part_of == part].T
             most, size = most + sums.max(axis=0), size + np.abs(sums).max(axis=0)
     length = np.linalg.norm(first[:, part_of == "direction"], axis=1)
+    if "light" in mlp.inputs and model.light is not None:
+        length += np.abs(first[:, part_of == "light"][:, 0]) * most_light(model.light).max()
     keep = most + length > -SLACK * (size + length)
     if not keep.any():
         keep[0] = True

@@ -10,8 +10,11 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 FORMAT = "shapeshift 1"
 FRAMES_FORMAT = "shapeshift 2"  # the same, and anchors.npz holds the anchors' own frames
+LIGHT_FORMAT = "shapeshift 3"  # and it holds their light by direction; frames or not
+FORMATS = (FORMAT, FRAMES_FORMAT, LIGHT_FORMAT)
 MANIFEST = "scene.json"
 ANCHORS = "anchors.npz"
+LIGHT = "light"  # the array in it of the anchors' light, and the colour network's input
 LABELS = "labels"  # the array in it that says which object each anchor is of
 WHOLE = f"a package is {MANIFEST}, {ANCHORS} and five ONNX files"
 
@@ -21,6 +24,8 @@ LARGEST_NETWORK = 256 << 20  # bytes; five of 64 MB would draw one frame a minut
 
 def format_name(model: AnchorModel) -> str:
     """What the manifest of its package names."""
+    if model.light is not None:
+        return LIGHT_FORMAT
     return FORMAT if model.frames is None else FRAMES_FORMAT
 
 

@@ -14,7 +14,12 @@ from shapeshift.runtime_models.model import (
     ObjectLabel,
     Stop,
 )
-from shapeshift.runtime_models.package.package_files import FORMAT, FRAMES_FORMAT
+from shapeshift.runtime_models.package.package_files import (
+    FORMATS,
+    FRAMES_FORMAT,
+    LIGHT,
+    LIGHT_FORMAT,
+)
 from shapeshift.runtime_models.stop_dates import check_dates
 from shapeshift.runtime_models.stop_weights import Pace
 
@@ -22,7 +27,7 @@ LARGEST_COUNT = 4096  # splats an anchor, features, Gaussians of the encoding
 LONGEST_PACE = 257  # weights of one pair of stops
 MOST_ROWS = 1 << 16  # stops, or pairs of stops with a pace
 LARGEST_NUMBER = 1e30  # beyond it float32 products overflow
-PARTS = ("feature", "direction", "control")
+PARTS = ("feature", "direction", LIGHT, "control")
 ADVICE = "docs/package.md lists what must be there"
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")
 
@@ -46,35 +51,39 @@ class Manifest:
     provenance: dict
     pace: tuple[Pace, ...] = ()
     between_stops: str = "blend"
-    has_frames: bool = False  # whether anchors.npz holds the anchors' own frames
+    has_frames: bool | None = False  # whether anchors.npz holds anchors' frames; None: maybe
     objects: tuple[ObjectLabel, ...] | None = None  # None: anchors.npz holds no labels
+    has_light: bool = False  # whether it holds their light by direction
 
 
 def read_manifest(data: bytes, where: str) -> Manifest:
     """The checked manifest; `where` is for messages.  Raises BadFile."""
     top = Fields(parse_json(data, where), where, ADVICE)
     found = top.data.get("format")
-    if found not in (FORMAT, FRAMES_FORMAT):
+    if found not in FORMATS:
         raise BadFile(
-            f"{where} has format {shown(found)}, this program reads '{FORMAT}' and "
-            f"'{FRAMES_FORMAT}'; a newer program may be needed."
+            f"{where} has format {shown(found)}, this program reads "
+            f"{', '.join(map(repr, FORMATS[:-1]))} and '{FORMATS[-1]}'; a newer program may be "
+            "needed."
         )
     if (up := top.value("up")) != "+Y":
         raise BadFile(f"{where} has up axis {shown(up)}, expected '+Y'; turn the scene.")
     provenance = Fields(top.value("provenance", {}), f"{where}: 'provenance'", ADVICE)
     check_view(provenance)
     heads, stops = top.object("heads"), read_stops(top)
+    lit = found == LIGHT_FORMAT
     return Manifest(
         top.count("splats_per_anchor", 1, LARGEST_COUNT),
         top.count("feature_width", 1, LARGEST_COUNT),
         read_encoding(top.object("encoding")),
         stops,
-        {name: read_head(name, heads.object(name)) for name in HEADS},
+        {name: read_head(name, heads.object(name), lit) for name in HEADS},
         dict(provenance.data),
         read_pace(top, {stop.name for stop in stops}),
         top.line("between_stops", "blend", known=BETWEEN_STOPS),
-        found == FRAMES_FORMAT,
+        None if lit else found == FRAMES_FORMAT,
         read_objects(top),
+        lit,
     )
 
 
@@ -91,17 +100,20 @@ def read_encoding(entry: Fields) -> ControlEncoding:
     return encoding
 
 
-def read_head(name: str, entry: Fields) -> Head:
+def read_head(name: str, entry: Fields, lit: bool) -> Head:
     file, inputs = entry.text("file"), entry.value("inputs")
     if "/" in file or "\\" in file or not file.endswith(".onnx"):
         raise entry.error("file", "the name of a .onnx in the package")
-    parts = PARTS if name == "color" else ("feature", "control")  # only colour sees the eye
+    known = PARTS if name == "color" else ("feature", "control")  # only colour sees the eye
+    parts = tuple(part for part in known if lit or part != LIGHT)
     if not (
         isinstance(inputs, list)
         and inputs
         and all(inputs.count(part) == 1 and part in parts for part in inputs)
     ):
         raise entry.error("inputs", f"a list of some of {', '.join(parts)}, each once,")
+    if lit and name == "color" and not {"direction", LIGHT} <= set(inputs):
+        raise entry.error("inputs", f"a list with 'direction' and '{LIGHT}' in '{LIGHT_FORMAT}'")
     return Head(file, tuple(inputs), entry.line("activation", known=ACTIVATIONS))
 
 

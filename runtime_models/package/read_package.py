@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.light_harmonics import WIDTH as LIGHT_WIDTH
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, unlimited
 from shapeshift.runtime_models.files.npy import read_array
 from shapeshift.runtime_models.files.zip_files import opened_zip
@@ -22,6 +23,7 @@ from shapeshift.runtime_models.package.feature_codes import decode_features, ran
 from shapeshift.runtime_models.package.package_files import (
     ANCHORS,
     LABELS,
+    LIGHT,
     MANIFEST,
     open_package,
 )
@@ -33,7 +35,10 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 STORED = ("float32", "float16", "uint8")
 TYPES = {"positions": ("float32",), "features": STORED}
 FRAME_TYPES = {"frame_log_scales": STORED, "frame_rotations": STORED}
-LARGEST_LOG = 20.0  # of a frame's scales: beyond it none was meant
+LARGEST = {  # numbers and what they are: beyond it none was meant
+    "frame_log_scales": (20.0, "natural logarithms of factors"),
+    LIGHT: (1e4, "what is added before a sigmoid"),
+}
 SHOWN = 60  # bytes of a splat that is decoded
 
 
@@ -54,8 +59,8 @@ def read_files(
         manifest = read_manifest(data, f"{package}/{MANIFEST}")
     where = f"{package}/{ANCHORS}"
     data = read(ANCHORS)
-    anchors, features, frames = read_anchors(
-        data, manifest.feature_width, where, manifest.has_frames, memory
+    anchors, features, frames, light = read_anchors(
+        data, manifest.feature_width, where, manifest.has_frames, memory, manifest.has_light
     )
     labels = read_labels(data, manifest.objects, len(anchors), where, memory)
     memory.release(len(data))
@@ -68,7 +73,7 @@ def read_files(
     return AnchorModel(
         anchors, features, networks, manifest.splats_per_anchor, manifest.encoding,
         manifest.stops, manifest.provenance, (), manifest.pace, manifest.between_stops, frames,
-        labels, manifest.objects or (),
+        labels, manifest.objects or (), light,
     )  # fmt: skip
 
 
@@ -76,34 +81,49 @@ def read_anchors(
     data: bytes,
     width: int,
     where: str,
-    with_frames: bool = False,
+    with_frames: bool | None = False,
     memory: Account | None = None,
-) -> tuple[np.ndarray, np.ndarray, AnchorFrames | None]:
-    """positions (A, 3) metres and features (A, F), both float32, and the frames where asked for."""
+    with_light: bool = False,
+) -> tuple[np.ndarray, np.ndarray, AnchorFrames | None, np.ndarray | None]:
+    """positions (A, 3) metres and features (A, F), both float32; frames and light (A, 8) where
+    asked for.
+
+    with_frames: None where there may be frames or not; with one of their arrays both must be there.
+    """
     memory = memory or unlimited()
-    types = TYPES | (FRAME_TYPES if with_frames else {})
+    if with_frames is None:
+        with opened_zip(data, where, memory) as archive:
+            names = {f"{name}.npy" for name in FRAME_TYPES}
+            with_frames = not names.isdisjoint(archive.namelist())
+    types = TYPES | (FRAME_TYPES if with_frames else {}) | ({LIGHT: STORED} if with_light else {})
     arrays = read_arrays(data, where, types, memory)
-    columns = {"positions": 3, "features": width, "frame_log_scales": 3, "frame_rotations": 4}
+    columns = {
+        "positions": 3, "features": width, "frame_log_scales": 3, "frame_rotations": 4,
+        LIGHT: LIGHT_WIDTH,
+    }  # fmt: skip
     for name in types:
         refuse_array(arrays[name], name, columns[name], types[name], where, memory)
     for name in types:
         memory.charge(4 * arrays[name].size, f"{len(arrays[name]):,} {name}")
-    tables = [np.ascontiguousarray(arrays["positions"], np.float32)]
+    positions = np.ascontiguousarray(arrays["positions"], np.float32)
+    tables = {}
     for name in list(types)[1:]:
-        tables.append(decode_features(arrays[name], arrays.get(range_of(name)), where, name))
-        if len(tables[0]) != len(tables[-1]):
-            raise BadFile(f"{where}: {len(tables[0])} positions but {len(tables[-1])} {name}.")
+        table = decode_features(arrays[name], arrays.get(range_of(name)), where, name)
+        if len(positions) != len(table):
+            raise BadFile(f"{where}: {len(positions)} positions but {len(table)} {name}.")
+        most, kind = LARGEST.get(name, (np.inf, ""))
+        if name in LARGEST and not np.abs(table).max() <= most:
+            raise BadFile(
+                f"{where}: {name} reach {np.abs(table).max():.3g}, expected {kind}, at most "
+                f"{most:g}; export it again."
+            )
+        tables[name] = table
     memory.release(sum(array.nbytes for array in arrays.values()))
-    positions, features, *frames = tables
-    if not with_frames:
-        return positions, features, None
-    log_scales, wxyz = frames
-    if not np.abs(log_scales).max() <= LARGEST_LOG:
-        raise BadFile(
-            f"{where}: frame_log_scales reach {np.abs(log_scales).max():.3g}, expected natural "
-            f"logarithms of factors, at most {LARGEST_LOG:g}; export it again."
-        )
-    return positions, features, AnchorFrames(np.exp(log_scales), normalize(wxyz))
+    frames = None
+    if "frame_rotations" in tables:
+        scales = np.exp(tables["frame_log_scales"])
+        frames = AnchorFrames(scales, normalize(tables["frame_rotations"]))
+    return positions, tables["features"], frames, tables.get(LIGHT)
 
 
 def read_labels(
@@ -161,7 +181,8 @@ def read_network(name: str, manifest: Manifest, data: bytes, memory: Account) ->
     head, k = manifest.heads[name], manifest.splats_per_anchor
     mlp = read_onnx(data, head.file, head.inputs, memory)
     memory.release(len(data))
-    widths = {"feature": manifest.feature_width, "control": manifest.encoding.d, "direction": 3}
+    widths = {"feature": manifest.feature_width, "control": manifest.encoding.d, "direction": 3,
+              LIGHT: 1}  # fmt: skip
     takes, gives = sum(widths[part] for part in head.inputs), k * SIZE_PER_SPLAT[name]
     if (mlp.width_in, mlp.width_out) != (takes, gives):
         raise BadFile(

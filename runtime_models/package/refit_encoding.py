@@ -115,7 +115,6 @@ def solve_rows(encoding: ControlEncoding, blend: StopBlend) -> np.ndarray:
 def split_columns(model: AnchorModel, name: str) -> dict[str, np.ndarray]:
     """The columns of a network's first layer, float64, by the input that they meet."""
     mlp = model.networks[name]
-    widths = {"feature": model.features.shape[1], "control": model.encoding.d, "direction": 3}
-    ends = np.cumsum([widths[part] for part in mlp.inputs])
+    ends = np.cumsum([model.input_widths[part] for part in mlp.inputs])
     columns = np.split(mlp.weights[0].astype(np.float64), ends[:-1], axis=1)
     return dict(zip(mlp.inputs, columns, strict=True))

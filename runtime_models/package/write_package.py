@@ -22,6 +22,7 @@ from shapeshift.runtime_models.package.package_files import (
     ANCHORS,
     FORMAT,
     LABELS,
+    LIGHT,
     MANIFEST,
     format_name,
     open_package,
@@ -66,6 +67,9 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
         log_scales = np.log(model.frames.scales)
         tables |= encode_features(log_scales, features, "frame_log_scales")
         tables |= encode_features(model.frames.wxyz, features, "frame_rotations")
+    if model.light is not None:
+        kind = exact_kind(model.light) if exact else features
+        tables |= encode_features(model.light, kind, LIGHT)
     if model.labels is not None:
         tables[LABELS] = model.labels
     write_arrays(arrays, {"positions": model.anchors, **tables})

@@ -136,15 +136,15 @@ def stored_features(model: AnchorModel, features: np.ndarray) -> np.ndarray:
 
 def feature_width(mlp: Mlp, model: AnchorModel) -> int:
     """How many features a network meets now."""
-    others = {"control": model.encoding.d, "direction": 3}
-    return mlp.width_in - sum(others[part] for part in mlp.inputs if part in others)
+    widths = model.input_widths
+    return mlp.width_in - sum(widths[part] for part in mlp.inputs if part != "feature")
 
 
 def with_columns(mlp: Mlp, part: str, more: int, model: AnchorModel) -> Mlp:
     """The network with `more` inputs at the end of a part, which it ignores."""
     if part not in mlp.inputs:
         return mlp
-    widths = {"feature": feature_width(mlp, model), "control": model.encoding.d, "direction": 3}
+    widths = model.input_widths | {"feature": feature_width(mlp, model)}
     end = sum(widths[p] for p in mlp.inputs[: mlp.inputs.index(part) + 1])
     first = np.insert(mlp.weights[0], [end] * more, 0, axis=1)
     return replace(mlp, weights=(np.ascontiguousarray(first), *mlp.weights[1:]))
@@ -169,6 +169,7 @@ def widened(
         "feature": feature,
         "control": -np.outer(gate, shut),
         "direction": np.zeros((count, 3)),
+        "light": np.zeros((count, 1)),
     }
     first = np.vstack([mlp.weights[0], np.hstack([blocks[part] for part in mlp.inputs])])
     weights, biases = [first], [np.concatenate([mlp.biases[0], units.bias])]

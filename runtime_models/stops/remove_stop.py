@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.light_harmonics import most_light
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Mlp
 from shapeshift.runtime_models.package.refit_encoding import place_stops, split_columns
 from shapeshift.runtime_models.stops.insert_stop import even_places
@@ -56,6 +57,8 @@ def without_shut_units(model: AnchorModel, head: str) -> Mlp:
         most = most + (model.features.astype(np.float64) @ parts["feature"].T).max(axis=0)
     if "direction" in parts:
         most = most + np.linalg.norm(parts["direction"], axis=1)
+    if "light" in parts and model.light is not None:
+        most = most + np.abs(parts["light"][:, 0]) * most_light(model.light).max()
     if "control" in parts:
         psi = np.stack([model.encoding.encode(stop.x) for stop in model.stops])
         most = most + (psi.astype(np.float64) @ parts["control"].T).max(axis=0)

@@ -91,6 +91,8 @@ def describe_anchors(out: Container, model: AnchorModel) -> dict:
     }  # fmt: skip
     if model.frames is not None:
         entry |= add_frames(out, model.frames.scales, model.frames.wxyz)
+    if model.light is not None:
+        entry["light"] = out.add_table("light", model.light, FEATURE_BITS)
     return entry
 
 
@@ -147,14 +149,15 @@ def network(out: Container, mlp: Mlp, name: str, model: AnchorModel) -> dict:
     """One network: layers in vectors of four, what Psi enters with apart, as the page adds it to
     the first bias.
     """
-    widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
+    widths = model.input_widths
     part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
     weights, biases = list(mlp.weights), list(mlp.biases)
     first = weights[0]  # (outputs, inputs)
     looks, control = "direction" in mlp.inputs, None
     columns = [padded(as_features(first, part_of, widths["feature"]))]
     if looks:
-        columns.append(padded(first[:, part_of == "direction"]))
+        seen = [first[:, part_of == part] for part in ("direction", "light")]  # 3 and 0 or 1
+        columns.append(padded(np.concatenate(seen, axis=1)))
     if "control" in mlp.inputs:
         control = out.add(padded(first[:, part_of == "control"].T).T)
     weights[0] = np.concatenate(columns, axis=1)

@@ -252,9 +252,9 @@ def test_after_falling_back_the_loss_has_to_fall(loss, healthy):
 def test_adam_equals_its_definition():
     device = open_device("cpu")
     rng = RNG(0)
-    start = {"a": rng.normal(size=(7, 3)), "b": rng.normal(size=70)}
+    start = {n: rng.normal(size=(7, 3)) for n in ("a", "light")} | {"b": rng.normal(size=70)}
     start = {n: v.astype(np.float32) for n, v in start.items()}
-    rates = {"a": np.array([0.01]), "b": rng.random(70)}
+    rates = {"a": np.array([0.01]), "b": rng.random(70), "light": np.array([0.02])}
     adam = Adam(device, start, rates)
     value = {n: v.astype(np.float64) for n, v in start.items()}
     mean, square = ({n: np.zeros_like(v) for n, v in value.items()} for _ in range(2))
@@ -262,12 +262,14 @@ def test_adam_equals_its_definition():
         grads = {n: rng.normal(size=v.shape).astype(np.float32) for n, v in start.items()}
         if t == 5:
             grads["a"][:] = 0  # a gradient of nothing must not divide by zero
+            grads["light"][3:] = 0  # nor pulls it
         adam.step({n: device.upload(g) for n, g in grads.items()}, 0.5)
         for n, g in grads.items():
             mean[n] = 0.9 * mean[n] + 0.1 * g
             square[n] = 0.999 * square[n] + 0.001 * g.astype(np.float64) ** 2
             root = np.sqrt(square[n] / (1 - 0.999**t)) + 1e-15
-            value[n] -= 0.5 * rates[n] * mean[n] / (1 - 0.9**t) / root
+            pull = 0.5 * value[n] * (g != 0) if n == "light" else 0  # AdamW: not over the root
+            value[n] -= 0.5 * rates[n] * (mean[n] / (1 - 0.9**t) / root + pull)
     for n in value:
         np.testing.assert_allclose(device.download(adam[n]), value[n], atol=1e-5)
     copy = Adam(device, start, rates)

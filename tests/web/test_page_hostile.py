@@ -12,6 +12,7 @@ import pytest
 from shapeshift.app.document import Document
 from shapeshift.app.page.page_file import page_text
 from shapeshift.app.page.page_scene import PageSettings, page_scene
+from tests.support.models import with_light
 from tests.support.web.page_scenes import paced_model, plain_splats
 
 SCRIPT = Path(__file__).resolve().parents[1] / "support" / "web" / "broken_scene.mjs"
@@ -32,7 +33,11 @@ def broken(node: str, scene: bytes, folder: Path, count: int, seed: int) -> dict
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("model", [paced_model(60), plain_splats(90, 2)], ids=["package", "plain"])
+@pytest.mark.parametrize(
+    "model",
+    [paced_model(60), with_light(paced_model(60)), plain_splats(90, 2)],
+    ids=["package", "light", "plain"],
+)
 @pytest.mark.parametrize("count", [600, pytest.param(20_000, marks=pytest.mark.slow)])
 def test_mutated_scenes_end_in_a_sentence(node, tmp_path, model, count):
     found = broken(node, scene_of(model), tmp_path, count, seed=count)
@@ -53,8 +58,10 @@ def test_a_broken_page_says_one_sentence_and_draws_nothing(browser, tmp_path):
     head = 12 + int.from_bytes(whole[8:12], "little")
     table = json.loads(whole[12:head])
     table["models"][0]["anchors"] = 10**5
+    unlit = json.loads(whole[12:head])
+    unlit["models"][0]["light"] = unlit["models"][0]["features"]  # four numbers a vector, not eight
 
-    def of_table() -> bytes:
+    def of_table(table: dict) -> bytes:
         text = json.dumps(table).encode()
         begin = whole[:8] + len(text).to_bytes(4, "little") + text
         return begin + bytes(-len(begin) % 4) + whole[head + (-head % 4) :]
@@ -63,7 +70,8 @@ def test_a_broken_page_says_one_sentence_and_draws_nothing(browser, tmp_path):
         "cut off": page_with(whole[: head + 8]),
         "no scene for a web page": page_with(b"X" + whole[1:]),
         "table of contents is damaged": page_with(whole[:20] + b"\0" * 40 + whole[60:]),
-        "do not fit": page_with(of_table()),
+        "do not fit": page_with(of_table(table)),
+        "tables do not fit its counts": page_with(of_table(unlit)),
         "larger than": page_with(whole, len(whole) - 1),
         "the size of the scene": page_with(whole, 10**12),
         "is damaged": page_with(whole).replace(

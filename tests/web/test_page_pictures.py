@@ -15,7 +15,7 @@ from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Painted, Sphere
-from tests.support.models import without_control, without_direction
+from tests.support.models import with_light, without_control, without_direction
 from tests.support.web.page_pictures import at, decibels, drawn, expected, still, write_page
 from tests.support.web.page_scenes import paced_model, plain_splats, several_objects
 
@@ -57,8 +57,9 @@ def test_every_control_of_a_package_is_drawn_right(browser, tmp_path):
         without_control(paced_model(50), "offset", "scale", "rotation", "color"),
         pytest.param(without_direction(paced_model(50, framed=False)), marks=pytest.mark.slow),
         replace(paced_model(50), between_stops="encoding", pace=()),
+        with_light(paced_model(60)),
     ],
-    ids=["linear", "deep", "only opacity moves", "no direction", "encoded x"],
+    ids=["linear", "deep", "only opacity moves", "no direction", "encoded x", "light"],
 )
 def test_networks_of_any_shape_are_drawn_right(browser, tmp_path, model):
     document = Document.of(model)

@@ -22,6 +22,7 @@ from shapeshift.rasterizer.bin import bin_tiles  # noqa: E402
 from shapeshift.rasterizer.device import Device  # noqa: E402
 from shapeshift.rasterizer.project import Camera, project  # noqa: E402
 from shapeshift.rasterizer.raster import rasterize_rgba  # noqa: E402
+from shapeshift.runtime_models.colors.light_harmonics import turn_light  # noqa: E402
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
 from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
@@ -154,4 +155,6 @@ def moved(model: AnchorModel, pose: np.ndarray) -> AnchorModel:
     quaternion = Pose.from_matrix(pose).wxyz[None].repeat(len(model.anchors), 0)
     wxyz = product(quaternion, model.frames.wxyz.astype(np.float64)).astype(np.float32)
     anchors = (model.anchors @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32)
-    return replace(model, anchors=anchors, frames=AnchorFrames(model.frames.scales, wxyz))
+    light = None if model.light is None else turn_light(model.light, pose[:3, :3])
+    frames = AnchorFrames(model.frames.scales, wxyz)
+    return replace(model, anchors=anchors, frames=frames, light=light)

@@ -1,6 +1,7 @@
 """What tables of ways to train share: options, captures by name, and runs of which ways take turns.
 
-Imported by growth.py and blended_shapes.py, which have put the project's folder on the path.
+Imported by growth.py, blended_shapes.py and ../colors/light.py, which have put the project's folder
+on the path.
 """
 
 import argparse
@@ -99,7 +100,8 @@ def table(
     """Rows into --out, a run at a time, below the command and the machine."""
     with options.out.open("w", newline="") as file:
         words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
-        file.write(f"# python3 tools/training/{Path(sys.argv[0]).name} {shlex.join(words)}\n")
+        program = Path(sys.argv[0]).resolve().relative_to(Path(__file__).resolve().parents[2])
+        file.write(f"# python3 {program} {shlex.join(words)}\n")
         file.write(f"# {device.name}, {device.platform}\n")
         rows = csv.DictWriter(file, columns, lineterminator="\n")
         rows.writeheader()

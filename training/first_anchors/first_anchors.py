@@ -14,6 +14,7 @@ from shapeshift.training.first_anchors.initial import (
     voxel_centres,
 )
 from shapeshift.training.first_anchors.views import pixel_of
+from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH
 from shapeshift.training.photos import BLACK, LoadedPhoto
 
 NEIGHBOURS = 3  # whose distance is an anchor's size, as the first scale of 3DGS
@@ -30,6 +31,7 @@ class FirstAnchors(NamedTuple):
     anchors: np.ndarray  # (A, 3) metres
     frames: np.ndarray  # (A, 7) logarithms of sizes in voxels, then wxyz: see gaussians.cl
     colors: np.ndarray  # (A, 3) logits
+    light: np.ndarray  # (A, 8) logits, none yet: colours are alike from everywhere
     voxel: float  # metres: the median size
 
 
@@ -49,7 +51,8 @@ def first_anchors(
     seen = np.clip(photo_colors(places, photos, background or BLACK), DARKEST, BRIGHTEST)
     colors = np.log(seen / (1 - seen))
     at, axes, logits = (a.astype(np.float32) for a in (places, frames, colors))
-    return FirstAnchors(at, axes, logits, voxel)
+    light = np.zeros((len(at), ATTRIBUTE_WIDTH["light"]), np.float32)
+    return FirstAnchors(at, axes, logits, light, voxel)
 
 
 def choose_positions(first: InitialPoints, most: int) -> np.ndarray:

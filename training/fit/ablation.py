@@ -166,11 +166,11 @@ def _anchors(part: Component, settings: TrainSettings, stops: tuple) -> TrainSet
 
 
 def _attribute(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    attributes = settings.layout(UNITS).attributes
-    fewer = [name for name in attributes if name not in part.heads]
-    if len(fewer) == len(attributes):
-        return None
-    return replace(settings, anchor_attributes=",".join(fewer))
+    layout = settings.layout(UNITS)
+    fewer = [name for name in layout.attributes if name not in part.heads]
+    less = replace(settings, anchor_attributes=",".join(fewer))
+    # Light has gone already where colours do not see the direction.
+    return None if less.layout(UNITS).per_anchor == layout.per_anchor else less
 
 
 REDUCE = {
@@ -186,6 +186,7 @@ COMPONENTS = (
     Component("half of the hidden units", "hidden", again=True),
     Component("half of the features", "features", again=True),
     Component("anchors' own axes and sizes", "attribute", ("frame",)),
+    Component("anchors' own light by direction", "attribute", ("light",)),
     Component("anchors' own base colours", "attribute", ("color",)),
     Component("one splat of every anchor", "slot", again=True),
     Component("a third of the anchors", "anchors", again=True),

@@ -53,27 +53,31 @@ class Activation:
         }
 
     def attributes_of(self, rows: dict[str, Any]) -> tuple:
-        """Frames and base colours of a step's anchors, or what stands in their place."""
+        """Frames, base colours and light of a step's anchors, or what stands in their place."""
         return tuple(rows.get(name, self.nothing) for name in ATTRIBUTE_WIDTH)
 
-    def forward(self, raw, rows: dict[str, Any]) -> Gaussians:
-        """`rows`: of the optimiser's groups that have a row an anchor, those of the step."""
+    def forward(self, raw, rows: dict[str, Any], eye: np.ndarray) -> Gaussians:
+        """The splats seen from an eye (3,) in metres.
+
+        `rows`: of the optimiser's groups that have a row an anchor, those of the step.
+        """
         self.resize(len(rows["anchors"]))
+        self.eye = [np.float32(v) for v in eye]
         by_row = self.device.kind == "cpu"  # an anchor a work-item, else a splat
         items = self.count if by_row else self.count * self.layout.splats
         self.device.launch(
             self.kernels["activate_rows" if by_row else "activate"], items, 16 if by_row else 64,
-            items, self.reach, self.unit, raw, rows["anchors"], *self.attributes_of(rows),
-            *self.splats.fields(),
+            items, self.reach, self.unit, *self.eye, raw, rows["anchors"],
+            *self.attributes_of(rows), *self.splats.fields(),
         )  # fmt: skip
         return self.splats
 
     def backward(self, raw, rows: dict[str, Any], grad: Gaussians) -> tuple:
         """(grad_raw (A, RAW), by group those of `rows` but the features) of the last `forward`."""
-        splats = self.splats
+        splats, (frames, _, light) = self.splats, self.attributes_of(rows)
         self.device.launch(
             self.kernels["activate_backward"], self.count, 16,
-            self.count, self.reach, self.unit, raw, self.attributes_of(rows)[0],
+            self.count, self.reach, self.unit, *self.eye, raw, rows["anchors"], frames, light,
             splats.scales, splats.opacity, splats.color, *grad.fields(), self.grad_raw,
             self.grad_anchors, *self.attributes_of(self.grad_attributes),
         )  # fmt: skip

@@ -14,8 +14,8 @@ CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients 
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
 RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
 # What anchors may have besides their features, and the optimiser's group of it.
-ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors"}
-ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3}  # numbers an anchor, see gaussians.cl
+ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors", "light": "light"}
+ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3, "light": 8}  # numbers an anchor, see gaussians.cl
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
 
@@ -37,7 +37,7 @@ class HeadLayout:
     control: int = 16  # d of Psi
     fixed: tuple[str, ...] = ()  # heads that do not see Psi: what they give is shared by all stops
     view_dependent: bool = True  # whether colour sees the direction from the eye
-    attributes: tuple[str, ...] = tuple(ANCHOR_ATTRIBUTES)  # of anchors, besides their features
+    attributes: tuple[str, ...] = ("frame", "color")  # of anchors, besides their features
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -52,7 +52,8 @@ class HeadLayout:
     @property
     def per_anchor(self) -> tuple[str, ...]:
         """The optimiser's groups that have a row for each anchor."""
-        return ("anchors", "features", *(ANCHOR_ATTRIBUTES[name] for name in self.attributes))
+        own = (name for name in self.attributes if name != "light" or self.view_dependent)
+        return ("anchors", "features", *(ANCHOR_ATTRIBUTES[name] for name in own))
 
     def parts_of(self, name: str) -> tuple[str, ...]:
         """What a head's network takes, in the order of the exported one (eq. 5)."""
@@ -92,6 +93,7 @@ class HeadLayout:
             "CONDITIONED": sum(1 << m for m, name in enumerate(HEADS) if name not in self.fixed),
             "FRAMES": "frame" in self.attributes,
             "BASE_COLORS": "color" in self.attributes,
+            "LIGHT": "light" in self.per_anchor,
         }  # fmt: skip
         for m, out in enumerate(self.outs):
             numbers |= {

@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 BETA1, BETA2 = 0.9, 0.999  # the same numbers stand in adam.cl
+# Towards 0, of a group: each step that shows a value takes so much of it, times the rate, from it.
+# Of light that leaves what the photos agree on: their gradients mostly point one way, those of
+# chance do not.
+PULL = {"light": np.float32(0.5)}
 
 
 @dataclass
@@ -67,17 +71,17 @@ class Adam:
         scale = np.float32(rate_scale)
         for name, group in self.groups.items():
             moments = group.value, group.mean, group.square
-            chosen = None if rows is None else rows.get(name)
+            chosen, pull = None if rows is None else rows.get(name), PULL.get(name, np.float32(0))
             if chosen is None:
                 count = group.value.size
                 self.device.launch(
                     self.kernels["adam"], count, 64, count, first, second, scale,
-                    int(group.rates.size > 1), group.rates, grads[name], *moments,
+                    int(group.rates.size > 1), pull, group.rates, grads[name], *moments,
                 )  # fmt: skip
                 continue
             self.device.launch(
                 self.kernels["adam_rows"], len(chosen), 64, len(chosen), group.value.shape[1],
-                chosen, first, second, scale, group.rates, grads[name], *moments,
+                chosen, first, second, scale, pull, group.rates, grads[name], *moments,
             )  # fmt: skip
 
     def state(self) -> dict[str, np.ndarray]:

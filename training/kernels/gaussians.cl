@@ -1,17 +1,22 @@
 // Raw outputs of the heads -> Gaussians, forward and backward: the activations of each head.
 //
 // Defined by networks.py: SPLATS (k an anchor), RAW and OUT_AT0..4 in the order of the heads
-// offset, scale, rotation, opacity, colour; FRAMES and BASE_COLORS (1: anchors have such).
+// offset, scale, rotation, opacity, colour; FRAMES, BASE_COLORS and LIGHT (1: anchors have such).
 // offset = reach * tanh(h) metres     (bounded: culling boxes can rely on it)
 // scale  = unit * exp(clip(h, -6, 3)) metres, one sigma
-// opacity = tanh(h), below zero absent; colour = sigmoid(h + c) with the anchor's base colour c, a
-// logit; rotation is left as it comes, wxyz.
+// opacity = tanh(h), below zero absent; colour = sigmoid(h + c + l) with the anchor's base colour c
+// and what its light l adds, logits; rotation is left as it comes, wxyz.
 // A frame (A, 7) is an anchor's own sizes, as logarithms s, and axes, as a quaternion q of any
 // length: mean = anchor + R(q) (exp(s) * offset), scale = exp(s) * scale, rotation = q times it.
-// Reads:   raw (A, RAW), anchors (A, 3), frames, base colours; backward the Gaussians' gradients.
+// Light (A, 8) makes an anchor lighter or darker by the direction d from the eye to it:
+// coefficients of the spherical harmonics of degrees 1 and 2, in units of those of degree 1, so
+// that these are x, y and z:  l = sum of light_j Y_j(d), the same for the three channels.
+// Reads:   raw (A, RAW), anchors (A, 3), frames, base colours, light, the eye; backward the
+//          Gaussians' gradients.
 // Writes:  means, scales, wxyz, opacity, color; backward grad_raw and gradients of what it read.
 // Units:   metres; one sigma; opacity and display sRGB in 0..1.
 
+#include "direction.cl"
 #define LOWEST -6.0f
 #define HIGHEST 3.0f
 #define FRAME 7
@@ -53,11 +58,42 @@ inline float3 base_color(int a, __global const float *colors) {
 #endif
 }
 
-__kernel void activate(int splats, float reach, float unit, __global const float *raw,
-                       __global const float *anchors, __global const float *frames,
-                       __global const float *colors, __global float *means,
-                       __global float *scales, __global float *wxyz, __global float *opacity,
-                       __global float *color) {
+#define HARMONICS 8
+
+// Y_j(d): x, y, z; sqrt(5) (xy, yz, zx); sqrt(5/12) (2 z^2 - x^2 - y^2); sqrt(5/4) (x^2 - y^2).
+inline float8 harmonics(float3 d) {
+  float3 two = 2.2360680f * d * d.yzx;
+  float3 square = d * d;
+  return (float8)(d, two, 0.6454972f * (2.0f * square.z - square.x - square.y),
+                  1.1180340f * (square.x - square.y));
+}
+
+// What the gradient by l is by d, for an anchor's light.
+inline float3 harmonics_backward(float8 light, float3 d) {
+  float3 two = 2.2360680f * light.s345;
+  return light.s012 + two * d.yzx + (two * d).zxy +
+         1.2909944f * light.s6 * (float3)(-d.x, -d.y, 2.0f * d.z) +
+         2.2360680f * light.s7 * (float3)(d.x, -d.y, 0.0f);
+}
+
+// What an anchor adds to the logits of all its splats.
+inline float3 own_color(int a, float3 eye, __global const float *anchors,
+                        __global const float *colors, __global const float *light) {
+  float3 sum = base_color(a, colors);
+#if LIGHT
+  float3 d = direction_and_inverse(eye, anchors + 3 * a).xyz;
+  float8 each = vload8(a, light) * harmonics(d);
+  float4 half_of = each.lo + each.hi;
+  sum += half_of.x + half_of.y + half_of.z + half_of.w;
+#endif
+  return sum;
+}
+
+__kernel void activate(int splats, float reach, float unit, float eye_x, float eye_y, float eye_z,
+                       __global const float *raw, __global const float *anchors,
+                       __global const float *frames, __global const float *colors,
+                       __global const float *light, __global float *means, __global float *scales,
+                       __global float *wxyz, __global float *opacity, __global float *color) {
   int i = get_global_id(0);
   if (!(i < splats)) return;
   int a = i / SPLATS, k = i % SPLATS;
@@ -67,17 +103,19 @@ __kernel void activate(int splats, float reach, float unit, __global const float
   vstore3(vload3(a, anchors) + turned(f.turn, f.size * offset), i, means);
   vstore3(f.size * unit * exp(clamp(vload3(k, h + OUT_AT1), LOWEST, HIGHEST)), i, scales);
   vstore4(product(f.turn, vload4(k, h + OUT_AT2)), i, wxyz);
-  vstore3(1.0f / (1.0f + exp(-(vload3(k, h + OUT_AT4) + base_color(a, colors)))), i, color);
+  float3 own = own_color(a, (float3)(eye_x, eye_y, eye_z), anchors, colors, light);
+  vstore3(1.0f / (1.0f + exp(-(vload3(k, h + OUT_AT4) + own))), i, color);
   opacity[i] = tanh(h[OUT_AT3 + k]);
 }
 
 #define PADDED(n) (((n) + 7) / 8 * 8)
 
 // The same for a CPU, one work-item an anchor: its row of raw outputs in vectors of eight.
-__kernel void activate_rows(int anchors_count, float reach, float unit, __global const float *raw,
+__kernel void activate_rows(int anchors_count, float reach, float unit, float eye_x, float eye_y,
+                            float eye_z, __global const float *raw,
                             __global const float *anchors, __global const float *frames,
-                            __global const float *colors, __global float *means,
-                            __global float *scales, __global float *wxyz,
+                            __global const float *colors, __global const float *light,
+                            __global float *means, __global float *scales, __global float *wxyz,
                             __global float *opacity, __global float *color) {
   int a = get_global_id(0);
   if (!(a < anchors_count)) return;
@@ -87,7 +125,8 @@ __kernel void activate_rows(int anchors_count, float reach, float unit, __global
   float offset[PADDED(3 * SPLATS)], scale[PADDED(3 * SPLATS)], shade[PADDED(3 * SPLATS)];
   float solid[PADDED(SPLATS)], base[PADDED(3 * SPLATS)];
   for (int c = 0; c < PADDED(3 * SPLATS) / 8; c++) vstore8(0.0f, c, base);
-  for (int k = 0; k < SPLATS * BASE_COLORS; k++) vstore3(base_color(a, colors), k, base);
+  float3 own = own_color(a, (float3)(eye_x, eye_y, eye_z), anchors, colors, light);
+  for (int k = 0; k < SPLATS * (BASE_COLORS || LIGHT); k++) vstore3(own, k, base);
   for (int c = 0; c < PADDED(3 * SPLATS) / 8; c++) {
     vstore8(reach * tanh(vload8(c, h + OUT_AT0)), c, offset);
     vstore8(unit * exp(clamp(vload8(c, h + OUT_AT1), LOWEST, HIGHEST)), c, scale);
@@ -114,16 +153,18 @@ inline float4 turned_backward(float4 q, float3 v, float3 grad) {
 
 // One work-item an anchor: its splats' gradients become the row of raw gradients, and those of the
 // means also add up to the anchor's own.
-__kernel void activate_backward(int anchors_count, float reach, float unit,
-                                __global const float *raw, __global const float *frames,
-                                __global const float *scales, __global const float *opacity,
-                                __global const float *color, __global const float *grad_means,
+__kernel void activate_backward(int anchors_count, float reach, float unit, float eye_x,
+                                float eye_y, float eye_z, __global const float *raw,
+                                __global const float *anchors, __global const float *frames,
+                                __global const float *light, __global const float *scales,
+                                __global const float *opacity, __global const float *color,
+                                __global const float *grad_means,
                                 __global const float *grad_scales,
                                 __global const float *grad_wxyz,
                                 __global const float *grad_opacity,
                                 __global const float *grad_color, __global float *grad_raw,
                                 __global float *grad_anchors, __global float *grad_frames,
-                                __global float *grad_colors) {
+                                __global float *grad_colors, __global float *grad_light) {
   int a = get_global_id(0);
   if (!(a < anchors_count)) return;
   __global const float *h = raw + a * RAW;
@@ -153,6 +194,14 @@ __kernel void activate_backward(int anchors_count, float reach, float unit,
     by_turn += turned_backward(f.turn, offset, grad);
     by_turn += product(by_wxyz, inverse(vload4(k, h + OUT_AT2)));
   }
+#if LIGHT
+  float4 look = direction_and_inverse((float3)(eye_x, eye_y, eye_z), anchors + 3 * a);
+  float by_light = by_color.x + by_color.y + by_color.z;
+  vstore8(by_light * harmonics(look.xyz), a, grad_light);
+  float3 by_look = by_light * harmonics_backward(vload8(a, light), look.xyz);
+  // Through the division by the distance: what points along the direction does nothing.
+  by_anchor += (by_look - look.xyz * dot(by_look, look.xyz)) * look.w;
+#endif
   vstore3(by_anchor, a, grad_anchors);
 #if FRAMES
   vstore3(by_size, 0, grad_frames + FRAME * a);

@@ -15,6 +15,7 @@
 // Writes:  bias and the transposed layers; grad, the gradient of all weights.
 // Units:   anchors in metres; features, Psi and units have none.
 
+#include "direction.cl"
 #define DIRECTION_ROW (FEATURES + CONTROL)
 #define INPUTS (FEATURES + CONTROL + 3)
 #define HIDDEN8 (HIDDEN / 8)
@@ -27,14 +28,6 @@
 __constant int OUT[5] = {OUT0, OUT1, OUT2, OUT3, OUT4};
 __constant int OUT_AT[5] = {OUT_AT0, OUT_AT1, OUT_AT2, OUT_AT3, OUT_AT4};
 __constant int WEIGHTS_AT[5] = {WEIGHTS_AT0, WEIGHTS_AT1, WEIGHTS_AT2, WEIGHTS_AT3, WEIGHTS_AT4};
-
-// Unit vector from the eye to an anchor (eq. 4) and 1 / distance; finite when they coincide.
-inline float4 direction_and_inverse(float3 eye, __global const float *anchor) {
-  float3 d = (float3)(anchor[0], anchor[1], anchor[2]) - eye;
-  // 1e-8 metres: where eye and anchor coincide, the direction is 0 and nothing is infinite.
-  float inverse = 1.0f / fmax(sqrt(dot(d, d)), 1e-8f);
-  return (float4)(d * inverse, inverse);
-}
 
 // One work-item a hidden unit of a head: the folded bias, and both layers transposed, so that the
 // backward kernel never sums across a vector.

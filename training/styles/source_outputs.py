@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.evaluate import directions
+from shapeshift.runtime_models.evaluate import directions, looked_along
 from shapeshift.runtime_models.model import HEADS, AnchorModel
 from shapeshift.runtime_models.network_sessions import FoldedNetwork
 from shapeshift.runtime_models.session import BATCH
@@ -37,7 +37,8 @@ class SourceOutputs:
         if not self.follows_eye or seen_from == self.eye:
             return False
         self.eye = seen_from
-        self.fill("color", {"direction": directions(self.model.anchors, np.array(seen_from))})
+        direction = directions(self.model.anchors, np.array(seen_from))
+        self.fill("color", looked_along(self.model, direction))
         return True
 
     def fill(self, head: str, parts: dict[str, np.ndarray]) -> None:

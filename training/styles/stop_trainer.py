@@ -173,7 +173,7 @@ class StopStep(TrainingStep):
                 self.kernels["add_source"], raw.size, 64, raw.size, self.may_change, self.base, raw
             )
         with self.timed("activate"):
-            return self.activation.forward(raw, self.gathered)
+            return self.activation.forward(raw, self.gathered, eye)
 
     def backward(self, grad: Gaussians) -> dict[str, object]:
         """The gradients by what the optimiser holds of those by the last splats decoded."""

@@ -1,13 +1,16 @@
 """A finished model as what an optimiser holds: the inverse of training/export.py.
 
 The base colours of a package lie among its features, and what adds them to the colour network's
-outputs among its hidden units; here they stay there.  Networks with fewer hidden units than the
+outputs among its hidden units; here they stay there.  Light by direction is taken out of the colour
+network, as the kernels add it themselves.  Networks with fewer hidden units than the
 widest get units that are 0, and stay 0.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
-from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile
+from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Mlp
 from shapeshift.training.heads.gaussians import REACH
 from shapeshift.training.heads.networks import HeadLayout, Layers, padded
 from shapeshift.training.styles.stop_trainer import refuse_unusual
@@ -22,14 +25,42 @@ def layout_of(model: AnchorModel) -> HeadLayout:
                 f"the {name} network of this scene has {len(model.networks[name].weights) - 1} "
                 "hidden layers; scenes with one in every network can be updated."
             )
+    networks = model.networks | {"color": unlit_color(model)}
+    own = ("frame", model.frames is not None), ("light", model.light is not None)
     return HeadLayout(
         model.splats_per_anchor,
         model.features.shape[1],
-        max(len(model.networks[name].biases[0]) for name in HEADS),
+        max(len(mlp.biases[0]) for mlp in networks.values()),
         model.encoding.d,
         tuple(name for name in HEADS if "control" not in model.networks[name].inputs),
         "direction" in model.networks["color"].inputs,
-        () if model.frames is None else ("frame",),
+        tuple(name for name, there in own if there),
+    )
+
+
+def unlit_color(model: AnchorModel) -> Mlp:
+    """The colour network without its input "light" and the units that carry it to the outputs.
+
+    Raises BadFile where these do otherwise than add it to every logit.
+    """
+    color = model.networks["color"]
+    if model.light is None:
+        return color
+    at = np.repeat(color.inputs, [model.input_widths[part] for part in color.inputs]) == "light"
+    (first, last), (bias, _) = color.weights, color.biases
+    slope = first[:, at][:, 0]
+    carry = slope != 0
+    adds = [last[:, side] @ slope[side] for side in (slope > 0, slope < 0)]  # of l > 0 and l < 0
+    if first[carry][:, ~at].any() or bias[carry].any() or not all((a == 1).all() for a in adds):
+        raise BadFile(
+            "the color network of this scene mixes light by direction with its other inputs; "
+            "scenes of `train`, where it is added to them, can be updated."
+        )
+    return replace(
+        color,
+        weights=(first[~carry][:, ~at], last[:, ~carry]),
+        biases=(bias[~carry], color.biases[1]),
+        inputs=tuple(part for part in color.inputs if part != "light"),
     )
 
 
@@ -42,7 +73,7 @@ def packed_weights(model: AnchorModel, layout: HeadLayout) -> np.ndarray:
     """The model's networks as the device's flat weights."""
     networks: dict[str, Layers] = {}
     for name in HEADS:
-        mlp = model.networks[name]
+        mlp = unlit_color(model) if name == "color" else model.networks[name]
         more = layout.hidden - len(mlp.biases[0])
         networks[name] = (
             np.pad(mlp.weights[0], ((0, more), (0, 0))),
@@ -61,4 +92,6 @@ def rows_of(model: AnchorModel, layout: HeadLayout) -> dict[str, np.ndarray]:
     if model.frames is not None:
         frames = [np.log(model.frames.scales), model.frames.wxyz]
         rows["frames"] = np.hstack(frames).astype(np.float32)
+    if model.light is not None:
+        rows["light"] = model.light.astype(np.float32)
     return rows

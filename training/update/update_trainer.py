@@ -155,11 +155,15 @@ class UpdateTrainer(Trainer):
                 np.concatenate([frames.scales, np.exp(halves(sizes))]),
                 np.concatenate([frames.wxyz, normalize(halves(turns))]),
             )
+        light = old.light
+        if light is not None:
+            light = np.concatenate([light, halves(learned["light"])])
         return replace(
             old,
             anchors=np.concatenate([old.anchors, anchors]),
             features=np.concatenate([old.features, features]),
             frames=frames,
+            light=light,
             labels=self.labels_of(anchors),
             provenance=self.provenance(),
         )

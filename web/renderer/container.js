@@ -171,6 +171,7 @@ function checkModel(model, array) {
     whole(d, 1, 256, "the width of the control encoding");
     if (!(Number.isFinite(spacing) && sigma > 0)) refuse("the control encoding is none");
     if (model.features?.width !== 4 * features) refuse("the scene's tables do not fit its counts");
+    if (model.light && !(model.light.width === 8 && model.networks?.color?.looks)) refuse("the scene's tables do not fit its counts");
     /** @type {Record<string, number>} */
     const vectors = { offset: Math.ceil((3 * k) / 4), scale: Math.ceil((3 * k) / 4), rotation: k, opacity: Math.ceil(k / 4), color: Math.ceil((3 * k) / 4) };
     for (const [name, outs] of Object.entries(vectors)) checkNetwork(model.networks?.[name], features, outs, d, array);

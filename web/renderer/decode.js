@@ -81,7 +81,7 @@ export class Decoder {
                 let framebuffer = target.framebuffers.get(key);
                 if (!framebuffer) target.framebuffers.set(key, (framebuffer = gpu.framebufferOfLayers(target.texture, first, part.outs)));
                 program.use({
-                    inputs: { layers: inputs }, anchors: { texture: model.anchorList }, stop_weights: { texture: object.own?.texture ?? model.anchorList },
+                    inputs: { layers: inputs }, anchors: { texture: model.anchorList }, stop_weights: { texture: object.own?.texture ?? model.anchorList }, light: { texture: model.lightList ?? model.anchorList }, lit: { int: model.lightList ? 1 : 0 },
                     first_anchor: { int: batch.first }, count: { int: model.anchors }, input_row: { int: inputRow }, ins: { int: of.ins - (looks ? 1 : 0) },
                     looks: { int: looks ? 1 : 0 }, stops: { int: l ? 0 : stops }, head: { int: headNumber(last ? net.head : "relu") },
                     low: last ? net.clip[0] : -LARGEST, high: last ? net.clip[1] : LARGEST, gain: last ? net.gain : 1, eye,

@@ -19,9 +19,10 @@ export function layerShader(outs) {
     const add = (/** @type {string} */ n, /** @type {string} */ value) => each((o) => [0, 1, 2, 3].map((c) => `s${o} += w[${n} + ${4 * o + c}] * ${value}.${"xyzw"[c]};`).join(" "));
     return `
 uniform sampler2DArray inputs;   // vector i of an anchor in layer i
-uniform sampler2D anchors, stop_weights;
+uniform sampler2D anchors, stop_weights, light;
 uniform int first_anchor, count, input_row, ins;
-uniform bool looks;              // the last vector of inputs is the direction from the eye
+uniform bool looks;              // the last vector of inputs is the direction from the eye, and light
+uniform bool lit;                // anchors have light by direction
 uniform int stops;               // each anchor has weights of so many stops; 0: Psi is in the bias
 uniform vec4 mask[16];           // of the stops that count
 uniform int head;                // index of HEADS
@@ -50,6 +51,14 @@ vec3 direction_from(vec3 eye, vec3 point) {
     return ray / length(ray);
 }
 
+// What coefficients of the spherical harmonics of degree 1 and 2 give along d, in units of degree 1.
+float light_along(vec4 low, vec4 high, vec3 d) {
+    vec3 products = 2.2360680 * d * d.yzx, squares = d * d;
+    float zone = 0.6454972 * (2.0 * squares.z - squares.x - squares.y);
+    float rest = 1.1180340 * (squares.x - squares.y);
+    return dot(low, vec4(d, products.x)) + dot(high, vec4(products.yz, zone, rest));
+}
+
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     int a = first_anchor + here.y * WIDTH + here.x;
@@ -62,6 +71,7 @@ void main() {
     }
     if (looks) {
         vec4 v = vec4(direction_from(eye, texelFetch(anchors, at(a), 0).xyz), 0.0);
+        if (lit) v.w = light_along(texelFetch(light, at(2 * a), 0), texelFetch(light, at(2 * a + 1), 0), v.xyz);
         int n = ins * ${4 * outs};
         ${add("n", "v")}
     }

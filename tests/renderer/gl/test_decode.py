@@ -17,7 +17,7 @@ from shapeshift.renderer.gl.networks import ACTIVATIONS, pack_mlp
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, Mlp, SplatLayers
 from shapeshift.runtime_models.rotation import covariance
-from tests.support.models import with_frames
+from tests.support.models import with_frames, with_light
 from tests.support.renderer.gl_models import f32, make_layers, make_mlp, make_model, read
 
 EYE = np.array([0.3, -0.2, 2.0])
@@ -68,6 +68,31 @@ def test_sizes_around_the_work_groups(gpu, anchors, k):
 @pytest.mark.parametrize("k", [1, 3])
 def test_anchors_with_axes_and_sizes_of_their_own(gpu, anchors, k):
     assert_as_evaluated(gpu, with_frames(make_model(anchors, k=k)))
+
+
+@pytest.mark.parametrize("anchors", [1, BLOCK + 1, GROUP + 1])
+def test_anchors_with_light_by_direction(gpu, anchors):
+    model = with_light(make_model(anchors, k=3))
+    color = assert_as_evaluated(gpu, model)[3]
+    assert (
+        np.abs(color - assert_as_evaluated(gpu, replace(model, light=-model.light))[3]).max() > 0.1
+    )
+    at_anchor = assert_as_evaluated(gpu, model, eye=model.anchors[0])[3]  # no direction, no light
+    dark = replace(model, light=np.zeros_like(model.light))
+    np.testing.assert_allclose(
+        at_anchor[:3], Evaluator(dark).color(0.4, model.anchors[0])[:3], atol=1e-5
+    )
+
+
+def test_light_of_one_model_is_not_that_of_another(gpu):
+    """The same arena holds a model with light between two without; each has its own."""
+    models = make_model(70), with_light(make_model(70)), make_model(70)
+    with Arena(gpu, [m.splat_count for m in models]) as arena, Decoder(gpu, arena, models) as made:
+        for i in (0, 1, 2, 1, 0):
+            made.color(i, 0.3, EYE)
+        found = np.split(read(arena.color, np.float32, 4)[:, :3], 3)
+    for model, color in zip(models, found, strict=True):
+        np.testing.assert_allclose(color, Evaluator(model).color(0.3, EYE), atol=1e-5)
 
 
 def test_frames_of_one_model_are_not_those_of_another(gpu):

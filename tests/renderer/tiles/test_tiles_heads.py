@@ -23,6 +23,7 @@ from tests.support.models import (
     psi_of,
     run_in_numpy,
     with_frames,
+    with_light,
     without_control,
     without_direction,
 )
@@ -46,6 +47,19 @@ def decoded(model: AnchorModel, x: float, eye=EYE, seen=None) -> tuple[np.ndarra
     for rows in found:
         assert (rows[:BEFORE] == -7).all() and (rows[BEFORE + n :] == -7).all()
     return tuple(rows[BEFORE : BEFORE + n] for rows in found)
+
+
+@pytest.mark.parametrize("anchors", [1, BLOCK, BLOCK + 1, RUNS + 1])
+@pytest.mark.parametrize("size", [1.0, 20.0])  # 20: light alone wakes units, and closes them
+def test_anchors_with_light_by_direction(anchors, size):
+    """onnxruntime and numpy's harmonics; at an anchor there is no direction, so no light."""
+    model = with_light(make_random_model(anchors, k=3))
+    model = replace(model, light=np.float32(size) * model.light)
+    for eye in (EYE, -EYE, model.anchors[0].astype(np.float64)):
+        found, want = decoded(model, 0.4, eye)[2][:, :3], Evaluator(model).color(0.4, eye)
+        np.testing.assert_allclose(found, want, rtol=0, atol=2e-5)
+    dark = decoded(replace(model, light=-model.light), 0.4)[2]
+    assert np.abs(dark - decoded(model, 0.4)[2]).max() > 0.1
 
 
 def slow(model: AnchorModel, x: float, eye=EYE) -> tuple[np.ndarray, ...]:

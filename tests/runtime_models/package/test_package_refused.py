@@ -125,7 +125,7 @@ BROKEN = {
     "file of another kind": (head("offset", file="scene.json"), "name of a .onnx in the package"),
     # manifest
     "unknown version": (edit(format="shapeshift 9"),
-                        "format \"shapeshift 9\", this program reads 'shapeshift 1' and"),
+                        "format \"shapeshift 9\", this program reads 'shapeshift 1', "),
     "no version": (edit(format=None), "has format null"),
     "not JSON": (write(MANIFEST, b"{"), "scene/scene.json is not JSON"),
     "not text": (write(MANIFEST, b"\xff\xfe\xfa"), "is not JSON"),

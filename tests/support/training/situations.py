@@ -13,13 +13,16 @@ from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
 from shapeshift.training.reference import decode_reference, step_loss_reference
 from shapeshift.training.step import TrainingStep
 
-LAYOUT = HeadLayout(splats=2, features=8, hidden=8, control=4)
+LAYOUT = HeadLayout(
+    splats=2, features=8, hidden=8, control=4, attributes=("frame", "color", "light")
+)
 OTHERS = {
     "shape fixed": replace(LAYOUT, fixed=("offset", "scale", "rotation")),
     "colour alike from everywhere": replace(LAYOUT, view_dependent=False),
     "all at once": replace(LAYOUT, fixed=("opacity", "color"), view_dependent=False),
-    "no frames": replace(LAYOUT, attributes=("color",)),
-    "no base colours": replace(LAYOUT, attributes=("frame",)),
+    "no frames": replace(LAYOUT, attributes=("color", "light")),
+    "no base colours": replace(LAYOUT, attributes=("frame", "light")),
+    "no light": replace(LAYOUT, attributes=("frame", "color")),
 }
 VOXEL = 0.5
 SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
@@ -35,7 +38,10 @@ def situation(seed: int, layout: HeadLayout = LAYOUT):
         "anchors": rng.uniform(-0.6, 0.6, (5, 3)).astype(np.float32),
         "features": rng.normal(size=(5, 8)).astype(np.float32),
     }
-    own = {"frames": rng.normal(0, 0.5, (5, 7)), "colors": rng.normal(size=(5, 3))}
+    own = {
+        "frames": rng.normal(0, 0.5, (5, 7)), "colors": rng.normal(size=(5, 3)),
+        "light": rng.normal(0, 0.5, (5, 8)),
+    }  # fmt: skip
     parameters |= {n: own[n].astype(np.float32) for n in layout.per_anchor[2:]}
     control = rng.random(4).astype(np.float32)
     eye = look_at(np.array([0.5, 0.7, 3.0]), np.zeros(3))

@@ -201,16 +201,22 @@ def test_a_model_of_which_nothing_shows_keeps_its_anchors():
 
 
 def test_a_change_of_the_state_keeps_the_others_moments():
-    layout = HeadLayout()
+    layout = HeadLayout(attributes=("frame", "color", "light"))
     state = {"weights.value": np.ones(3)}
-    for name, width in (("anchors", 3), ("features", 8), ("frames", 7), ("colors", 3)):
+    for name, width in (
+        ("anchors", 3),
+        ("features", 8),
+        ("frames", 7),
+        ("colors", 3),
+        ("light", 8),
+    ):
         for part in ("value", "mean", "square"):
             state[f"{name}.{part}"] = RNG(0).normal(size=(4, width)).astype(np.float32)
     new = NewAnchors(np.full((2, 3), 9, np.float32), np.array([3, 0]))
     keep = np.array([True, False, True, True])
     out = resize_optimizer_state(state, layout.per_anchor, keep, new)
     np.testing.assert_array_equal(out["features.mean"][:3], state["features.mean"][keep])
-    for name in ("features", "colors"):
+    for name in ("features", "colors", "light"):
         value = out[f"{name}.value"][3:]
         np.testing.assert_array_equal(value, state[f"{name}.value"][[3, 0]])
     frames, parents = out["frames.value"][3:], state["frames.value"][[3, 0]]
@@ -222,8 +228,11 @@ def test_a_change_of_the_state_keeps_the_others_moments():
 
 @pytest.mark.parametrize("features", [1, 8, 33])
 @pytest.mark.parametrize("max_mb", [0.08, 0.2])
-def test_a_package_within_its_megabytes(tmp_path, features, max_mb):
-    layout, encoding = HeadLayout(5, features, 32, 16), ControlEncoding(16, 1 / 15, 0.04)
+@pytest.mark.parametrize("lit", [False, True])
+def test_a_package_within_its_megabytes(tmp_path, features, max_mb, lit):
+    attributes = ("frame", "color", "light") if lit else ("frame", "color")
+    layout = HeadLayout(5, features, 32, 16, attributes=attributes)
+    encoding = ControlEncoding(16, 1 / 15, 0.04)
     settings = TrainSettings(max_mb=max_mb, max_anchors=10**9, features=features)
     most = anchor_cap(settings, layout, encoding, STOPS)
     rng = RNG(0)
@@ -233,6 +242,7 @@ def test_a_package_within_its_megabytes(tmp_path, features, max_mb):
         "features.value": rng.normal(size=(most, -(-features // 8) * 8)).astype(np.float32),
         "frames.value": rng.normal(size=(most, 7)).astype(np.float32),
         "colors.value": rng.normal(size=(most, 3)).astype(np.float32),
+        "light.value": rng.normal(size=(most, 8)).astype(np.float32),
     }  # noise, which does not compress
     model = model_of(state, layout, 0.1, encoding, STOPS, {"settings": settings.as_dict()})
     size = write_package(model, tmp_path / "a.shift")

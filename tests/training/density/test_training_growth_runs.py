@@ -23,6 +23,7 @@ WAYS = {
     "to the cap": {},
     "at the cap": {"max_anchors": FIRST},
     "no attributes": {"anchor_attributes": ""},
+    "with light": {"anchor_attributes": "frame,color,light"},
 }
 
 
@@ -71,6 +72,19 @@ def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
     assert write_package(trainer.model(), tmp_path / "a.shift") <= 0.085e6
     finite = all(np.isfinite(a).all() for a in trainer.adam.state().values())
     assert finite
+
+
+def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
+    root, out = Path(__file__).resolve().parents[3], tmp_path / "light.csv"
+    program = [sys.executable, "tools/colors/light.py", str(balls.folder), "--out", str(out)]
+    program += ["--iterations", "40", "--max-anchors", "300"]
+    subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)
+    rows = list(csv.DictReader(out.read_text().splitlines()[2:]))
+    assert [row["modality"] for row in rows] == 2 * ["RGB", "Thermal", "mean"]
+    size = [int(row["package_bytes"]) for row in rows]
+    # Eight halves an anchor, less what deflating saves and with the name of an array.
+    assert 300 * 8 < size[3] - size[0] < 300 * 16 + 600
+    assert all(float(row["psnr_db"]) > 10 for row in rows)
 
 
 def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path):

@@ -97,7 +97,7 @@ def test_what_another_part_won_is_not_used_up():
 
 
 def test_settings_without_each_part():
-    settings = TrainSettings()
+    settings = TrainSettings(anchor_attributes="frame,color,light")
     found = {name: part.without(settings, STOPS) for name, part in BY_NAME.items()}
     assert found["shape that follows x"].layout(2).fixed == SHAPE_HEADS
     assert found["scale that follows x"].fixed == "scale"
@@ -107,8 +107,12 @@ def test_settings_without_each_part():
     assert found["half of the features"].features == 8
     assert found["one splat of every anchor"].splats_per_anchor == 4
     assert found["a third of the anchors"].max_anchors == 8000
-    assert found["anchors' own axes and sizes"].anchor_attributes == "color"
-    assert found["anchors' own base colours"].anchor_attributes == "frame"
+    assert found["anchors' own axes and sizes"].anchor_attributes == "color,light"
+    assert found["anchors' own base colours"].anchor_attributes == "frame,light"
+    assert found["anchors' own light by direction"].anchor_attributes == "frame,color"
+    for none in ({}, {"view_dependent": False, "anchor_attributes": "frame,light"}):
+        usual = TrainSettings(**none)  # blind colours have no light, so nothing is taken away
+        assert BY_NAME["anchors' own light by direction"].without(usual, STOPS) is None
 
 
 def test_parts_that_are_not_there_are_not_tried():

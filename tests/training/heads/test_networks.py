@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
 from shapeshift.runtime_models.package.read_package import read_files
@@ -13,6 +14,7 @@ from shapeshift.runtime_models.package.write_package import package_files
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import (
+    ANCHOR_ATTRIBUTES,
     ATTRIBUTE_WIDTH,
     HeadLayout,
     Heads,
@@ -58,18 +60,20 @@ def relative(found, wanted) -> float:
     return float(np.abs(found - wanted).max() / max(np.abs(wanted).max(), 1e-30))
 
 
+EVERY = tuple(ANCHOR_ATTRIBUTES)
 LAYOUTS = [
     HeadLayout(splats=5),
     HeadLayout(splats=10),
     HeadLayout(splats=1, features=1, hidden=1, control=1),
-    HeadLayout(splats=3, features=7, hidden=9, control=5),
-    HeadLayout(splats=4, features=32, hidden=64, control=16),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=EVERY),
+    HeadLayout(splats=4, features=32, hidden=64, control=16, attributes=EVERY),
     HeadLayout(splats=2, features=8, hidden=16),
     HeadLayout(splats=2, features=5, hidden=130),
-    HeadLayout(splats=3, features=7, hidden=9, control=5, view_dependent=False),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, view_dependent=False, attributes=EVERY),
     HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=()),
     HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=("frame",)),
     HeadLayout(splats=3, features=7, hidden=9, attributes=("color",)),
+    HeadLayout(splats=3, features=7, hidden=9, attributes=("light",)),
     HeadLayout(splats=3, features=7, hidden=9, control=5, fixed=("offset", "scale", "rotation")),
     HeadLayout(splats=2, hidden=12, fixed=HEADS, view_dependent=False),
 ]
@@ -193,22 +197,22 @@ def test_an_eye_at_an_anchor_is_finite(device, form):
 def activated(layout, raw, rows):
     """Splats of raw outputs (A, RAW) in float64, fields in the order of Gaussians."""
     raw = raw.astype(np.float64)
-    anchors, frames, colors = (rows[n].astype(np.float64) for n in ("anchors", "frames", "colors"))
+    anchors, *own = (rows[n].astype(np.float64) for n in ("anchors", *ATTRIBUTE_WIDTH))
     by_head = {n: raw_of(raw, layout, n) for n in HEADS}
-    return activate_reference(by_head, anchors, VOXEL, frames, colors)
+    return activate_reference(by_head, anchors, VOXEL, *own, directions(anchors, EYE))
 
 
 @pytest.mark.parametrize("spread", [0.5, 20.0])  # 20: every activation saturates somewhere
 def test_activations_and_their_gradient(device, spread):
-    layout = HeadLayout(splats=3)
+    layout = HeadLayout(splats=3, attributes=EVERY)
     rng = np.random.default_rng(2)
     anchors = rng.normal(size=(21, 3)).astype(np.float32)
     raw = (spread * rng.normal(size=(21, layout.raw_at[-1]))).astype(np.float32)
     activation = Activation(device, layout, VOXEL)
-    own = {"frames": rng.normal(0, 0.7, (21, 7)), "colors": rng.normal(size=(21, 3))}
+    own = {n: rng.normal(0, 0.7, (21, width)) for n, width in ATTRIBUTE_WIDTH.items()}
     rows = {"anchors": anchors} | {n: a.astype(np.float32) for n, a in own.items()}
     there = {name: device.upload(array) for name, array in rows.items()}
-    splats = activation.forward(device.upload(raw), there)
+    splats = activation.forward(device.upload(raw), there, EYE)
     wanted = activated(layout, raw, rows)
     for got, want in zip(splats.fields(), wanted, strict=True):
         assert relative(device.download(got), want) < 1e-6
@@ -237,8 +241,14 @@ def test_activations_and_their_gradient(device, spread):
             assert abs(found[row, column] - numeric) < 2e-6 * max(abs(numeric), 1)
     unused = np.setdiff1d(np.arange(layout.raw_at[-1]), real)
     assert not found[:, unused].any()
-    summed = grads[0].reshape(21, 3, 3).sum(1)
-    np.testing.assert_allclose(device.download(by_group["anchors"]), summed, atol=2e-6)
+    for name in ("anchors", "light"):  # which light show depends on where an anchor stands
+
+        def scalar_of(values, name=name):
+            splats = activated(layout, raw, rows | {name: values})
+            return sum((a * g).sum() for a, g in zip(splats, grads, strict=True))
+
+        numeric = finite_differences(scalar_of, rows[name].astype(np.float64))
+        np.testing.assert_allclose(device.download(by_group[name]), numeric, atol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -288,7 +298,10 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     exported = model_of(state, layout, VOXEL, encoding, stops, {})
     files = package_files(exported, "float32")
     read = read_files(files.__getitem__, "test")
-    assert {n: read.networks[n].inputs for n in HEADS} == {n: layout.parts_of(n) for n in HEADS}
+    taken = {n: read.networks[n].inputs for n in HEADS}
+    assert ("light" in taken["color"]) == ("light" in layout.per_anchor) == (read.light is not None)
+    taken["color"] = tuple(part for part in taken["color"] if part != "light")
+    assert taken == {n: layout.parts_of(n) for n in HEADS}
     heads, activation = Heads(device, layout), Activation(device, layout, VOXEL)
     on_device = [device.upload(a) for a in (weights, anchors, features)]
     there = {"anchors": on_device[1]} | {n: device.upload(array) for n, array in own.items()}
@@ -296,7 +309,7 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     for x in (0.0, 0.3, 1.0):
         psi = psi_of(read, x).astype(np.float32)
         raw = heads.forward(*on_device, psi, EYE)
-        ours = activation.forward(raw, there)
+        ours = activation.forward(raw, there, EYE)
         theirs = evaluate(read, x, EYE)
         for name in ("means", "scales", "opacity", "color"):
             mine = device.download(getattr(ours, name))

@@ -11,6 +11,7 @@ from shapeshift.runtime_models.model import HEADS, BadFile
 from shapeshift.runtime_models.package.write_package import package_files, write_package
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.sections.section import BoxShape
+from shapeshift.training.export import with_light
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic import balls
 from shapeshift.training.train import Trainer
@@ -125,6 +126,51 @@ def test_what_it_decodes_is_what_the_package_shows(device, visits, base):
         np.testing.assert_allclose(means, shown.means, rtol=0, atol=2e-4)  # sizes in 16 bits
         np.testing.assert_allclose(opacity[:old], shown.opacity[:old], rtol=0, atol=2e-5)
         np.testing.assert_allclose(color[:old], shown.color[:old], rtol=0, atol=2e-5)
+
+
+@pytest.fixture(scope="module")
+def lit(base) -> UpdateBase:
+    """The scene with random light by direction, as training exports it."""
+    model = base.model
+    light = np.random.default_rng(0).normal(0, 0.5, (len(model.anchors), 8)).astype(np.float16)
+    color = with_light(model.networks["color"], model.features.shape[1])
+    networks = model.networks | {"color": color}
+    return replace(base, model=replace(model, networks=networks, light=light.astype(np.float32)))
+
+
+def test_light_outside_stays_to_the_bit_and_inside_learns(device, visits, lit):
+    trainer = begin_update(device, lit, visits[1], replace(SETTINGS, iterations=40))
+    eye, stop = np.array([0.3, 1.0, 2.5]), lit.model.stops[0]
+    first, old = trainer.step.decode(trainer.control(stop.name), eye), trainer.fixed
+    shown = evaluate(trainer.model(), stop.x, eye).color
+    np.testing.assert_allclose(device.download(first.color), shown, rtol=0, atol=2e-5)
+    began = trainer.model()
+    model, outside = run(trainer).model(), ~REGION.holds(lit.model.anchors)
+    np.testing.assert_array_equal(model.light[:old], lit.model.light[outside])
+    kept = min(len(began.light), len(model.light))
+    assert np.abs(model.light[old:kept] - began.light[old:kept]).max() > 0.01
+    assert (
+        package_files(model, "float16")["color.onnx"]
+        == (package_files(lit.model, "float16")["color.onnx"])
+    )
+
+
+@pytest.mark.parametrize("where", ["first", "bias", "last"])
+def test_light_that_a_network_mixes_with_others_is_refused(lit, where):
+    color = lit.model.networks["color"]
+    first, last = (weight.copy() for weight in color.weights)
+    bias = color.biases[0].copy()
+    if where == "first":
+        first[-1, 0] = 0.1
+    if where == "bias":
+        bias[-1] = 0.1
+    if where == "last":
+        last[0, -1] *= 2
+    color = replace(color, weights=(first, last), biases=(bias, color.biases[1]))
+    mixed = replace(lit.model, networks=lit.model.networks | {"color": color})
+    with pytest.raises(BadFile, match="mixes light by direction with its other inputs; scenes"):
+        layout_of(mixed)
+    layout_of(lit.model)
 
 
 def test_an_update_resumes_to_the_same_bits_and_with_its_own_scene_only(device, visits, base):

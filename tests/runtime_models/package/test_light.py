@@ -1,0 +1,378 @@
+"""Anchors with light by direction: what it means, on disk and back, turned, and what is refused."""
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import onnxruntime
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.special import sph_harm_y
+
+from shapeshift.runtime_models.bake import bake
+from shapeshift.runtime_models.colors.color_slope import color_slope
+from shapeshift.runtime_models.colors.light_harmonics import (
+    WIDTH,
+    harmonics,
+    light_along,
+    most_light,
+    turn_light,
+)
+from shapeshift.runtime_models.colors.spherical_harmonics import shade
+from shapeshift.runtime_models.evaluate import Evaluator, evaluate
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.package.drop_unused import drop_unused
+from shapeshift.runtime_models.package.feature_codes import FEATURES
+from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST
+from shapeshift.runtime_models.package.read_package import read_files, read_package
+from shapeshift.runtime_models.package.write_package import EXACT, package_files, write_package
+from shapeshift.runtime_models.read_scene import describe
+from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.runtime_models.stops.insert_stop import NewUnits, add_units, insert_stop
+from shapeshift.runtime_models.stops.remove_stop import remove_stop
+from shapeshift.training.export import with_light as carried
+from tests.support.models import (
+    make_random_model,
+    psi_of,
+    with_frames,
+    with_light,
+    without_control,
+)
+
+EYE = np.array([0.3, -0.2, 2.0])
+
+
+def spread(count: int, seed: int = 0) -> np.ndarray:
+    directions = np.random.default_rng(seed).normal(size=(count, 3))
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def by_scipy(direction: np.ndarray) -> np.ndarray:
+    """(N, 8) real harmonics of degree 1 and 2 from scipy's complex ones, over that of z's size."""
+    x, y, z = direction.T
+    polar, around = np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)
+
+    def real(degree: int, order: int) -> np.ndarray:
+        value = sph_harm_y(degree, abs(order), polar, around) * (-1) ** order  # no phase
+        if order == 0:
+            return value.real
+        return np.sqrt(2) * (value.real if order > 0 else value.imag)
+
+    orders = [(1, 1), (1, -1), (1, 0), (2, -2), (2, -1), (2, 1), (2, 0), (2, 2)]
+    return np.stack([real(*each) for each in orders], 1) / np.sqrt(3 / (4 * np.pi))
+
+
+def test_the_functions_are_those_of_scipy():
+    direction = np.concatenate([spread(200), np.eye(3), -np.eye(3)])
+    np.testing.assert_allclose(harmonics(direction), by_scipy(direction), atol=1e-12)
+
+
+def test_they_are_orthogonal_and_of_one_size_over_the_sphere():
+    """By a product rule that is exact for polynomials of this degree: Gauss in z, even turns."""
+    z, weight = np.polynomial.legendre.leggauss(8)
+    turn = 2 * np.pi * np.arange(16) / 16
+    ring = np.sqrt(1 - z**2)[:, None]
+    places = [ring * np.cos(turn), ring * np.sin(turn), np.broadcast_to(z[:, None], (8, 16))]
+    values = harmonics(np.stack([each.ravel() for each in places], 1))
+    mean = np.einsum("n,na,nb->ab", np.repeat(weight, 16) / 32, values, values)
+    np.testing.assert_allclose(mean, np.eye(WIDTH) / 3, atol=1e-12)
+
+
+def test_no_direction_gives_no_light():
+    assert not harmonics(np.zeros((2, 3), np.float32)).any()
+
+
+def test_light_stays_below_its_bound_and_may_reach_it():
+    direction = spread(4000)
+    light = np.random.default_rng(1).normal(size=(50, WIDTH))
+    most = np.abs(light @ harmonics(direction).T).max(axis=1)
+    assert (most <= most_light(light)).all()
+    ahead = np.array([[0.0, 0, 1]])
+    same_way = harmonics(ahead)  # both degrees are largest there: 1 + 5/3
+    assert most_light(same_way)[0] == pytest.approx(8 / 3)
+    assert light_along(same_way, ahead)[0, 0] == pytest.approx(8 / 3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_turned_light_is_the_same_light_seen_from_a_turned_eye(seed):
+    turn = Rotation.random(random_state=seed).as_matrix()
+    light = np.random.default_rng(seed).normal(size=(40, WIDTH))
+    direction = spread(40, seed + 9)
+    found = light_along(turn_light(light, turn), direction @ turn.T)
+    np.testing.assert_allclose(found, light_along(light, direction), atol=1e-12)
+    back = turn_light(turn_light(light, turn), turn.T)
+    np.testing.assert_allclose(back, light, atol=1e-12)
+
+
+def logits(color: np.ndarray) -> np.ndarray:
+    return np.log(color / (1 - color))
+
+
+@pytest.mark.parametrize("fold", [True, False])
+@pytest.mark.parametrize("hidden", [1, 32])
+def test_an_exported_network_adds_the_light_to_every_logit(fold, hidden):
+    """Its oracle is scipy's harmonics and float64; the colours are far from 0 and 1."""
+    bare = make_random_model(37, k=3, hidden=(hidden,))
+    light = np.random.default_rng(3).normal(0, 0.3, (37, WIDTH)).astype(np.float32)
+    color = carried(bare.networks["color"], 16)
+    model = replace(bare, networks=bare.networks | {"color": color}, light=light)
+    delta = model.anchors - EYE
+    delta /= np.linalg.norm(delta, axis=1, keepdims=True)
+    added = (light * by_scipy(delta)).sum(axis=1)
+    for x in (0.0, 0.4, 1.0):
+        shown = Evaluator(model, fold=fold).color(x, EYE).astype(np.float64)
+        plain = Evaluator(bare, fold=fold).color(x, EYE).astype(np.float64)
+        found = (logits(shown) - logits(plain)).reshape(37, -1)
+        np.testing.assert_allclose(found, np.repeat(added[:, None], 9, axis=1), atol=2e-4)
+
+
+def test_folded_whole_and_chosen_rows_agree():
+    model = with_light(make_random_model(50, k=2))
+    want = Evaluator(model, fold=False).color(0.3, EYE)
+    folded = Evaluator(model)
+    np.testing.assert_allclose(folded.color(0.3, EYE), want, atol=1e-6)
+    seen = np.random.default_rng(0).random(50) < 0.4
+    out = np.full_like(want, 7)
+    folded.color(0.3, EYE, seen, out)
+    rows = np.repeat(seen, 2)
+    np.testing.assert_allclose(out[rows], want[rows], atol=1e-6)
+    assert (out[~rows] == 7).all()
+    delta = model.anchors - EYE
+    direction = (delta / np.linalg.norm(delta, axis=1, keepdims=True)).astype(np.float32)
+    np.testing.assert_allclose(folded.color_along(0.3, direction), want, atol=1e-6)
+
+
+@pytest.mark.parametrize("sides", [2, 50])
+def test_a_control_an_anchor_has_its_own_light(sides):
+    """Two controls run in two folded networks, many in a whole one: each as one for all does."""
+    model = with_light(make_random_model(50, k=2))
+    xs = np.linspace(0, 1, sides)
+    x = xs[np.arange(50) % sides].astype(np.float32)
+    found = Evaluator(model).color(x, EYE).reshape(50, -1)
+    for value in xs[:3].astype(np.float32):
+        one = evaluate(model, float(value), EYE).color.reshape(50, -1)
+        np.testing.assert_allclose(found[x == value], one[x == value], atol=1e-5)
+
+
+def test_the_file_itself_run_by_onnxruntime_gives_the_same(tmp_path):
+    """As docs/package.md says it to a stranger; nothing of ours between the bytes and numbers."""
+    write_package(with_light(make_random_model(30, k=4)), tmp_path / "scene", "float32")
+    manifest = json.loads((tmp_path / "scene" / MANIFEST).read_text())
+    assert manifest["format"] == "shapeshift 3"
+    with np.load(tmp_path / "scene" / ANCHORS) as arrays:
+        positions, features, light = (arrays[n] for n in ("positions", "features", "light"))
+    d = positions.astype(np.float64) - EYE
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    x, y, z = d.T
+    terms = [
+        x, y, z, np.sqrt(5) * x * y, np.sqrt(5) * y * z, np.sqrt(5) * z * x,
+        np.sqrt(5 / 12) * (2 * z * z - x * x - y * y), np.sqrt(5 / 4) * (x * x - y * y),
+    ]  # fmt: skip
+    added = sum(light[:, i] * term for i, term in enumerate(terms))
+    model = read_package(tmp_path / "scene")
+    parts = {"feature": features, "direction": d, "light": added[:, None],
+             "control": np.tile(psi_of(model, 0.6), (30, 1))}  # fmt: skip
+    rows = np.concatenate([parts[p] for p in manifest["heads"]["color"]["inputs"]], axis=1)
+    session = onnxruntime.InferenceSession(
+        tmp_path / "scene" / "color.onnx", providers=["CPUExecutionProvider"]
+    )
+    found = session.run(["output"], {"input": rows.astype(np.float32)})[0].reshape(-1, 3)
+    np.testing.assert_allclose(Evaluator(model).color(0.6, EYE), found, atol=1e-6)
+
+
+@pytest.mark.parametrize("frames", [True, False])
+@pytest.mark.parametrize("kind", [*FEATURES, EXACT])
+def test_a_package_gives_back_the_light(tmp_path, kind, frames):
+    model = with_light(make_random_model(300))
+    model = with_frames(model) if frames else model
+    write_package(model, tmp_path / "a.shift", kind)
+    back = read_package(tmp_path / "a.shift")
+    assert (back.frames is not None) == frames
+    # float16: 11 bits of at most 2 or 3; a byte: half of a 255th of what a column spans
+    wide = np.ptp(model.light, axis=0).max()
+    most = {"float32": 0, EXACT: 0, "float16": 2**-10, "uint8": 0.501 * wide / 255}[kind]
+    assert np.abs(back.light - model.light).max() <= most
+    facts = describe(back, tmp_path / "a.shift")
+    size = {"float32": 4, EXACT: 4, "float16": 2, "uint8": 1}[kind]
+    ends = 64 if kind == "uint8" else 0
+    assert facts["format"] == "shapeshift 3"
+    assert facts["light_by_direction_bytes"] == 300 * 8 * size + ends
+    write_package(back, tmp_path / "b.shift", EXACT)
+    np.testing.assert_array_equal(read_package(tmp_path / "b.shift").light, back.light)
+
+
+def test_a_package_without_light_is_as_it_was(tmp_path):
+    model = with_frames(make_random_model(10))
+    files = package_files(model, "float16")
+    assert json.loads(files[MANIFEST])["format"] == "shapeshift 2"
+    with np.load(io.BytesIO(files[ANCHORS])) as arrays:
+        assert set(arrays) == {"positions", "features", "frame_log_scales", "frame_rotations"}
+    back = read_files(files.__getitem__, "here")
+    assert back.light is None
+    write_package(back, tmp_path / "a.shift")
+    assert "light_by_direction_bytes" not in describe(back, tmp_path / "a.shift")
+
+
+def changed(files: dict[str, bytes], **arrays) -> dict[str, bytes]:
+    """The package with arrays of its npz replaced, or left out where None."""
+    with np.load(io.BytesIO(files[ANCHORS])) as archive:
+        there = dict(archive) | arrays
+    out = io.BytesIO()
+    np.savez(out, **{name: array for name, array in there.items() if array is not None})
+    return files | {ANCHORS: out.getvalue()}
+
+
+@pytest.mark.parametrize(
+    ("arrays", "sentence"),
+    [
+        ({"light": None}, "lacks the array 'light'"),
+        ({"light": np.zeros((10, 9), np.float32)}, r"expected \(A, 8\)"),
+        ({"light": np.ones((9, 8), np.float32)}, "10 positions but 9 light"),
+        ({"light": np.full((10, 8), np.nan, np.float32)}, "NaN or Inf in 10 of 10"),
+        ({"light": np.full((10, 8), np.inf, np.float16)}, "NaN or Inf in 10 of 10"),
+        ({"light": np.full((10, 8), -1.1e4, np.float32)}, "light reach 1.1e.04, expected what is"),
+        ({"light": np.zeros((10, 8))}, "is float64"),
+        ({"light": np.zeros((10, 8), np.uint8)}, "need light_range"),
+        ({"frame_rotations": np.ones((10, 4), np.float32)}, "lacks the array 'frame_log_scales'"),
+    ],
+)
+def test_light_that_cannot_be_is_refused(arrays, sentence):
+    files = package_files(with_light(make_random_model(10)), "float32")
+    with pytest.raises(BadFile, match=sentence):
+        read_files(changed(files, **arrays).__getitem__, "here")
+
+
+def test_the_largest_light_is_read():
+    files = package_files(with_light(make_random_model(10)), "float32")
+    files = changed(files, light=np.full((10, 8), 1e4, np.float32))
+    assert (read_files(files.__getitem__, "here").light == 1e4).all()
+
+
+@pytest.mark.parametrize(
+    ("version", "inputs", "sentence"),
+    [
+        (
+            "shapeshift 3",
+            ["feature", "direction", "control"],
+            "a list with 'direction' and 'light'",
+        ),
+        ("shapeshift 3", ["feature", "light", "control"], "a list with 'direction' and 'light'"),
+        ("shapeshift 2", None, "a list of some of feature, direction, control, each once"),
+        ("shapeshift 1", None, "a list of some of feature, direction, control, each once"),
+    ],
+)
+def test_a_manifest_that_does_not_fit_its_light_is_refused(version, inputs, sentence):
+    files = package_files(with_light(make_random_model(10)), "float32")
+    manifest = json.loads(files[MANIFEST])
+    manifest["format"] = version
+    if inputs is not None:
+        manifest["heads"]["color"]["inputs"] = inputs
+    with pytest.raises(BadFile, match=sentence):
+        read_files((files | {MANIFEST: json.dumps(manifest).encode()}).__getitem__, "here")
+
+
+def test_another_head_may_not_take_it():
+    files = package_files(with_light(make_random_model(10)), "float32")
+    manifest = json.loads(files[MANIFEST])
+    manifest["heads"]["opacity"]["inputs"] = ["feature", "light", "control"]
+    with pytest.raises(BadFile, match="a list of some of feature, control, each once"):
+        read_files((files | {MANIFEST: json.dumps(manifest).encode()}).__getitem__, "here")
+
+
+def test_a_model_cannot_lose_its_light_or_the_input_alone():
+    model = with_light(make_random_model(5))
+    with pytest.raises(ValueError, match="anchors have no light, but the colour network takes"):
+        replace(model, light=None)
+    with pytest.raises(ValueError, match="anchors have light, but the colour network takes"):
+        replace(model, networks=make_random_model(5).networks)
+    with pytest.raises(ValueError, match="shape"):
+        replace(model, light=model.light[:4])
+
+
+def test_what_nothing_shows_goes_with_its_light():
+    model = with_light(make_random_model(40, k=2))
+    alive = np.random.default_rng(2).random((40, 2)) < 0.4
+    smaller, removed = drop_unused(model, alive)
+    kept = alive.any(axis=1)
+    assert removed.anchors == (~kept).sum() > 0
+    np.testing.assert_array_equal(smaller.light, model.light[kept])
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0])
+def test_units_that_carry_light_go_only_where_there_is_none(size):
+    bare = make_random_model(30)
+    color = carried(bare.networks["color"], 16)
+    light = np.random.default_rng(0).normal(0, size, (30, WIDTH)).astype(np.float32)
+    model = replace(bare, networks=bare.networks | {"color": color}, light=light)
+    # In reach of the bound alone: units that light opens, and nothing else does.
+    biases = (color.biases[0].copy(), color.biases[1])
+    biases[0][-2:] = -0.9 * np.abs(light @ harmonics(spread(5000)).T).max()
+    gated = replace(model, networks=model.networks | {"color": replace(color, biases=biases)})
+    for each in (model, gated):
+        smaller, _ = drop_unused(each, np.ones((30, 5), bool))
+        assert (smaller.light is None) == (size == 0)
+        assert ("light" in smaller.networks["color"].inputs) == (size > 0)
+        assert len(smaller.networks["color"].biases[0]) == (34 if size else 32)
+        for eye in (EYE, -EYE, np.array([0.1, 3.0, 0])):
+            np.testing.assert_allclose(
+                evaluate(smaller, 0.4, eye).color, evaluate(each, 0.4, eye).color, atol=1e-6
+            )
+
+
+def test_a_new_stop_leaves_light_as_it_was_and_may_go_again():
+    model = with_light(make_random_model(25, k=2))
+    names, rng = [stop.name for stop in model.stops], np.random.default_rng(4)
+    wide = insert_stop(model, "Styled", names[0])
+    units = {"color": NewUnits(rng.normal(size=(3, 17)), rng.normal(size=3),
+                               rng.normal(size=(6, 3)))}  # fmt: skip
+    wide = add_units(wide, "Styled", rng.normal(size=(25, 1)), units)
+    np.testing.assert_array_equal(wide.light, model.light)
+
+    def shown(of, stop):
+        return evaluate(of, StopWeights(((stop, 1.0),)), EYE).color
+
+    for name in names:
+        np.testing.assert_allclose(shown(wide, name), shown(model, name), atol=2e-5)
+    assert np.abs(shown(wide, "Styled") - shown(model, names[0])).max() > 0.01
+    again = remove_stop(wide, "Styled")
+    color, was = again.networks["color"], model.networks["color"]
+    assert color.inputs == was.inputs
+    assert len(color.biases[0]) == len(was.biases[0])  # the units of the stop have gone with it
+    for name in names:
+        np.testing.assert_allclose(shown(again, name), shown(model, name), atol=2e-5)
+
+
+def test_baked_harmonics_follow_light():
+    """A network blind but for light: degree 2 of what a small light adds, to its rounding."""
+    bare = make_random_model(20, k=1)
+    color = carried(bare.networks["color"], 16)
+    first = color.weights[0].copy()
+    first[:, 16:19] = 0
+    color = replace(color, weights=(first, color.weights[1]))
+    light = np.random.default_rng(1).normal(0, 0.02, (20, WIDTH)).astype(np.float32)
+    model = replace(bare, networks=bare.networks | {"color": color}, light=light)
+    plain = bake(model, 0.0, sh_degree=2)
+    there = Evaluator(model).geometry(0.0)[3] >= 1 / 255
+    for direction in np.concatenate([spread(20, 5), np.eye(3)]).astype(np.float32):
+        every = np.tile(direction, (20, 1))
+        want = Evaluator(model).color_along(0.0, every)[there]
+        # What is not linear in light of 0.1: a tenth of its square.
+        assert np.abs(shade(plain.sh, every[there]) - want).max() < 1e-3
+
+
+def test_the_slope_of_colours_counts_light():
+    """Light of degree 1 alone, all else blind: |dl / dangle| has the mean square |c|^2 / 3."""
+    bare = without_control(make_random_model(4000, k=1), "color")
+    color = carried(bare.networks["color"], 16)
+    first = color.weights[0].copy()
+    first[:32] = 0
+    last = color.weights[1].copy()
+    last[:, :32] = 0
+    flat = (np.zeros_like(color.biases[0]), np.zeros_like(color.biases[1]))
+    color = replace(color, weights=(first, last), biases=flat)
+    light = np.zeros((4000, WIDTH), np.float32)
+    light[:, 2] = 0.2
+    model = replace(bare, networks=bare.networks | {"color": color}, light=light)
+    # A quarter: the sigmoid's slope at 0.  4,000 random directions: to 2 %.
+    assert color_slope(model) == pytest.approx(0.25 * 0.2 / np.sqrt(3), rel=0.03)
