@@ -90,8 +90,11 @@ class AnchorHeads:
         first = np.zeros((self._units, self._features), np.float32)
         first[self._at] = np.concatenate([head.feature for head in heads])
         self._bounds = device.empty((self._feature.shape[0], self._units))
-        self._launch(
-            "bound_units", self._feature.shape[0], self._features, self._units,
+        # Work-items, and how many of them a group has.
+        self._items = (-(-self._feature.shape[0] // RUN[device.kind]), GROUP[device.kind])
+        device.launch(
+            self._kernels["bound_units"], *self._items,
+            self._feature.shape[0], self._features, self._units,
             RUN[device.kind], device.constants(first), self._feature, self._bounds,
         )  # fmt: skip
 
@@ -104,8 +107,9 @@ class AnchorHeads:
 
         bias: (units of all heads,) of the first layers, with what Psi(x) adds to them.
         """
-        self._launch(
-            "decode_shapes", self._count, start, RUN[self._device.kind], self._splats,
+        self._device.launch(
+            self._kernels["decode_shapes"], *self._items,
+            self._count, start, RUN[self._device.kind], self._splats,
             self._features, self._units, shapes, self._heads, self._weights,
             *self._biases(bias), self._bounds, self._feature, self._places, self._frames,
             mean_opacity, covariance,
@@ -126,17 +130,13 @@ class AnchorHeads:
             blocks = whole.reshape(-1, self._width).any(axis=1)
             wanted = self._device.constants(np.asarray(blocks, np.uint8))
         x, y, z = (float(v) for v in eye)
-        self._launch(
-            "decode_colors", self._count, start, RUN[self._device.kind], self._splats,
+        self._device.launch(
+            self._kernels["decode_colors"], *self._items,
+            self._count, start, RUN[self._device.kind], self._splats,
             self._features, self._units, self._looks, x, y, z, self._heads, self._weights,
             *self._biases(bias), self._bounds, self._feature, self._places, self._light,
             wanted, color,
         )  # fmt: skip
-
-    def _launch(self, kernel: str, *arguments) -> None:
-        kind = self._device.kind
-        items = -(-self._feature.shape[0] // RUN[kind])
-        self._device.launch(self._kernels[kernel], items, GROUP[kind], *arguments)
 
     def _biases(self, bias: np.ndarray) -> "tuple[cl.Buffer, cl.Buffer]":
         """The biases, and what the bound of each unit has to exceed for the unit to be awake."""

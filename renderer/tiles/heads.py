@@ -51,26 +51,16 @@ class ModelHeads:
         parts = [_Folded(model, model.networks[name]) for name in HEADS]
         self._bias = np.concatenate([part.bias for part in parts])  # float64, of all heads
         self._control = np.concatenate([part.control for part in parts])  # (units, d)
-        self._shapes_follow = any(
+        self.shapes_follow = any(
             "control" in model.networks[name].inputs for name in HEADS[:3]
         )  # means and covariances depend on x
         frames = model.frames
         own = None if frames is None else np.hstack([frames.scales, frames.wxyz])
         heads = [part.head for part in parts]
-        self._anchors = AnchorHeads(
+        self.anchors = AnchorHeads(
             device, model.anchors, model.features, heads, model.splats_per_anchor, own,
             light=model.light,
         )  # fmt: skip
-
-    def geometry(
-        self, x: Controls, start: int, mean_opacity: "Array", covariance: "Array", placed: bool
-    ) -> None:
-        """Means, covariances and opacities at one control -> rows start... of the arena.
-
-        placed: they hold those of another control, of which what does not follow it may stay.
-        """
-        shapes = self._shapes_follow or not placed
-        self._anchors.decode_shapes(self._folded(x), start, mean_opacity, covariance, shapes)
 
     def color_into(
         self, color: "Array", start: int, x: Controls, eye: np.ndarray,
@@ -79,7 +69,7 @@ class ModelHeads:
         """Rows start... of color (N, 4) at one control, display sRGB towards an eye (3,) in the
         object's frame; of anchors not `seen` (A,) anything.
         """
-        self._anchors.decode_colors(self._folded(x), eye, start, color, seen)
+        self.anchors.decode_colors(self.folded(x), eye, start, color, seen)
 
     def color(
         self, x: Controls, eye: np.ndarray, seen: np.ndarray | None = None,
@@ -90,7 +80,7 @@ class ModelHeads:
         self.color_into(out, 0, x, eye, seen)
         return out
 
-    def _folded(self, x: Controls) -> np.ndarray:
+    def folded(self, x: Controls) -> np.ndarray:
         """(units,) first biases with Psi(x) in them: the same for every anchor, so exact."""
         assert not is_each(x), "one control for all"
         return self._bias + self._control @ self.model.psi(x)[0].astype(np.float64)

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
+from shapeshift.rasterizer.pack import pack_color
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.renderer.tiles.heads import ModelHeads, uncovered
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.evaluate import Evaluator, follows_eye, only_fades
+from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, is_each
 
@@ -61,23 +61,6 @@ class Slot:
     @property
     def rows(self) -> slice:
         return slice(self.start, self.start + self.count)
-
-    def decode_geometry(
-        self, device: Device, x: Controls, eye: np.ndarray | None, seen: np.ndarray | None,
-        mean_opacity: "Array", covariance: "Array",
-    ) -> None:  # fmt: skip
-        """Its rows at a control, or at one an anchor, which onnxruntime decodes."""
-        heads, evaluator = self.decoding.heads, self.decoding.evaluator
-        if heads is not None and not is_each(x):
-            heads.geometry(x, self.start, mean_opacity, covariance, self.placed)
-            self.placed = True
-            return
-        splats = evaluator.geometry(x, unit=False, eye=eye, seen=seen)
-        if self.placed and only_fades(evaluator.model):
-            pack_opacity(device, splats[3], self.start, mean_opacity)
-            return
-        pack(device, splats, self.start, mean_opacity, covariance)
-        self.placed = only_fades(evaluator.model)
 
     def decode_color(
         self, device: Device, key: tuple[int, int], x: Controls, eye: np.ndarray,

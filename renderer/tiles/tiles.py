@@ -6,7 +6,6 @@ What its methods mean: renderer/drawing.py.  No GL here.
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from shapeshift.rasterizer.device import Device, open_device
 from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
-from shapeshift.rasterizer.pack import pack_color
+from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
 from shapeshift.rasterizer.project import CULL_REASONS, Projected
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
@@ -42,13 +41,11 @@ from shapeshift.renderer.tiles.inputs import (
 )
 from shapeshift.renderer.tiles.slot import Slot, decoding_of
 from shapeshift.renderer.timing import PassTimer
+from shapeshift.runtime_models.evaluate import only_fades
 from shapeshift.runtime_models.model import Model, is_antialiased
-from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.runtime_models.stop_weights import Controls, is_each
 from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View
-
-if TYPE_CHECKING:
-    pass
 
 
 class TilesDrawing(Drawing):
@@ -118,9 +115,20 @@ class TilesDrawing(Drawing):
         seen: np.ndarray | None = None,
     ) -> None:
         slot = self._slots[i]
-        self._changed = True
+        heads, evaluator = slot.decoding.heads, slot.decoding.evaluator
         arena = (self._mean_opacity, self._covariance)
-        slot.decode_geometry(self.device, x, eye_object, seen, *arena)
+        self._changed = True
+        if heads is not None and not is_each(x):  # one control an anchor: onnxruntime's
+            shapes = heads.shapes_follow or not slot.placed
+            heads.anchors.decode_shapes(heads.folded(x), slot.start, *arena, shapes)
+            slot.placed = True
+            return
+        splats = evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
+        if slot.placed and only_fades(evaluator.model):
+            pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
+            return
+        pack(self.device, splats, slot.start, *arena)
+        slot.placed = only_fades(evaluator.model)
 
     def color_set(self, which: int, count: int) -> None:
         self._colors = self._colors[:count]

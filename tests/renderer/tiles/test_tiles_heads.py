@@ -36,12 +36,18 @@ BLOCK, RUNS = WIDTH["cpu"], WIDTH["cpu"] * RUN["cpu"]  # anchors of a block, of 
 MOST = 1e-5  # of the largest of a column group: 80 times the rounding of a float
 
 
+def geometry(heads: ModelHeads, x: float, start: int, arena: tuple, placed: bool) -> None:
+    """As the drawing has it: what does not follow x may stay where it is."""
+    shapes = heads.shapes_follow or not placed
+    heads.anchors.decode_shapes(heads.folded(x), start, *arena, shapes)
+
+
 def decoded(model: AnchorModel, x: float, eye=EYE, seen=None) -> tuple[np.ndarray, ...]:
     """mean_opacity, covariance, color of the model's rows; those before and after must stay."""
     d, n = device(), model.splat_count
     arrays = [d.upload(np.full((BEFORE + n + AFTER, k), -7, np.float32)) for k in (4, 8, 4)]
     heads = ModelHeads(d, model)
-    heads.geometry(x, BEFORE, arrays[0], arrays[1], placed=False)
+    geometry(heads, x, BEFORE, tuple(arrays[:2]), placed=False)
     heads.color_into(arrays[2], BEFORE, x, eye, seen)
     found = [d.download(array) for array in arrays]
     for rows in found:
@@ -247,9 +253,9 @@ def test_what_does_not_follow_x_is_decoded_once():
     model = without_control(make_random_model(20, k=2), "offset", "scale", "rotation")
     d, heads = device(), ModelHeads(device(), model)
     mean_opacity, sigma = d.zeros((40, 4)), d.zeros((40, 8))
-    heads.geometry(0.0, 0, mean_opacity, sigma, placed=False)
+    geometry(heads, 0.0, 0, (mean_opacity, sigma), placed=False)
     sigma.fill(5)
-    heads.geometry(0.8, 0, mean_opacity, sigma, placed=True)
+    geometry(heads, 0.8, 0, (mean_opacity, sigma), placed=True)
     assert (d.download(sigma) == 5).all()
     wanted = slow(model, 0.8)[0]
     np.testing.assert_allclose(d.download(mean_opacity), wanted, atol=MOST)

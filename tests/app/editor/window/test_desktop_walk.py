@@ -16,8 +16,8 @@ from tests.support.walks import calls_below
 
 # Below Viewer.draw_splats, the launch itself included: the picture on the screen, the renderer's
 # scene, the drawing, then what differs.  Quads have a decoder that picks among networks by GL, by
-# onnxruntime and plain layers, and networks run four times; tiles evaluate on the processor and
-# launch the packing of the result, of layers through a copy.
+# onnxruntime and plain layers, and networks run four times; tiles launch all networks of the shape
+# at once, or the packing of layers through a copy.
 MOST = {
     ("quads", "networks"): 7,
     ("quads", "layers"): 6,
