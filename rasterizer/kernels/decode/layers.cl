@@ -81,14 +81,17 @@ inline void activate(Head head, floatn* z) {
     const float a = odd ? head.gain : 0, b = odd ? -2 * head.gain : head.gain;
     const float c = odd ? 2 * LOG2E : -LOG2E;
     floatn under[TILE + 1];  // one more, so that there are pairs
-    UNROLL for (int o = 0; o < TILE; o++) under[o] = 1.0f + exp2n(c * z[o], 60.0f);
+    // NaN has to stay with its own splat: fmax drops it, and it is put back.
+    UNROLL for (int o = 0; o < TILE; o++)
+      under[o] = 1.0f + exp2n(fmax(c * z[o], TO_FLOATN -60.0f), 60.0f);
     // 2^60: the product of two is a float, and either result is 0 or 1 to all of its bits.
     under[TILE] = 1;
     // Two at a time: one division, which takes as long as ten products.
     UNROLL for (int o = 0; o < TILE; o += 2) {
       const floatn by = b / (under[o] * under[o + 1]);
-      z[o] = fma(by, under[o + 1], TO_FLOATN a);
-      if (o + 1 < TILE) z[o + 1] = fma(by, under[o], TO_FLOATN a);
+      z[o] = select(fma(by, under[o + 1], TO_FLOATN a), z[o], z[o] != z[o]);
+      if (o + 1 < TILE)
+        z[o + 1] = select(fma(by, under[o], TO_FLOATN a), z[o + 1], z[o + 1] != z[o + 1]);
     }
     return;
   }

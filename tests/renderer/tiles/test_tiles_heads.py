@@ -208,6 +208,28 @@ def test_a_bad_feature_is_that_of_its_anchor_alone(bad):
         assert np.isnan(poisoned[0][mine]).all() and np.isnan(poisoned[2][mine, :3]).all()
 
 
+@pytest.mark.parametrize("name", ["opacity", "scale", "color"])
+@pytest.mark.parametrize("head", ACTIVATIONS)
+def test_a_nan_in_one_output_is_that_of_its_splats_alone(name, head):
+    """Two outputs share a division, whose rounding alone the others may notice."""
+    model, k = make_random_model(33, k=5), 5
+    network = replace(model.networks[name], head=head)
+    model = replace(model, networks=model.networks | {name: network})
+    clean = decoded(model, 0.3)
+    outputs = len(network.biases[1])
+    for output in {0, 1, 2, 4, outputs - 1}:
+        last = network.biases[1].copy()
+        last[output] = np.nan
+        broken = replace(network, biases=(network.biases[0], last))
+        found = decoded(replace(model, networks=model.networks | {name: broken}), 0.3)
+        mine = np.arange(33 * k) % k == output // (outputs // k)
+        for before, after in zip(clean, found, strict=True):
+            assert (np.abs(after - before)[~mine] <= MOST * np.abs(before).max()).all()
+        column = {"opacity": found[0][mine, 3], "color": found[2][mine, output % 3]}
+        if name in column:
+            assert np.isnan(column[name]).all()
+
+
 def test_units_that_sleep_and_units_that_a_direction_wakes():
     """Every unit of the shape sleeps; those of the colour wake on one side of the anchors alone."""
     model = make_random_model(64, k=2, hidden=(16,))
