@@ -11,7 +11,7 @@ from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, Memory
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from shapeshift.runtime_models.splats.layers.read_layers import check_mode, join_layers
-from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
+from shapeshift.runtime_models.splats.operations.decimate import within_most_splats
 from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
 from shapeshift.runtime_models.splats.sog.sog_files import (
@@ -85,7 +85,7 @@ def levels(path: Path, reading: Reading) -> Iterator[SplatLayers]:
     streamed = read_tree(path, reading.within(folder_of(path)).account)
     origin = None
     for number in steps(streamed.counts, reading.most_splats):
-        level = prune_by_importance(read_level(streamed, number, reading), reading.most_splats)
+        level = within_most_splats(read_level(streamed, number, reading), path, reading)
         if origin is None:
             origin = level.origin
         shift = np.subtract(level.origin, origin)
