@@ -28,6 +28,7 @@ COLOR = 4.0  # 1 to 16 are within 0.3 dB of each other
 REACH = 8  # places along the curve that a partner is looked for; 16: +-0.4 dB at 1.5 times the time
 AT_ONCE = 1 << 14  # splats: 1 MB of a mixture's rows
 FEW = 64  # a round that finds a pair among fewer than so many splats takes neighbours as they are
+MOST_AREA = 1e30  # m^2: sums of so large ones are finite, too
 TINY = 1e-37  # m^2 and above: float32 that has an inverse
 TURNS = (  # wxyz of the Z-curve, a round each: the borders of its cells lie elsewhere every time
     (1.0, 0.0, 0.0, 0.0),
@@ -88,7 +89,7 @@ def mixture_of(layers: SplatLayers) -> np.ndarray:
             out[MEAN, rows] = layers.means[rows].T
             out[COV, rows] = covariances
             out[COLORS, rows] = C0 * layers.sh[rows, 0].T
-            out[WEIGHT, rows] = shown_area(scales, layers.opacity[rows])
+            out[WEIGHT, rows] = np.minimum(shown_area(scales, layers.opacity[rows]), MOST_AREA)
             out[LOG_AREA, rows] = np.log(np.maximum(mean_area(covariances), TINY))
 
     each_block(layers.splat_count, fill, block=AT_ONCE)
