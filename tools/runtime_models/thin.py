@@ -6,11 +6,17 @@ Each scene is drawn whole and with fewer splats from views around it; the rows a
 of the mean squared error over all views) against the whole one at each stop, and the processor
 seconds that the way took.  "merge" is --max-splats (runtime_models/splats/operations/decimate.py),
 with two other ways to treat an opacity above 1; "prune" is prune_by_importance.py beside it;
-"even" draws along the Z-curve with chances by a weight.
+"even" draws along the Z-curve with chances by a weight.  Where splat-transform is on the PATH
+(`npm install @playcanvas/splat-transform`), what its --decimate makes of the same file is measured
+too, reading and writing included in its seconds.
 """
 
 import argparse
+import resource
+import shutil
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
@@ -71,6 +77,24 @@ def area(model: SplatLayers) -> np.ndarray:
     return middle * most
 
 
+PEER = "splat-transform"
+
+
+def decimated_by_peer(path: Path, model: SplatLayers, count: int) -> SplatLayers:
+    """What splat-transform makes of the file."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "fewer.ply"
+        command = [PEER, "-q", "-g", "cpu", str(path), "--decimate", str(count), str(out)]
+        subprocess.run(command, check=True)
+        return read_model(out)
+
+
+def cpu_seconds() -> float:
+    """Of this process and of those that it has waited for."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
 def ways() -> dict[str, Way]:
     """Ways to fewer splats by name."""
     weights = {
@@ -107,12 +131,15 @@ def measure(path: Path, renderer) -> list[str]:
     views = orbit_path(VIEWS, *frame_points(*model_points(model)), SIZE)
     whole = {stop.x: pictures(renderer, model, views, stop.x) for stop in model.stops}
     rows = []
-    for name, way in ways().items():
+    offered = ways()
+    if shutil.which(PEER) and path.is_file():
+        offered[f"{PEER} --decimate"] = partial(decimated_by_peer, path)
+    for name, way in offered.items():
         for part in PARTS:
             count = round(part * model.splat_count)
-            began = time.process_time()
+            began = cpu_seconds()
             fewer = way(model, count)
-            seconds = time.process_time() - began
+            seconds = cpu_seconds() - began
             facts = f"{path.name},{model.splat_count},{name},{part},{fewer.splat_count}"
             for x, picture in whole.items():
                 error = psnr(pictures(renderer, fewer, views, x), picture)

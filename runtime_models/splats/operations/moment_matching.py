@@ -44,8 +44,8 @@ def merge_groups(
     covariance with the spread of the places (moment matching of Gaussian mixtures, Runnalls 2007).
     The opacity keeps the sum of the weights.  Where it would pass 1, some of the members lie over
     each other and hide each other, some lie beside: the area grows by the root of the excess.
-    Measured at a tenth (docs/bench/thin.csv): 0.4 to 2.6 dB better than not at all, 0.6 to 1.4
-    better than by all of it but at one stop, where it is 0.5 worse.
+    Measured at a tenth (docs/bench/thin.csv): 0.3 to 2.6 dB better than not at all, 0.0 to 1.5
+    better than by all of it.
 
     Everything else (stop, label, other columns) is of the member of the largest weight, in whose
     place in the order the result stands; who is alone keeps every bit.  progress(part done 0..1).

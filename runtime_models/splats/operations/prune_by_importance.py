@@ -15,7 +15,7 @@ NEARLY_SURE = 0.999  # chance from which a splat stays for certain
 def prune_by_importance(layers: SplatLayers, most: int) -> SplatLayers:
     """`most` of the splats in their order, or all of them where most is 0 or there are no more.
 
-    Merging shows 5 to 13 dB more, but not of splats that move, nor across stops and labels.
+    Merging is 5 to 13 dB better, but not of splats that move, nor across stops and labels.
 
     Not simply the largest: those leave holes where detail was, which costs 1 to 3.4 dB at
     half of a scene (docs/bench/thin.csv).  A finding says how many stay.
