@@ -40,7 +40,9 @@ def decimate(layers: SplatLayers, most: int, reading: Reading | None = None) -> 
     report = (reading or Reading()).report
     what = f"merging {count:,} splats into {most:,}"
     group = pair_groups(layers, most, lambda part: report(what, PAIRING * part))
-    merged = merge_groups(layers, group, lambda part: report(what, PAIRING + (1 - PAIRING) * part))
+    merged, _ = merge_groups(
+        layers, group, lambda part: report(what, PAIRING + (1 - PAIRING) * part)
+    )
     found = Finding(
         f"{count:,} splats, --max-splats asks for {most:,}",
         0,

@@ -43,16 +43,20 @@ ROWS = 14  # of a mixture: metres, m^2, display sRGB, m^2, log m^2
 
 
 def pair_groups(
-    layers: SplatLayers, most: int, progress: Callable[[float], None] | None = None
+    layers: SplatLayers,
+    most: int,
+    progress: Callable[[float], None] | None = None,
+    kinds: np.ndarray | None = None,
 ) -> np.ndarray:
     """(N,) int32: the row that stands for each splat; `most` rows stand for all of them.
 
-    Only splats of one stop and one label meet: more than `most` are left where there are more of
-    those.  The same input gives the same groups.  progress(part done 0..1) is called each round.
+    Only splats of one stop and one label meet, or of one of kinds (N,) int32: more than `most` are
+    left where there are more of those.  The same input gives the same groups.
+    progress(part done 0..1) is called each round.
     """
     count = layers.splat_count
     group = np.arange(count, dtype=np.int32)
-    mixture, kinds = mixture_of(layers), kinds_of(layers)
+    mixture, kinds = mixture_of(layers), kinds_of(layers) if kinds is None else kinds
     ids, rounds = group.copy(), 0
     turns = rotation_matrices(normalize(np.array(TURNS)))
     while len(ids) > most:
@@ -222,6 +226,27 @@ def merge_into(mixture: np.ndarray, first: np.ndarray, second: np.ndarray) -> No
         merged[LOG_AREA] = np.maximum(merged[LOG_AREA], log_area)
         merged[WEIGHT] = weight
     mixture[:, first] = merged
+
+
+def merging_losses(layers: SplatLayers, merged: SplatLayers, row_of: np.ndarray) -> np.ndarray:
+    """(N,) float64 m^2: what is lost of each splat that became row row_of (N,) of `merged`.
+
+    The cost of a pair, of a group of any size: its terms are sums over the members.
+    """
+    out = np.empty(layers.splat_count)
+
+    def fill(rows: slice, _: None) -> None:
+        into = row_of[rows]
+        own, theirs = (
+            np.maximum(shown_area(scales, np.ones(len(scales), np.float32)), TINY)
+            for scales in (layers.scales[rows], merged.scales[into])
+        )
+        away = C0 * (layers.sh[rows, 0].astype(np.float64) - merged.sh[into, 0])
+        weight = shown_area(layers.scales[rows], layers.opacity[rows])
+        out[rows] = weight * (np.log(theirs / own) + COLOR * (away**2).sum(axis=1))
+
+    each_block(layers.splat_count, fill, block=AT_ONCE)
+    return out
 
 
 def last_of(group: np.ndarray) -> np.ndarray:

@@ -37,8 +37,10 @@ def shown_area(scales: np.ndarray, opacity: np.ndarray) -> np.ndarray:
 
 def merge_groups(
     layers: SplatLayers, group: np.ndarray, progress: Callable[[float], None] | None = None
-) -> SplatLayers:
-    """The splats with each group as one; group (N,) is any number that its members share.
+) -> tuple[SplatLayers, np.ndarray]:
+    """The splats with each group as one, and (N,) int32 into which row of them each went.
+
+    group (N,) is any number that its members share.
 
     Weights are opacity times mean area: mean, covariance and harmonics are the weighted means, the
     covariance with the spread of the places (moment matching of Gaussian mixtures, Runnalls 2007).
@@ -56,6 +58,8 @@ def merge_groups(
     counts = np.diff(np.r_[starts, len(by)])
     leaders = by[starts]
     in_order = np.argsort(leaders)
+    into = np.empty(len(by), np.int32)
+    into[by] = np.repeat(np.argsort(in_order), counts)
     several = np.flatnonzero(counts[in_order] > 1)  # rows of the result
     starts, counts = starts[in_order[several]], counts[in_order[several]]
     out = layers.with_rows(leaders[in_order])
@@ -70,7 +74,7 @@ def merge_groups(
             getattr(out, name)[rows] = values
 
     each_block(len(several), merge_rows, progress, block=MERGED_AT_ONCE)
-    return out
+    return out, into
 
 
 def merge_moments(
