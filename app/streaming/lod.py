@@ -112,9 +112,9 @@ def write_folder(
     from shapeshift.runtime_models.files.whole_file import whole_folder
     from shapeshift.runtime_models.splats.sog.write_streamed import write_streamed
 
-    def told(part: float) -> None:
+    def report(part: float) -> None:
         progress(f"merging and writing {len(splats.means):,} splats", BAKED + (1 - BAKED) * part)
 
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with whole_folder(options.out) as folder:
-        return write_streamed(splats, folder, options.leaf, "shapeshift lod", told)
+        return write_streamed(splats, folder, options.leaf, "shapeshift lod", report)

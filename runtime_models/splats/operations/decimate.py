@@ -18,8 +18,9 @@ def within_most_splats(layers: SplatLayers, path: Path, reading: Reading) -> Spl
     count, most = layers.splat_count, reading.most_splats
     if not 0 < most < count:
         return layers
-    what = f"merging {count:,} splats"
-    with reading.within(path).account.lend(MERGING * count, what):
+    # By the splats, not by the file: a meta.json of a few bytes names others that hold them.
+    size = count * (44 + 12 * layers.sh.shape[1])
+    with reading.within(path, size).account.lend(MERGING * count, f"merging {count:,} splats"):
         return decimate(layers, most, reading)
 
 

@@ -1,11 +1,13 @@
 """Plain splats to PlayCanvas's SOG, version 2, degree 0: the inverse of read_sog."""
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.sog.read_sog import FIRST_MODE
 from shapeshift.runtime_models.splats.sog.sog_files import META
@@ -55,7 +57,7 @@ def write_sog(splats: PlainSplats, folder: Path, generator: str) -> None:
         "quats": {"files": ["quats.webp"]},
         "sh0": {"codebook": color_book.tolist(), "files": ["sh0.webp"]},
     }  # fmt: skip
-    (folder / META).write_text(json.dumps(meta))
+    write_whole(folder / META, json.dumps(meta).encode())
 
 
 def coded(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -105,4 +107,6 @@ def write_picture(pixels: np.ndarray, path: Path) -> None:
     out[: len(pixels), : pixels.shape[1]] = pixels
     picture = Image.fromarray(out.reshape(height, width, 4))
     # exact: colours of pixels whose alpha is 0 are codes, too.  method 0 is the quickest.
-    picture.save(path, "WEBP", lossless=True, exact=True, quality=20, method=0)
+    data = io.BytesIO()
+    picture.save(data, "WEBP", lossless=True, exact=True, quality=20, method=0)
+    write_whole(path, data.getvalue())

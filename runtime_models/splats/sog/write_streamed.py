@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.runtime_models.splats.lod.leaves import Tree, cut_leaves
@@ -67,7 +68,7 @@ def write_streamed(
         "filenames": names,
         "tree": described(leaves.tree, nodes, boxes)[0],
     }
-    (folder / TREE).write_text(json.dumps(meta))
+    write_whole(folder / TREE, json.dumps(meta).encode())
     progress(1.0)
     return StreamedSizes(leaves.count, tuple(sizes))
 

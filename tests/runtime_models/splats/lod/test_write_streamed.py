@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from shapeshift.runtime_models.files import memory
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.operations.decimate import decimate
@@ -119,6 +120,16 @@ def test_files_hold_whole_leaves_and_no_more_than_they_may(tmp_path, monkeypatch
             ends[run.file] = run.first + run.count
     assert max(ends.values()) == 250 and len(ends) == len(tree.files) > len(sizes.levels)
     assert read_model(tmp_path / "a").splat_count == 1000
+
+
+def test_merging_is_not_refused_by_the_size_of_a_small_file(tmp_path, monkeypatch):
+    """lod-meta.json and meta.json are few bytes; the splats lie in other files."""
+    written(plain(shell(40_000)), tmp_path / "a", 1 << 16)
+    monkeypatch.setattr(memory, "FREE", 1 << 20)
+    for file, count in (("lod-meta.json", 10), ("0_0/meta.json", 39_999)):
+        assert read_model(tmp_path / "a" / file, Reading(most_splats=count)).splat_count == count
+    *_, last = levels(tmp_path / "a" / "lod-meta.json", Reading(most_splats=10))
+    assert last.splat_count == 10
 
 
 @pytest.mark.parametrize("count", [1, 2, 64, 65])
