@@ -11,7 +11,6 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
-    from shapeshift.runtime_models.model import Finding
     from shapeshift.runtime_models.splats.plain_splats import PlainSplats
     from shapeshift.runtime_models.splats.sog.write_streamed import StreamedSizes
 
@@ -34,6 +33,8 @@ class Options(ReadingOptions):
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
     stop, and in a scene file what it says for each object."""
+    sh_degree: int = 3
+    """Degree of the colours' spherical harmonics, at most; 0: one colour from all sides."""
     leaf: Annotated[int, EXPERT] = 4096
     """Splats of a leaf at the finest level, at most; viewers choose a level for each leaf."""
     overwrite: bool = False
@@ -46,12 +47,14 @@ def run(options: Options) -> int:
 
     if not LEAST_LEAF <= options.leaf <= MOST_LEAF:
         raise UsageError(f"--leaf is {options.leaf}, expected {LEAST_LEAF} to {MOST_LEAF}.")
+    if not 0 <= options.sh_degree <= 3:
+        raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
     if options.out.suffix:
         raise UsageError(f"--out {options.out} is no folder's name; leave its ending out.")
     check_output(options.out, [options.scene], options.overwrite)
     with progress_after(PATIENCE_S) as progress:
         splats = bake_scene(options, progress)
-        for finding in (*splats.findings, *harmonics_finding(splats, options.scene.name)):
+        for finding in splats.findings:
             say(sentence(finding))
         sizes = write_folder(splats, options, progress)
     size = sum(file.stat().st_size for file in options.out.rglob("*") if file.is_file())
@@ -89,20 +92,9 @@ def bake_scene(options: Options, progress: Callable[[str, float], None]) -> "Pla
     parts = []
     for number, obj in enumerate(objects):
         progress(f"baking {obj.name}", BAKED * number / len(objects))
-        parts.append(bake_part(Part(obj), ExportLook()))
+        parts.append(bake_part(Part(obj), ExportLook(options.sh_degree)))
     splats = merged(parts)
     return replace(splats, origin=three(np.add(splats.origin, document.origin)))
-
-
-def harmonics_finding(splats: "PlainSplats", file: str) -> tuple["Finding", ...]:
-    """A word where colours depend on the direction, which levels do not keep."""
-    from shapeshift.runtime_models.model import Finding
-
-    degree = round(splats.sh.shape[1] ** 0.5) - 1
-    if not splats.sh[:, 1:].any():
-        return ()
-    what = f"colours depend on the direction (harmonics of degree {degree})"
-    return (Finding(what, 0, "levels have one colour from all sides", file=file, repaired=False),)
 
 
 def write_folder(

@@ -2,11 +2,11 @@
 
     python tools/runtime_models/lod.py SCENE ... --out docs/bench/lod.csv
 
-A scene is baked at its last stop with one colour from all sides, written, and read back by the
-program's own reader, level by level.  Rows: splats of the level, mean PSNR (dB of the mean squared
-error over eight views) against the baked scene, from the usual distance and from three times as
-far, the same of as many splats that --max-splats merges to, bytes a splat over all levels, and
-processor seconds a million splats of the scene for levels and files.
+A scene is baked at its last stop, with one colour from all sides and with the harmonics that it
+has, written, and read back by the program's own reader, level by level.  Rows: splats of the level,
+mean PSNR (dB of the mean squared error over eight views) against the baked scene, from the usual
+distance and from three times as far, the same of as many splats that --max-splats merges to, bytes
+a splat over all levels, and processor seconds a million splats of the scene for levels and files.
 """
 
 import argparse
@@ -47,8 +47,13 @@ def orbits(model: SplatLayers) -> list[list]:
 
 def measure(path: Path, renderer) -> list[str]:
     model = read_model(path)
+    own = round(model.sh.shape[1] ** 0.5) - 1
+    return [row for degree in sorted({0, own}) for row in rows_of(path, model, degree, renderer)]
+
+
+def rows_of(path: Path, model: SplatLayers, degree: int, renderer) -> list[str]:
     views = orbits(model)
-    plain = bake(model, model.stops[-1].x, sh_degree=0)
+    plain = bake(model, model.stops[-1].x, sh_degree=degree)
     whole = join_layers([replace(plain)], (Stop("all", 0.0),), "", [path.name])
 
     def drawn(part: SplatLayers) -> list[np.ndarray]:
@@ -65,7 +70,7 @@ def measure(path: Path, renderer) -> list[str]:
             near, far = map(psnr, drawn(read_level(tree, number, Reading())), true)
             merged = psnr(drawn(decimate(whole, count))[0], true[0]) if number else np.inf
             rows.append(
-                f"{path.name},{sizes.leaves},{number},{count},{near:.2f},{far:.2f},{merged:.2f},"
+                f"{path.name},{degree},{sizes.leaves},{number},{count},{near:.2f},{far:.2f},{merged:.2f},"
                 f"{size / sum(sizes.levels):.1f},{seconds:.1f}"
             )
             print(rows[-1], flush=True)  # noqa: T201
@@ -85,8 +90,8 @@ def main() -> None:
         names = " ".join(path.name for path in options.scenes)
         head = [f"# python tools/runtime_models/lod.py {names} --out docs/bench/{options.out.name}"]
         head += [
-            "scene,leaves,level,splats,psnr_db,psnr_db_3x_farther,max_splats_db,bytes_a_splat,"
-            "cpu_s_a_million"
+            "scene,sh_degree,leaves,level,splats,psnr_db,psnr_db_3x_farther,max_splats_db,"
+            "bytes_a_splat,cpu_s_a_million"
         ]
         options.out.write_text("\n".join([*head, *rows, ""]))
 

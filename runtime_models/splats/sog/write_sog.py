@@ -1,4 +1,4 @@
-"""Plain splats to PlayCanvas's SOG, version 2, degree 0: the inverse of read_sog."""
+"""Plain splats to PlayCanvas's SOG, version 2: the inverse of read_sog."""
 
 import io
 import json
@@ -9,7 +9,8 @@ from PIL import Image
 
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
-from shapeshift.runtime_models.splats.sog.read_sog import FIRST_MODE
+from shapeshift.runtime_models.splats.sog.read_sog import COEFFICIENTS, FIRST_MODE, PALETTE_ROW
+from shapeshift.runtime_models.splats.sog.sh_palette import make_palette
 from shapeshift.runtime_models.splats.sog.sog_files import META
 
 CODES = 256  # of a codebook
@@ -21,11 +22,11 @@ LARGEST_CODE = 65535  # of a place
 
 
 def write_sog(splats: PlainSplats, folder: Path, generator: str) -> None:
-    """meta.json and five pictures in an existing folder; the splats are in the format's axes.
+    """meta.json and its pictures in an existing folder; the splats are in the format's axes.
 
     What is lost: half of 1/65535 of the range of sign(x) log(1 + |x|) in place, half a step of the
     codebooks in the logarithm of a scale and in colour, 1/510 in opacity, 3e-3 in a quaternion's
-    entries, and all harmonics above degree 0.
+    entries; about four splats share the harmonics above degree 0 (sh_palette.py).
     """
     means = splats.means.astype(np.float64) + splats.origin
     bent = np.sign(means) * np.log1p(np.abs(means))
@@ -42,6 +43,9 @@ def write_sog(splats: PlainSplats, folder: Path, generator: str) -> None:
         "quats": smallest_three(splats.wxyz),
         "sh0": np.concatenate([colors, opacity[:, None]], axis=1),
     }
+    harmonics = {}
+    if splats.sh.shape[1] > 1:
+        harmonics = {"shN": coded_harmonics(splats.sh[:, 1:], pictures)}
     for name, pixels in pictures.items():
         write_picture(pixels, folder / f"{name}.webp")
     meta = {
@@ -56,8 +60,27 @@ def write_sog(splats: PlainSplats, folder: Path, generator: str) -> None:
         "scales": {"codebook": scale_book.tolist(), "files": ["scales.webp"]},
         "quats": {"files": ["quats.webp"]},
         "sh0": {"codebook": color_book.tolist(), "files": ["sh0.webp"]},
+        **harmonics,
     }  # fmt: skip
     write_whole(folder / META, json.dumps(meta).encode())
+
+
+def coded_harmonics(rest: np.ndarray, pictures: dict[str, np.ndarray]) -> dict:
+    """What meta.json says of harmonics (N, M - 1, 3); their two pictures are put beside others."""
+    sets, labels = make_palette(rest)
+    book, codes = coded(sets.reshape(-1, 3))
+    rows = -(-len(sets) // PALETTE_ROW)
+    padded = np.zeros((rows * PALETTE_ROW * rest.shape[1], 3), np.uint8)
+    padded[: len(codes)] = codes
+    pictures["shN_centroids"] = padded.reshape(rows, -1, 3)
+    low, high = (labels & 255).astype(np.uint8), (labels >> 8).astype(np.uint8)
+    pictures["shN_labels"] = np.stack([low, high, np.zeros_like(low)], axis=1)
+    return {
+        "count": len(sets),
+        "bands": COEFFICIENTS.index(rest.shape[1]),
+        "codebook": book.tolist(),
+        "files": ["shN_centroids.webp", "shN_labels.webp"],
+    }
 
 
 def coded(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -99,9 +122,13 @@ def smallest_three(wxyz: np.ndarray) -> np.ndarray:
 
 
 def write_picture(pixels: np.ndarray, path: Path) -> None:
-    """A lossless WebP of pixels (N, 3 or 4), row after row, as square as can be."""
-    width = 4 * -(-int(np.ceil(len(pixels) ** 0.5)) // 4)
-    height = 4 * -(-len(pixels) // (4 * width))
+    """A lossless WebP of (H, W, 3) pixels, or of (N, 3 or 4), as square as can be."""
+    if pixels.ndim == 3:
+        height, width = pixels.shape[:2]
+        pixels = pixels.reshape(-1, 3)
+    else:
+        width = 4 * -(-int(np.ceil(len(pixels) ** 0.5)) // 4)
+        height = 4 * -(-len(pixels) // (4 * width))
     out = np.zeros((height * width, 4), np.uint8)
     out[:, 3] = 255
     out[: len(pixels), : pixels.shape[1]] = pixels

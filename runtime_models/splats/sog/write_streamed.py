@@ -42,12 +42,12 @@ def write_streamed(
     """lod-meta.json and its files into an existing folder, of at least one splat.
 
     Leaves have at most leaf_splats splats at the finest level; all of them have every level, with
-    an error that readers spend their budget by.  Harmonics above degree 0 are lost.
+    an error that readers spend their budget by.
     """
     turned = rotate_half_turn(splats)
     flat = SplatLayers(
         turned.means, turned.scales, turned.wxyz, turned.opacity,
-        np.ascontiguousarray(turned.sh[:, :1]), np.zeros(len(turned.means), np.int32),
+        turned.sh, np.zeros(len(turned.means), np.int32),
         (Stop("all", 0.0),), origin=turned.origin, antialiased=turned.antialiased,
     )  # fmt: skip
     leaves = cut_leaves(flat.means, leaf_splats)

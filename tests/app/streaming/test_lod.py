@@ -21,13 +21,16 @@ def scene(tmp_path):
 def test_a_folder_is_written_and_read_at_any_budget(scene, tmp_path, capsys):
     assert cli.main(["lod", str(scene), "--out", str(tmp_path / "b"), "--leaf", "100"]) == 0
     said = capsys.readouterr().err
-    assert "harmonics of degree 1" in said and "4 leaves, 2 levels of 400, 200" in said
+    assert "4 leaves, 2 levels of 400, 200" in said
     assert read_model(tmp_path / "b").splat_count == 400
     counts = read_model(tmp_path / "b").provenance["level_splats"]
     for count in counts:
         assert read_model(tmp_path / "b", Reading(most_splats=count)).splat_count == count
     assert cli.main(["info", str(tmp_path / "b"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["levels"]
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["levels"] and facts["sh_degree"] == 1
+    flat = ["lod", str(scene), "--out", str(tmp_path / "c"), "--sh-degree", "0"]
+    assert cli.main(flat) == 0 and read_model(tmp_path / "c").sh.shape == (400, 1, 3)
 
 
 def test_a_package_is_written_as_it_is_at_x(tmp_path):
@@ -44,6 +47,7 @@ def test_a_package_is_written_as_it_is_at_x(tmp_path):
     [
         (["--out", "b.sog"], "is no folder's name"),
         (["--out", "b", "--leaf", "63"], "--leaf is 63, expected 64 to 524288"),
+        (["--out", "b", "--sh-degree", "4"], "--sh-degree is 4, expected 0 to 3"),
         (["--out", "b", "--x", "nowhere"], "is no x of this scene"),
         (["--out", "there"], "--overwrite replaces it"),
     ],

@@ -17,6 +17,7 @@ from shapeshift.runtime_models.splats.operations.decimate import decimate
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.sog import write_streamed as module
 from shapeshift.runtime_models.splats.sog.read_streamed import levels, read_level, read_tree
+from shapeshift.runtime_models.splats.sog.sh_palette import make_palette
 from shapeshift.runtime_models.splats.sog.write_sog import CODES, codebook, coded, write_sog
 from shapeshift.runtime_models.splats.sog.write_streamed import write_streamed
 from tests.support.splat_scenes import shell
@@ -61,6 +62,31 @@ def test_a_codebook_has_the_ends_and_the_nearest_code_is_taken():
     np.testing.assert_allclose(np.abs(book[codes] - values), best, atol=1e-5)
     alike, zeros = coded(np.full((3, 3), 7.0, np.float32))
     assert (alike[zeros] == 7).all()
+
+
+@pytest.mark.parametrize("coefficients", [4, 9, 16])
+@pytest.mark.parametrize("count", [1, 2, 255, 256, 257, 2000])
+def test_harmonics_come_back_as_the_mean_of_their_set(tmp_path, count, coefficients):
+    splats = some_splats(count, coefficients)
+    sets, labels = make_palette(splats.sh[:, 1:])
+    assert len(sets) == 1 << max(int(np.log2(count / 4)), 0) and labels.max() == len(sets) - 1
+    sizes = np.bincount(labels)
+    assert sizes.max() - sizes.min() <= 1
+    for number in range(0, len(sets), 17):
+        mean = splats.sh[labels == number, 1:].mean(axis=0)
+        np.testing.assert_allclose(sets[number], mean, atol=1e-5)
+    write_sog(splats, tmp_path, "test")
+    back = read_model(tmp_path, Reading(up="+Y"))
+    step = np.diff(codebook(sets)).max() / 2
+    assert np.abs(back.sh[:, 1:] - sets[labels]).max() <= step + 1e-5
+
+
+def test_sets_of_harmonics_are_of_those_that_are_alike():
+    """Sixteen kinds of splats, many of each: a set of each kind, to the last bits."""
+    kinds = np.random.default_rng(0).normal(size=(16, 15, 3)).astype(np.float32)
+    which = np.random.default_rng(1).permutation(np.arange(1024) % 16)
+    sets, labels = make_palette(kinds[which])
+    np.testing.assert_allclose(sets[labels], kinds[which], atol=1e-5)
 
 
 def test_antialiased_and_far_scenes_come_back(tmp_path):
@@ -151,7 +177,7 @@ def test_others_read_a_file_as_we_do(tmp_path):
     """The format's own splat-transform, where it is on the PATH."""
     if not shutil.which("splat-transform"):
         pytest.skip("splat-transform is not installed (npm install @playcanvas/splat-transform)")
-    written(plain(shell(500)), tmp_path / "a")
+    written(plain(shell(500, 9)), tmp_path / "a")
     command = ["splat-transform", "-q", "-g", "cpu", str(tmp_path / "a/1_0/meta.json")]
     subprocess.run([*command, str(tmp_path / "b.ply")], check=True, timeout=120)
     ours, theirs = read_model(tmp_path / "a/1_0"), read_model(tmp_path / "b.ply")
