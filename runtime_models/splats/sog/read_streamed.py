@@ -16,13 +16,13 @@ from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats, Rea
 from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
 from shapeshift.runtime_models.splats.sog.sog_files import (
     EXPORT_AGAIN,
-    LARGEST_META,
     META,
     file_inside,
 )
 
 TREE = "lod-meta.json"
 MOST_LEVELS = 64
+LARGEST_TREE = 64 << 20  # bytes: 100,000 leaves of 7 levels, some 300 million splats
 GROWTH = 4  # while a scene is refined, the next level that is read has so many times the splats
 
 
@@ -114,8 +114,8 @@ def steps(counts: tuple[int, ...], most: int) -> list[int]:
 def read_tree(path: Path, memory: Account | None = None) -> Streamed:
     """What a lod-meta.json says, checked, no splat read yet.  Raises BadFile."""
     file = path if path.name == TREE else path / TREE
-    if file.stat().st_size > LARGEST_META:
-        raise BadFile(f"{file.name} has over {LARGEST_META:,} bytes; it is no {TREE} of a scene.")
+    if file.stat().st_size > LARGEST_TREE:
+        raise BadFile(f"{file.name} has over {LARGEST_TREE:,} bytes; it is no {TREE} of a scene.")
     memory = memory or Memory().of(path)
     with memory.lend(JSON_A_BYTE * file.stat().st_size, f"its {file.name}"):
         tree = Fields(parse_json(file.read_bytes(), file.name), file.name, EXPORT_AGAIN)

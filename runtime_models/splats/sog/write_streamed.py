@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.whole_file import write_whole
-from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.runtime_models.splats.lod.leaves import Tree, cut_leaves
 from shapeshift.runtime_models.splats.lod.levels import Level, count_levels, make_levels
 from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
-from shapeshift.runtime_models.splats.sog.read_streamed import TREE
+from shapeshift.runtime_models.splats.sog.read_streamed import LARGEST_TREE, TREE
 from shapeshift.runtime_models.splats.sog.write_sog import write_sog
 
 MOST_OF_A_FILE = 1 << 19  # splats, as the format's own writer has it
@@ -42,7 +42,7 @@ def write_streamed(
     """lod-meta.json and its files into an existing folder, of at least one splat.
 
     Leaves have at most leaf_splats splats at the finest level; all of them have every level, with
-    an error that readers spend their budget by.
+    an error that readers spend their budget by.  Raises BadFile where the tree gets too large.
     """
     turned = rotate_half_turn(splats)
     flat = SplatLayers(
@@ -68,7 +68,13 @@ def write_streamed(
         "filenames": names,
         "tree": described(leaves.tree, nodes, boxes)[0],
     }
-    write_whole(folder / TREE, json.dumps(meta).encode())
+    data = json.dumps(meta, separators=(",", ":")).encode()
+    if len(data) > LARGEST_TREE:
+        raise BadFile(
+            f"{leaves.count:,} leaves make a {TREE} of {len(data):,} bytes, readers take "
+            f"{LARGEST_TREE:,} at most; give leaves more splats, --leaf {4 * leaf_splats}."
+        )
+    write_whole(folder / TREE, data)
     progress(1.0)
     return StreamedSizes(leaves.count, tuple(sizes))
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from shapeshift.runtime_models.files import memory
-from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.operations.decimate import decimate
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
@@ -162,6 +162,14 @@ def test_merging_is_not_refused_by_the_size_of_a_small_file(tmp_path, monkeypatc
 def test_few_splats_have_few_levels(tmp_path, count):
     sizes = written(some_splats(count, 1), tmp_path / "a")
     assert sizes.levels[0] == count == read_model(tmp_path / "a").splat_count
+
+
+def test_a_tree_that_no_reader_takes_is_not_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "LARGEST_TREE", 4000)
+    with pytest.raises(BadFile, match=r"64 leaves make a lod-meta\.json of .* --leaf 256"):
+        written(plain(shell(4000)), tmp_path / "a", 64)
+    written(plain(shell(1000)), tmp_path / "b", 256)
+    assert (tmp_path / "b" / "lod-meta.json").stat().st_size <= 4000
 
 
 def test_the_same_scene_gives_the_same_bytes(tmp_path):
