@@ -41,6 +41,10 @@ COMMANDS = {
         "commands.export",
         "a scene at one x as .ply, .compressed.ply, .spz, .glb or .splat",
     ),
+    "lod": (
+        "streaming.lod",
+        "levels of detail of a scene as streamed SOG, for viewers that load what is seen",
+    ),
     "serve": ("page.serve", "a scene in the browsers of this computer, anew when its file changes"),
     "cameras": ("commands.cameras", "list a file of cameras, or convert it"),
     "simulate": (

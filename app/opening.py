@@ -36,7 +36,7 @@ class ReadingOptions:
     allow_huge: Annotated[bool, EXPERT] = False
     """Open a file even where thousands of its splats would lie over every pixel."""
     max_splats: Annotated[int, EXPERT] = 0
-    """Show at most so many splats, the most visible ones; 0: all."""
+    """Show at most so many splats: neighbours become one, where it shows least; 0: all."""
     memory: Annotated[float, EXPERT] = 0.0
     """GB of memory that files may take while they are read, however few bytes they have; 0: 64
     bytes for each byte of a file, and three quarters of this machine's in all."""

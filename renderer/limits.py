@@ -17,7 +17,7 @@ def too_many(count: int, most: int, limit: str, instead: str) -> TooLarge:
     """
     return TooLarge(
         f"the scene has {count:,} splats and this driver draws {most:,} at most ({limit}); open it "
-        f"with --max-splats {most} to see those that show most, or draw it with "
+        f"with --max-splats {most} to see it with neighbours merged, or draw it with "
         f"--drawing {instead}."
     )
 

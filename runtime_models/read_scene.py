@@ -34,10 +34,8 @@ from shapeshift.runtime_models.splats.layers.read_layer_list import (
 from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
 from shapeshift.runtime_models.splats.lcc.read_lcc import is_lcc, read_lcc
 from shapeshift.runtime_models.splats.lcc.read_lcc2 import is_lcc2, read_lcc2
-from shapeshift.runtime_models.splats.operations.prune_by_importance import (
-    left_whole,
-    prune_by_importance,
-)
+from shapeshift.runtime_models.splats.operations.decimate import within_most_splats
+from shapeshift.runtime_models.splats.operations.prune_by_importance import left_whole
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.read_output_folder import (
     in_run,
@@ -56,7 +54,6 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
 from shapeshift.runtime_models.splats.sog.sog_files import META
 
 PHOTOS = (".jpg", ".jpeg")  # a scene's own pictures are .png and .webp
-THINNING = 160  # bytes a splat on the way, in addition to what is kept
 KNOWN = (
     "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
     ".gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of a 3DGS or "
@@ -66,21 +63,17 @@ KNOWN = (
 
 def read_model(path: str | Path, reading: Reading | None = None) -> Model:
     """The model in a file or folder, read as `reading` says.  Raises BadFile."""
-    reading = (reading or Reading()).begun()
+    path, reading = Path(path), (reading or Reading()).begun()
     try:
-        model = read_whole(Path(path), reading)
+        model = read_whole(path, reading)
     except MemoryError as error:
         raise BadFile(
-            f"{Path(path).name} does not fit this machine's memory ({error}); close other "
+            f"{path.name} does not fit this machine's memory ({error}); close other "
             "programs, or open fewer layers."
         ) from error
     if isinstance(model, AnchorModel):
-        return left_whole(model, reading.most_splats, Path(path).name)
-    if not (isinstance(model, SplatLayers) and 0 < reading.most_splats < model.splat_count):
-        return model
-    memory = reading.within(Path(path)).account
-    with memory.lend(THINNING * model.splat_count, f"thinning {model.splat_count:,} splats"):
-        return prune_by_importance(model, reading.most_splats)
+        return left_whole(model, reading.most_splats, path.name)
+    return within_most_splats(model, path, reading) if isinstance(model, SplatLayers) else model
 
 
 def read_whole(path: Path, reading: Reading) -> Model:

@@ -44,6 +44,24 @@ def rotation_matrices(wxyz: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
+def quaternions_of(matrices: np.ndarray) -> np.ndarray:
+    """(N, 4) wxyz of rotations (N, 3, 3): each component's square is known, take the largest."""
+    m = matrices
+    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    squares = np.stack([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], 1)
+    products = np.empty((len(m), 4, 4))  # 4 q q^T
+    products[:, range(4), range(4)] = squares
+    pairs = {
+        (0, 1): m[:, 2, 1] - m[:, 1, 2], (0, 2): m[:, 0, 2] - m[:, 2, 0],
+        (0, 3): m[:, 1, 0] - m[:, 0, 1], (1, 2): m[:, 0, 1] + m[:, 1, 0],
+        (1, 3): m[:, 0, 2] + m[:, 2, 0], (2, 3): m[:, 1, 2] + m[:, 2, 1],
+    }  # fmt: skip
+    for (i, j), value in pairs.items():
+        products[:, i, j] = products[:, j, i] = value
+    rows = products[np.arange(len(m)), squares.argmax(1)]
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
 def covariance(scales: np.ndarray, wxyz: np.ndarray) -> np.ndarray:
     """(N, 6) xx xy xz yy yz zz in m^2 of R S S^T R^T (paper eq. 1); scales (N, 3), wxyz (N, 4)."""
     m = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3)

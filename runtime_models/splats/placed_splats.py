@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.rotation import normalize, rotation_matrices
+from shapeshift.runtime_models.rotation import normalize, quaternions_of, rotation_matrices
 from shapeshift.runtime_models.splats.operations.rotate_splats import (
     quaternion_of,
     rotate_harmonics,
@@ -70,24 +70,6 @@ def stretched(
         new_scales[part] = np.where(good[:, None], sizes, np.nan)
         new_wxyz[part] = quaternions_of(left)
     return new_scales, new_wxyz
-
-
-def quaternions_of(matrices: np.ndarray) -> np.ndarray:
-    """(N, 4) wxyz of rotations (N, 3, 3): each component's square is known, take the largest."""
-    m = matrices
-    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
-    squares = np.stack([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], 1)
-    products = np.empty((len(m), 4, 4))  # 4 q q^T
-    products[:, range(4), range(4)] = squares
-    pairs = {
-        (0, 1): m[:, 2, 1] - m[:, 1, 2], (0, 2): m[:, 0, 2] - m[:, 2, 0],
-        (0, 3): m[:, 1, 0] - m[:, 0, 1], (1, 2): m[:, 0, 1] + m[:, 1, 0],
-        (1, 3): m[:, 0, 2] + m[:, 2, 0], (2, 3): m[:, 1, 2] + m[:, 2, 1],
-    }  # fmt: skip
-    for (i, j), value in pairs.items():
-        products[:, i, j] = products[:, j, i] = value
-    rows = products[np.arange(len(m)), squares.argmax(1)]
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
 def joined(parts: list[RawSplats], file: str) -> RawSplats:

@@ -25,7 +25,7 @@ class Reading:
     flip: bool = False  # half a turn about z after that: upside down
     strict: bool = False  # refuse what would be repaired
     allow_huge: bool = False  # open files that would lay thousands of splats over every pixel
-    most_splats: int = 0  # no more than these, the ones that show most; 0 = all
+    most_splats: int = 0  # no more than these, neighbours are merged; 0 = all
     progress: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
     memory_gb: float = 0.0  # that files may take while they are read; 0 = as memory.py has it
     memory: Memory | Account | None = None  # what they have taken; None: nothing is open yet

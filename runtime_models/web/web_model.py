@@ -51,7 +51,7 @@ def check_counts(model: AnchorModel | SplatLayers) -> None:
     if not 0 < model.splat_count <= MOST_SPLATS or anchors > MOST_ANCHORS:
         raise BadFile(
             f"the scene has {model.splat_count:,} splats; a page shows 1 to {MOST_SPLATS:,}: "
-            "--max-splats keeps the most visible ones of plain splats."
+            "--max-splats merges neighbours of plain splats."
         )
 
 

@@ -25,9 +25,10 @@ def load(
 
     mode: how layers add up.  up: the axis of the file that points up, where its format does not
     say; flip: half a turn after that.  strict: refuse a file that needs repair.  allow_huge: open a
-    file whose splats would lie thousands deep over every pixel.  max_splats: keep the most visible
-    ones; 0 is all.  memory_gb: what files may take while they are read; 0 is 64 bytes for each byte
-    of a file.  progress: called with (what, part 0..1) from this thread.
+    file whose splats would lie thousands deep over every pixel.  max_splats: neighbours become one
+    until there are no more than these; 0 is all.  memory_gb: what files may take while they are
+    read; 0 is 64 bytes for each byte of a file.  progress: called with (what, part 0..1) from this
+    thread.
 
     Raises BadFile, one sentence: what was found, what is wanted, what to do.  What was repaired is
     in `scene.findings`.

@@ -81,7 +81,7 @@ def test_the_poison_works(folder, tmp_path):
 SIZE = ("--size", "32x24")
 LIGHT = [
     ("info", "a.ply"), ("lint", "a.ply"), ("cameras", "capture/transforms.json"),
-    ("export", "a.ply", "--out", "light/a.spz"),
+    ("export", "a.ply", "--out", "light/a.spz"), ("lod", "a.ply", "--out", "light/levels"),
     ("compare", "a.ply", "b.ply", *SIZE),
     ("render", "a.ply", "--out", "light/pictures", *SIZE),
     ("film", "a.ply", "--seconds", "0.1", "--out", "light/film.gif", *SIZE),

@@ -1,17 +1,24 @@
-"""What --max-splats costs in the picture: ways to choose the splats that stay, at half and less.
+"""What --max-splats costs in the picture: ways to fewer splats, at half and less.
 
     python tools/runtime_models/thin.py SCENE ... --out docs/bench/thin.csv
 
-Each scene is drawn whole and with a part of its splats from views around it; the rows are the mean
-PSNR (dB of the mean squared error over all views) against the whole one.  "thin" is what
-runtime_models/splats/operations/prune_by_importance.py does; "even"
-draws along the Z-curve with chances by a weight.
+Each scene is drawn whole and with fewer splats from views around it; the rows are the mean PSNR (dB
+of the mean squared error over all views) against the whole one at each stop, and the processor
+seconds that the way took.  "merge" is --max-splats (runtime_models/splats/operations/decimate.py),
+with two other ways to treat an opacity above 1; "prune" is prune_by_importance.py beside it;
+"even" draws along the Z-curve with chances by a weight.  Where splat-transform is on the PATH
+(`npm install @playcanvas/splat-transform`), what its --decimate makes of the same file is measured
+too, reading and writing included in its seconds.
 """
 
 import argparse
+import resource
+import shutil
+import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -23,11 +30,13 @@ sys.path[:0] = [str(HERE.parents[1])]
 from shapeshift.app.drawing import open_renderer  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.runtime_models.splats.operations import moment_matching  # noqa: E402
+from shapeshift.runtime_models.splats.operations.decimate import decimate  # noqa: E402
 from shapeshift.runtime_models.splats.operations.morton import morton_order  # noqa: E402
 from shapeshift.runtime_models.splats.operations.prune_by_importance import (  # noqa: E402
     evenly,
     largest,
-    prominence,
+    prune_by_importance,
 )
 from shapeshift.scene.cameras.framing import frame_points, model_points, orbit_path  # noqa: E402
 from shapeshift.scene.metrics import psnr  # noqa: E402
@@ -38,39 +47,78 @@ VIEWS = 8
 PARTS = (0.5, 0.25, 0.1)
 
 
-def ways(model: SplatLayers) -> dict[str, Callable[[int], np.ndarray]]:
-    """Ways to choose rows, each a function of how many."""
+Way = Callable[[SplatLayers, int], SplatLayers]
+OVERLAPS = {"merge": 0.5, "merge: opacity cut at 1": 0.0, "merge: area takes all above 1": 1.0}
+
+
+def merged(overlap: float, model: SplatLayers, count: int) -> SplatLayers:
+    """Decimated, the area taking this power of what is above an opacity of 1."""
+    usual, moment_matching.OVERLAP = moment_matching.OVERLAP, overlap
+    try:
+        return decimate(model, count)
+    finally:
+        moment_matching.OVERLAP = usual
+
+
+def sampled(weigh: Callable[[SplatLayers], np.ndarray], model: SplatLayers, count: int):
+    return model.with_rows(evenly(weigh(model), morton_order(model.means), count))
+
+
+def ranked(weigh: Callable[[SplatLayers], np.ndarray], model: SplatLayers, count: int):
+    return model.with_rows(largest(weigh(model), count))
+
+
+def opacity(model: SplatLayers) -> np.ndarray:
+    return model.opacity.astype(np.float64)
+
+
+def area(model: SplatLayers) -> np.ndarray:
     _, middle, most = np.sort(model.scales, axis=1).T.astype(np.float64)
-    opacity, area = model.opacity.astype(np.float64), middle * most
-    order = morton_order(model.means)
-    evened = {
-        "thin": prominence(model),
-        "even: all alike": np.ones_like(area),
-        "even: opacity": opacity,
-        "even: opacity x area": opacity * area,
-        "even: root of opacity x area": np.sqrt(opacity * area),
+    return middle * most
+
+
+PEER = "splat-transform"
+
+
+def decimated_by_peer(path: Path, model: SplatLayers, count: int) -> SplatLayers:
+    """What splat-transform makes of the file."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "fewer.ply"
+        command = [PEER, "-q", "-g", "cpu", str(path), "--decimate", str(count), str(out)]
+        subprocess.run(command, check=True)
+        return read_model(out)
+
+
+def cpu_seconds() -> float:
+    """Of this process and of those that it has waited for."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def ways() -> dict[str, Way]:
+    """Ways to fewer splats by name."""
+    weights = {
+        "all alike": lambda model: np.ones(model.splat_count),
+        "opacity": opacity,
+        "opacity x area": lambda model: opacity(model) * area(model),
+        "root of opacity x area": lambda model: np.sqrt(opacity(model) * area(model)),
     }
-    ranked = {
-        "largest opacity x area": opacity * area,
-        "largest opacity x root of area": opacity * np.sqrt(area),
+    ranks = {
+        "largest opacity x area": weights["opacity x area"],
+        "largest opacity x root of area": lambda model: opacity(model) * np.sqrt(area(model)),
         "largest opacity": opacity,
         "largest area": area,
-        "chance": np.random.default_rng(0).random(model.splat_count),
+        "chance": lambda model: np.random.default_rng(0).random(model.splat_count),
     }
-    return {name: partial(evenly, values, order) for name, values in evened.items()} | {
-        name: partial(largest, values) for name, values in ranked.items()
-    }
+    out: dict[str, Way] = {name: partial(merged, value) for name, value in OVERLAPS.items()}
+    out["prune"] = prune_by_importance
+    out |= {f"even: {name}": partial(sampled, weigh) for name, weigh in weights.items()}
+    return out | {name: partial(ranked, weigh) for name, weigh in ranks.items()}
 
 
-def subset(model: SplatLayers, rows: np.ndarray) -> SplatLayers:
-    names = ("means", "scales", "wxyz", "opacity", "sh", "layer")
-    arrays = {name: getattr(model, name)[rows] for name in names}
-    return replace(model, **arrays, labels=None, extra={})
-
-
-def pictures(renderer, model: SplatLayers, views: list) -> np.ndarray:
-    """(V, H, W, 3) of the last stop, where every layer of a cumulative scene is there."""
-    renderer.update(Scene((SceneObject("scene", model, x=1.0),)))
+def pictures(renderer, model: SplatLayers, views: list, x: float) -> np.ndarray:
+    """(V, H, W, 3) at x."""
+    renderer.update(Scene((SceneObject("scene", model, x=x),)))
     images = []
     for view in views:
         renderer.draw([view])
@@ -81,15 +129,22 @@ def pictures(renderer, model: SplatLayers, views: list) -> np.ndarray:
 def measure(path: Path, renderer) -> list[str]:
     model = read_model(path)
     views = orbit_path(VIEWS, *frame_points(*model_points(model)), SIZE)
-    whole = pictures(renderer, model, views)
+    whole = {stop.x: pictures(renderer, model, views, stop.x) for stop in model.stops}
     rows = []
-    for way, choose in ways(model).items():
+    offered = ways()
+    if shutil.which(PEER) and path.is_file():
+        offered[f"{PEER} --decimate"] = partial(decimated_by_peer, path)
+    for name, way in offered.items():
         for part in PARTS:
             count = round(part * model.splat_count)
-            kept = subset(model, choose(count))
-            error = psnr(pictures(renderer, kept, views), whole)
-            rows.append(f"{path.name},{model.splat_count},{way},{part},{count},{error:.2f}")
-            print(rows[-1], flush=True)  # noqa: T201
+            began = cpu_seconds()
+            fewer = way(model, count)
+            seconds = cpu_seconds() - began
+            facts = f"{path.name},{model.splat_count},{name},{part},{fewer.splat_count}"
+            for x, picture in whole.items():
+                error = psnr(pictures(renderer, fewer, views, x), picture)
+                rows.append(f"{facts},{x:g},{error:.2f},{seconds:.2f}")
+                print(rows[-1], flush=True)  # noqa: T201
     return rows
 
 
@@ -107,7 +162,7 @@ def main() -> None:
             path.name for path in options.scenes
         )
         head = [f"# {command} --out docs/bench/{options.out.name}"]
-        head += ["scene,splats,way,part,kept,psnr_db"]
+        head += ["scene,splats,way,part,kept,x,psnr_db,cpu_s"]
         options.out.write_text("\n".join([*head, *rows, ""]))
 
 

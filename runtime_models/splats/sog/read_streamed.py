@@ -11,18 +11,18 @@ from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, Memory
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from shapeshift.runtime_models.splats.layers.read_layers import check_mode, join_layers
-from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
+from shapeshift.runtime_models.splats.operations.decimate import within_most_splats
 from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
 from shapeshift.runtime_models.splats.sog.sog_files import (
     EXPORT_AGAIN,
-    LARGEST_META,
     META,
     file_inside,
 )
 
 TREE = "lod-meta.json"
 MOST_LEVELS = 64
+LARGEST_TREE = 64 << 20  # bytes: 100,000 leaves of 7 levels, some 300 million splats
 GROWTH = 4  # while a scene is refined, the next level that is read has so many times the splats
 
 
@@ -85,7 +85,7 @@ def levels(path: Path, reading: Reading) -> Iterator[SplatLayers]:
     streamed = read_tree(path, reading.within(folder_of(path)).account)
     origin = None
     for number in steps(streamed.counts, reading.most_splats):
-        level = prune_by_importance(read_level(streamed, number, reading), reading.most_splats)
+        level = within_most_splats(read_level(streamed, number, reading), path, reading)
         if origin is None:
             origin = level.origin
         shift = np.subtract(level.origin, origin)
@@ -114,8 +114,8 @@ def steps(counts: tuple[int, ...], most: int) -> list[int]:
 def read_tree(path: Path, memory: Account | None = None) -> Streamed:
     """What a lod-meta.json says, checked, no splat read yet.  Raises BadFile."""
     file = path if path.name == TREE else path / TREE
-    if file.stat().st_size > LARGEST_META:
-        raise BadFile(f"{file.name} has over {LARGEST_META:,} bytes; it is no {TREE} of a scene.")
+    if file.stat().st_size > LARGEST_TREE:
+        raise BadFile(f"{file.name} has over {LARGEST_TREE:,} bytes; it is no {TREE} of a scene.")
     memory = memory or Memory().of(path)
     with memory.lend(JSON_A_BYTE * file.stat().st_size, f"its {file.name}"):
         tree = Fields(parse_json(file.read_bytes(), file.name), file.name, EXPORT_AGAIN)

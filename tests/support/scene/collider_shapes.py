@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from shapeshift.runtime_models.splats.placed_splats import quaternions_of
+from shapeshift.runtime_models.rotation import quaternions_of
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""--max-splats and joining: exact numbers, the order kept, origins, labels and other columns."""
+"""Pruning by importance and joining: exact numbers, the order, origins, labels, columns."""
 
 from dataclasses import replace
 
@@ -84,14 +84,14 @@ def test_largest_rows_rise_and_of_equals_the_first_stay():
     assert largest(np.array([1, 5, 5, 0, 5, 9]), 3).tolist() == [1, 2, 5]
 
 
-def test_a_scene_is_thinned_over_all_layers_together(tmp_path):
+def test_a_scene_is_pruned_over_all_layers_together(tmp_path):
     for i, count in enumerate((300, 500)):
         extra = {"own": np.arange(count, dtype=np.float32)}
         splats = replace(some_splats(count, 4, seed=i), extra=extra)
         write_ply(splats, tmp_path / f"layer{i}.ply")
     whole = read_model(tmp_path)
     for most in (1, 2, 399, 799):
-        part = read_model(tmp_path, Reading(most_splats=most))
+        part = prune_by_importance(whole, most)
         assert part.splat_count == most and part.layer.shape == (most,)
         # Each row is one of the whole scene, in its order.
         rows = [np.flatnonzero((whole.means == mean).all(1))[0] for mean in part.means]
@@ -101,10 +101,19 @@ def test_a_scene_is_thinned_over_all_layers_together(tmp_path):
         np.testing.assert_array_equal(part.extra["own"], whole.extra["own"][rows])
         (found,) = part.findings
         assert f"asks for {most:,}" in found.what and "kept" in found.done
+    assert prune_by_importance(whole, 800) is whole
+
+
+def test_max_splats_counts_over_all_layers_together(tmp_path):
+    for i, count in enumerate((300, 500)):
+        write_ply(some_splats(count, 4, seed=i), tmp_path / f"layer{i}.ply")
+    for most in (1, 2, 399, 799):
+        part = read_model(tmp_path, Reading(most_splats=most))
+        assert part.splat_count == most and part.layer.shape == (most,)
+        assert f"asks for {most:,}" in part.findings[-1].what
     for most in (0, 800, 801):
         same = read_model(tmp_path, Reading(most_splats=most))
         assert same.splat_count == 800 and same.findings == ()
-    assert prune_by_importance(whole, 800) is whole
 
 
 def test_one_part_is_not_copied():

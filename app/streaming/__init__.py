@@ -1,0 +1,1 @@
+"""Scenes for viewers that load what is seen."""

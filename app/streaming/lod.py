@@ -1,0 +1,112 @@
+"""launch.py lod: levels of detail of a scene at one control value, as streamed SOG."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL
+from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
+
+if TYPE_CHECKING:
+    from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+    from shapeshift.runtime_models.splats.sog.write_streamed import StreamedSizes
+
+LEAST_LEAF = 64  # splats: of smaller ones the tree would take more bytes than they
+MOST_LEAF = 1 << 19  # a leaf lies in one file
+BAKED = 0.2  # of the time
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Write levels of detail, each with half of the splats of the one before, made by merging
+    neighbours: a folder in PlayCanvas's streamed SOG, with the errors that its engine spends its
+    budget by.  This program reads the finest level that --max-splats allows.
+    """
+
+    scene: Annotated[Path, POSITIONAL]
+    """A package, splats of any known format, a folder of layers or a scene file."""
+    out: Path
+    """The folder to write, with lod-meta.json in it."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
+    stop, and in a scene file what it says for each object."""
+    sh_degree: int = 3
+    """Degree of the colours' spherical harmonics, at most; 0: one colour from all sides."""
+    leaf: Annotated[int, EXPERT] = 4096
+    """Splats of a leaf at the finest level, at most; viewers choose a level for each leaf."""
+    overwrite: bool = False
+    """Replace an earlier folder; never what is read."""
+
+
+def run(options: Options) -> int:
+    from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.errors import UsageError
+
+    if not LEAST_LEAF <= options.leaf <= MOST_LEAF:
+        raise UsageError(f"--leaf is {options.leaf}, expected {LEAST_LEAF} to {MOST_LEAF}.")
+    if not 0 <= options.sh_degree <= 3:
+        raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
+    if options.out.suffix:
+        raise UsageError(f"--out {options.out} is no folder's name; leave its ending out.")
+    check_output(options.out, [options.scene], options.overwrite)
+    with progress_after(PATIENCE_S) as progress:
+        splats = bake_scene(options, progress)
+        for finding in splats.findings:
+            say(sentence(finding))
+        sizes = write_folder(splats, options, progress)
+    size = sum(file.stat().st_size for file in options.out.rglob("*") if file.is_file())
+    counts = ", ".join(f"{count:,}" for count in sizes.levels)
+    say(
+        f"{full(options.out)}: {sizes.leaves:,} leaves, {len(sizes.levels)} levels of {counts} "
+        f"splats, {size:,} bytes."
+    )
+    return 0
+
+
+def bake_scene(options: Options, progress: Callable[[str, float], None]) -> "PlainSplats":
+    """All that is visible as plain splats, where it stands.  Raises BadFile and UsageError."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from shapeshift.app.commands.export import choose_x
+    from shapeshift.app.commands.exported import ExportLook, Part, bake_part
+    from shapeshift.app.document import open_document
+    from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.shapes import three
+    from shapeshift.runtime_models.splats.write_plain import merged
+
+    document = open_document(options.scene, options)
+    objects = [obj for obj in document.scene.objects if obj.visible]
+    if not objects:
+        raise UsageError(f"{options.scene}: all objects are hidden; show one of them.")
+    if not document.file:
+        (obj,) = objects
+        name = options.scene.stem or options.scene.name
+        objects = [replace(obj, name=name, x=choose_x(options.x, obj.model))]
+    elif options.x:
+        objects = [obj for obj in document.placed(options.x).scene.objects if obj.visible]
+    parts = []
+    for number, obj in enumerate(objects):
+        progress(f"baking {obj.name}", BAKED * number / len(objects))
+        parts.append(bake_part(Part(obj), ExportLook(options.sh_degree)))
+    splats = merged(parts)
+    return replace(splats, origin=three(np.add(splats.origin, document.origin)))
+
+
+def write_folder(
+    splats: "PlainSplats", options: Options, progress: Callable[[str, float], None]
+) -> "StreamedSizes":
+    """The folder, all or nothing."""
+    from shapeshift.runtime_models.files.whole_file import whole_folder
+    from shapeshift.runtime_models.splats.sog.write_streamed import write_streamed
+
+    def report(part: float) -> None:
+        progress(f"merging and writing {len(splats.means):,} splats", BAKED + (1 - BAKED) * part)
+
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    with whole_folder(options.out) as folder:
+        return write_streamed(splats, folder, options.leaf, "shapeshift lod", report)

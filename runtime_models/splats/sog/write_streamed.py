@@ -1,0 +1,141 @@
+"""Levels of detail to PlayCanvas's streamed SOG: the inverse of read_streamed, with errors."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.runtime_models.rotation import covariance
+from shapeshift.runtime_models.splats.lod.leaves import Tree, cut_leaves
+from shapeshift.runtime_models.splats.lod.levels import Level, count_levels, make_levels
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.sog.read_streamed import LARGEST_TREE, TREE
+from shapeshift.runtime_models.splats.sog.write_sog import write_sog
+
+MOST_OF_A_FILE = 1 << 19  # splats, as the format's own writer has it
+REACH = 3.0  # sigmas of a splat that its leaf's box holds
+DIGITS = 6  # of a bound and an error
+MERGED = 0.1  # of the time that a level takes before its files are written
+Box = tuple[np.ndarray, np.ndarray]  # (3,) least and most, metres
+
+
+@dataclass(frozen=True)
+class StreamedSizes:
+    """What was written."""
+
+    leaves: int
+    levels: tuple[int, ...]  # splats of each
+
+
+def write_streamed(
+    splats: PlainSplats,
+    folder: Path,
+    leaf_splats: int,
+    generator: str,
+    progress: Callable[[float], None],
+) -> StreamedSizes:
+    """lod-meta.json and its files into an existing folder, of at least one splat.
+
+    Leaves have at most leaf_splats splats at the finest level; all of them have every level, with
+    an error that readers spend their budget by.  Raises BadFile where the tree gets too large.
+    """
+    turned = rotate_half_turn(splats)
+    flat = SplatLayers(
+        turned.means, turned.scales, turned.wxyz, turned.opacity,
+        turned.sh, np.zeros(len(turned.means), np.int32),
+        (Stop("all", 0.0),), origin=turned.origin, antialiased=turned.antialiased,
+    )  # fmt: skip
+    leaves = cut_leaves(flat.means, leaf_splats)
+    count = count_levels(flat.splat_count, leaves.count)
+    nodes: list[dict] = [{"lods": {}, "errors": []} for _ in range(leaves.count)]
+    boxes: list[Box] = [(np.full(3, np.inf), np.full(3, -np.inf))] * leaves.count
+    names: list[str] = []
+    sizes = []
+    for level in make_levels(flat, leaves, count, lambda part: progress(MERGED + part * 0.8)):
+        sizes.append(level.splats.splat_count)
+        names += write_level(level, folder, nodes, len(names), generator)
+        boxes = [around(box, other) for box, other in zip(boxes, boxes_of(level), strict=True)]
+    meta = {
+        "version": 1,
+        "asset": {"generator": generator},
+        "lodLevels": count,
+        "lodErrors": True,
+        "filenames": names,
+        "tree": described(leaves.tree, nodes, boxes)[0],
+    }
+    data = json.dumps(meta, separators=(",", ":")).encode()
+    if len(data) > LARGEST_TREE:
+        raise BadFile(
+            f"{leaves.count:,} leaves make a {TREE} of {len(data):,} bytes, readers take "
+            f"{LARGEST_TREE:,} at most; give leaves more splats, --leaf {4 * leaf_splats}."
+        )
+    write_whole(folder / TREE, data)
+    progress(1.0)
+    return StreamedSizes(leaves.count, tuple(sizes))
+
+
+def write_level(
+    level: Level, folder: Path, nodes: list[dict], first_file: int, generator: str
+) -> list[str]:
+    """Writes a level, leaf after leaf, and notes where each run lies; gives the files' names."""
+    ends = np.cumsum(np.bincount(level.leaf, minlength=len(nodes)))
+    names: list[str] = []
+    start = leaf = 0
+    while leaf < len(nodes):
+        fitting = int(np.searchsorted(ends, start + MOST_OF_A_FILE, side="right"))
+        last = max(fitting, leaf + 1)
+        stop, begin = int(ends[last - 1]), start
+        for i in range(leaf, last):
+            run = {"file": first_file + len(names), "offset": begin - start}
+            nodes[i]["lods"][str(level.number)] = run | {"count": int(ends[i]) - begin}
+            nodes[i]["errors"].append(round(float(level.errors[i]), DIGITS))
+            begin = int(ends[i])
+        name = f"{level.number}_{len(names)}"
+        (folder / name).mkdir()
+        write_sog(plain_rows(level.splats, slice(start, stop)), folder / name, generator)
+        names.append(f"{name}/meta.json")
+        start, leaf = stop, last
+    return names
+
+
+def plain_rows(layers: SplatLayers, rows: slice) -> PlainSplats:
+    """Some splats of layers of one stop."""
+    return PlainSplats(
+        layers.means[rows], layers.scales[rows], layers.wxyz[rows], layers.opacity[rows],
+        layers.sh[rows], layers.origin, layers.antialiased,
+    )  # fmt: skip
+
+
+def boxes_of(level: Level) -> list[Box]:
+    """Each leaf's box, metres in the file, REACH sigmas around its splats."""
+    splats = level.splats
+    starts = np.searchsorted(level.leaf, np.arange(level.leaf[-1] + 1))
+    middle = splats.means.astype(np.float64) + splats.origin
+    spread = covariance(splats.scales.astype(np.float64), splats.wxyz)[:, [0, 3, 5]]
+    away = REACH * np.sqrt(np.maximum(spread, 0))
+    low = np.minimum.reduceat(middle - away, starts)
+    high = np.maximum.reduceat(middle + away, starts)
+    return list(zip(low, high, strict=True))
+
+
+def around(one: Box, other: Box) -> Box:
+    return np.minimum(one[0], other[0]), np.maximum(one[1], other[1])
+
+
+def described(tree: Tree, nodes: list[dict], boxes: list[Box]) -> tuple[dict, Box]:
+    """A node of the file for a part of the tree, and its box."""
+    if isinstance(tree, int):
+        return bound(boxes[tree]) | nodes[tree], boxes[tree]
+    parts = [described(half, nodes, boxes) for half in tree]
+    box = around(parts[0][1], parts[1][1])
+    return bound(box) | {"children": [part for part, _ in parts]}, box
+
+
+def bound(box: Box) -> dict:
+    low, high = (np.round(end, DIGITS).tolist() for end in box)
+    return {"bound": {"min": low, "max": high}}

@@ -1,0 +1,63 @@
+"""lod: a folder that this program and others open, refusals in one sentence, nothing lost."""
+
+import json
+
+import pytest
+
+from shapeshift.app import cli
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from tests.support.models import random_package
+from tests.support.splats.ply_files import some_splats
+
+
+@pytest.fixture
+def scene(tmp_path):
+    write_ply(some_splats(400, 4, opacities=(0.3, 0.9)), tmp_path / "a.ply")
+    return tmp_path / "a.ply"
+
+
+def test_a_folder_is_written_and_read_at_any_budget(scene, tmp_path, capsys):
+    assert cli.main(["lod", str(scene), "--out", str(tmp_path / "b"), "--leaf", "100"]) == 0
+    said = capsys.readouterr().err
+    assert "4 leaves, 2 levels of 400, 200" in said
+    assert read_model(tmp_path / "b").splat_count == 400
+    counts = read_model(tmp_path / "b").provenance["level_splats"]
+    for count in counts:
+        assert read_model(tmp_path / "b", Reading(most_splats=count)).splat_count == count
+    assert cli.main(["info", str(tmp_path / "b"), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["levels"] and facts["sh_degree"] == 1
+    flat = ["lod", str(scene), "--out", str(tmp_path / "c"), "--sh-degree", "0"]
+    assert cli.main(flat) == 0 and read_model(tmp_path / "c").sh.shape == (400, 1, 3)
+
+
+def test_a_package_is_written_as_it_is_at_x(tmp_path):
+    package = random_package(tmp_path, 40)
+    for x in ("0", "1"):
+        words = ["lod", str(package), "--x", x, "--out", str(tmp_path / f"at{x}")]
+        assert cli.main(words) == 0
+    one, other = (read_model(tmp_path / f"at{x}") for x in "01")
+    assert one.splat_count != other.splat_count or (one.means != other.means).any()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--out", "b.sog"], "is no folder's name"),
+        (["--out", "b", "--leaf", "63"], "--leaf is 63, expected 64 to 524288"),
+        (["--out", "b", "--sh-degree", "4"], "--sh-degree is 4, expected 0 to 3"),
+        (["--out", "b", "--x", "nowhere"], "is no x of this scene"),
+        (["--out", "there"], "--overwrite replaces it"),
+    ],
+)
+def test_refusals_are_one_sentence(scene, tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "own.txt").write_text("kept")
+    assert cli.main(["lod", str(scene), *words]) == 2
+    text = capsys.readouterr().err
+    assert said in text and "Traceback" not in text
+    assert (tmp_path / "there" / "own.txt").read_text() == "kept"
+    assert not (tmp_path / "b").exists()
