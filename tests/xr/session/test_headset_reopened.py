@@ -54,7 +54,8 @@ def test_a_runtime_that_comes_back_finds_all_as_it_was(served, start):
     states = report["states"]
     assert report["reopened"] == 1 and states.count("FOCUSED") >= 2
     assert states[: states.index("LOST")][-1] == "FOCUSED"
-    assert report["frames"] == len(program.lines)
+    # Ctrl-C may come between a frame and its line.
+    assert report["frames"] - len(program.lines) in (0, 1)
     seen = [line["seen_s"] for line in program.lines]
     assert seen == sorted(seen)
     told = program.told()
