@@ -14,7 +14,7 @@ ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):(\d{1,5}
 
 
 @dataclass(frozen=True)
-class Place:
+class ClusterPlace:
     """Where tasks run."""
 
     kind: str  # none | local | scheduler | slurm
@@ -33,21 +33,21 @@ class Address:
     port: int
 
 
-def read_place(text: str) -> Place:
+def read_place(text: str) -> ClusterPlace:
     """What --cluster says.  Raises UsageError."""
     kind, colon, rest = text.partition(":")
     if text == "none":
-        return Place("none")
+        return ClusterPlace("none")
     if kind == "local":
         if colon and not (rest.isascii() and rest.isdigit() and 1 <= int(rest) <= MOST_LOCAL):
             raise UsageError(f"--cluster is '{text}', expected local:1 to local:{MOST_LOCAL}.")
-        return Place("local", int(rest) if colon else USUAL_LOCAL)
+        return ClusterPlace("local", int(rest) if colon else USUAL_LOCAL)
     if kind == "slurm" and rest:
         from shapeshift.app.paths import plain
 
-        return Place("slurm", file=plain(rest))
+        return ClusterPlace("slurm", file=plain(rest))
     if kind in ("tcp", "tls"):
-        return Place("scheduler", address=read_address(text, "--cluster").text)
+        return ClusterPlace("scheduler", address=read_address(text, "--cluster").text)
     raise UsageError(f"--cluster is '{text}', expected {FORMS}.")
 
 

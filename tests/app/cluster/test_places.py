@@ -9,17 +9,17 @@ import pytest
 from shapeshift.app.cluster.certificates import read_certificates, require_dask, write_certificates
 from shapeshift.app.cluster.command import Options, run
 from shapeshift.app.cluster.open_cluster import open_cluster
-from shapeshift.app.cluster.place import Place, is_loopback, read_address, read_place
+from shapeshift.app.cluster.place import ClusterPlace, is_loopback, read_address, read_place
 from shapeshift.app.cluster.slurm import job_options, read_jobs, slurm_cluster
 from shapeshift.app.errors import UsageError
 
 
 @pytest.mark.parametrize(("text", "place"), [
-    ("none", Place("none")), ("local", Place("local", 2)), ("local:1", Place("local", 1)),
-    ("local:256", Place("local", 256)), ("slurm:/a/b.toml", Place("slurm", file=Path("/a/b.toml"))),
-    ("tcp://127.0.0.1:1", Place("scheduler", address="tcp://127.0.0.1:1")),
-    ("tcp://[::1]:8786", Place("scheduler", address="tcp://[::1]:8786")),
-    ("tls://big.example:65535", Place("scheduler", address="tls://big.example:65535")),
+    ("none", ClusterPlace("none")), ("local", ClusterPlace("local", 2)), ("local:1", ClusterPlace("local", 1)),
+    ("local:256", ClusterPlace("local", 256)), ("slurm:/a/b.toml", ClusterPlace("slurm", file=Path("/a/b.toml"))),
+    ("tcp://127.0.0.1:1", ClusterPlace("scheduler", address="tcp://127.0.0.1:1")),
+    ("tcp://[::1]:8786", ClusterPlace("scheduler", address="tcp://[::1]:8786")),
+    ("tls://big.example:65535", ClusterPlace("scheduler", address="tls://big.example:65535")),
 ])  # fmt: skip
 def test_places_are_read(text, place):
     assert read_place(text) == place
