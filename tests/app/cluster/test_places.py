@@ -15,8 +15,10 @@ from shapeshift.app.errors import UsageError
 
 
 @pytest.mark.parametrize(("text", "place"), [
-    ("none", ClusterPlace("none")), ("local", ClusterPlace("local", 2)), ("local:1", ClusterPlace("local", 1)),
-    ("local:256", ClusterPlace("local", 256)), ("slurm:/a/b.toml", ClusterPlace("slurm", file=Path("/a/b.toml"))),
+    ("none", ClusterPlace("none")), ("local", ClusterPlace("local", 2)),
+    ("local:1", ClusterPlace("local", 1)),
+    ("local:256", ClusterPlace("local", 256)),
+    ("slurm:/a/b.toml", ClusterPlace("slurm", file=Path("/a/b.toml"))),
     ("tcp://127.0.0.1:1", ClusterPlace("scheduler", address="tcp://127.0.0.1:1")),
     ("tcp://[::1]:8786", ClusterPlace("scheduler", address="tcp://[::1]:8786")),
     ("tls://big.example:65535", ClusterPlace("scheduler", address="tls://big.example:65535")),
