@@ -34,7 +34,7 @@ class DaskCluster:
     """Runs tasks on the workers of a scheduler."""
 
     def __init__(self, client: "Client") -> None:
-        self._client = client
+        self.client = client
 
     def run(self, tasks: Sequence[Task]) -> None:
         """As Cluster.run."""
@@ -55,7 +55,7 @@ class DaskCluster:
 
     def _submit(self, task: Task, key: str, topic: str) -> "Future":
         # pure: Dask would give the result of an earlier run without looking at the files
-        return self._client.submit(
+        return self.client.submit(
             run_on_worker, asdict(task), key, topic, pure=False, resources=dict(task.slots) or None
         )
 
@@ -64,7 +64,7 @@ class DaskCluster:
     ) -> None:
         from distributed import as_completed
 
-        with self._client.as_current():
+        with self.client.as_current():
             ended = as_completed(list(futures), raise_errors=False)
         for future in ended:
             task = futures[future]
@@ -84,15 +84,15 @@ class DaskCluster:
         def handle(event: tuple[float, Any]) -> None:
             shown.hear(*event[1])
 
-        self._client.subscribe_topic(topic, handle)
+        self.client.subscribe_topic(topic, handle)
         try:
             yield topic
         finally:
-            self._client.unsubscribe_topic(topic)
+            self.client.unsubscribe_topic(topic)
 
     def _stop(self, futures: "list[Future]", tasks: Sequence[Task]) -> None:
         """Takes all back, and waits until the attempts have saved what they have."""
-        self._client.cancel(futures)
+        self.client.cancel(futures)
         until = time.monotonic() + 1.5 * GRACE_S
         for task in tasks:
             while task.begun_note.exists() and time.monotonic() < until:
@@ -103,7 +103,7 @@ class DaskCluster:
 
     def _check_slots(self, tasks: Sequence[Task]) -> None:
         """Raises UsageError where a task wants what no worker has."""
-        workers = self._client.scheduler_info(n_workers=-1)["workers"].values()
+        workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
         for task in tasks:
             for slot, count in task.slots.items():
                 if workers and all(w["resources"].get(slot, 0) < count for w in workers):

@@ -160,7 +160,7 @@ def test_nobody_else_of_this_machine_gets_in(two):
     from distributed import Client
     from distributed.security import Security
 
-    address = two._client.scheduler.address
+    address = two.client.scheduler.address
     assert address.startswith("tls://127.0.0.1:")
     for security in (None, Security.temporary()):
         reach = address if security else address.replace("tls", "tcp")
