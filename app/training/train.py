@@ -2,6 +2,7 @@
 
 import shlex
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,9 +35,10 @@ def run(options: Options) -> int:
     from shapeshift.app.training.saving import (
         check_writable,
         memory_for_training,
+        photos_path,
         save,
         save_checkpoint,
-        saved_when_memory_ends,
+        saved_when_it_fails,
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
@@ -47,13 +49,15 @@ def run(options: Options) -> int:
         report,
     )
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
     check_calibrate(options)
+    room = PhotoRoom(photo_bytes(options), photos_path(options.out))
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
-        return run_baseline(options)
+        return run_baseline(options, replace(room, folder=None))
     check_plain_options(options)
     check_writable(options.out)  # now, not after the training
     refuse_foreign(options.out)
@@ -67,11 +71,11 @@ def run(options: Options) -> int:
         settings = calibrated(device, capture, settings, options.calibrate)
     with memory_for_training(), working(READING) as shown:
         given = with_extrinsics(capture, settings.rig)
-        trainer = Trainer(device, given, settings, resume, report=shown)
+        trainer = Trainer(device, given, settings, resume, report=shown, room=room)
     say(describe(trainer), *trainer.warnings)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     began, before = time.monotonic(), trainer.iteration
-    with saved_when_memory_ends(trainer, options.out, checkpoint):
+    with saved_when_it_fails(trainer, options.out, checkpoint):
         interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
     step_s = (time.monotonic() - began) / max(trainer.iteration - before, 1)
     save(trainer, options.out, checkpoint)
@@ -85,7 +89,19 @@ def run(options: Options) -> int:
         say(*found)
     for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
+    trainer.photos.close(keep=interrupted)
     return INTERRUPTED if interrupted else 0
+
+
+def photo_bytes(options: Options) -> int | None:
+    """Bytes of memory that --photo-mb gives photos.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+
+    if options.photo_mb is None:
+        return None
+    if not 0 < options.photo_mb < float("inf"):
+        raise UsageError(f"--photo-mb is {options.photo_mb}, expected MB above 0.")
+    return int(options.photo_mb * 1e6)
 
 
 def check_calibrate(options: Options) -> None:

@@ -74,13 +74,18 @@ def train(
         model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
-    from shapeshift.app.training.saving import check_writable, memory_for_training
+    from shapeshift.app.training.saving import (
+        check_writable,
+        memory_for_training,
+        photos_path,
+    )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
     from shapeshift.training.calibration.extrinsics import rig_json, with_extrinsics
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
     path = None if out is None else plain(str(out))
@@ -99,7 +104,8 @@ def train(
         offset = calibrate_cameras(on, found, wished, calibrate, report=lambda what, part: None)
         wished = replace(wished, rig=rig_json(calibrate, offset))
     with memory_for_training():
-        trainer = Trainer(on, with_extrinsics(found, wished.rig), wished, before)
+        room = PhotoRoom(folder=photos_path(path) if path is not None else None)
+        trainer = Trainer(on, with_extrinsics(found, wished.rig), wished, before, room=room)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
     run(trainer, path, progress)
@@ -140,7 +146,7 @@ def run(
     from shapeshift.training.checkpoint import checkpoint_path
 
     saved = time.monotonic()
-    ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, *memory_errors())
+    ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, BadFile, *memory_errors())
     try:
         for now in trainer.steps():
             if progress is not None and progress(now) is False and trainer.settled:
@@ -151,6 +157,7 @@ def run(
     except ends:
         if path is not None and trainer.iteration:
             save(trainer, path, checkpoint_path(path))
+        trainer.photos.close(keep=path is not None)
         raise
 
 
@@ -169,7 +176,9 @@ def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
         model = replace(model, pace=measure_pace(model))
         if path is not None:
             write_package(model, path)
-    return TrainedScene(model, path, trainer)
+    scene = TrainedScene(model, path, trainer)
+    trainer.photos.close()
+    return scene
 
 
 def update(
