@@ -60,7 +60,7 @@ def made(source: Path, folder: Path, count: int) -> Path:
             "file_path": file.name, "transform_matrix": pose.tolist(), "fl_x": fx * x,
             "fl_y": fy * y, "cx": cx * x, "cy": cy * y, "w": SIZE[0], "h": SIZE[1],
         })  # fmt: skip
-    np.savez(folder / "points.npz", points=capture.points)
+    np.savez(folder / "points.npz", xyz=capture.points)
     about = {"frames": frames, "up": [0, 1, 0], "points": "points.npz"}
     (folder / "transforms.json").write_text(json.dumps(about))
     return folder
@@ -94,7 +94,7 @@ def measure(folder: Path, megabytes: int) -> dict:
     if store is not None:
         row["read"] = store.sources
         row["read_ms"] = f"{1e3 * store.read_s / max(store.sources, 1):.1f}"
-        row["disk_mb"] = f"{store.files.bytes / 1e6:.0f}"
+        row["disk_mb"] = f"{store.files.size / 1e6:.0f}"
     trainer.photos.close()
     return row
 

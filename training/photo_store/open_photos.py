@@ -70,7 +70,7 @@ class TrainingPhotos:
         width, height = (*self.train, *self.test)[0].view.size
         return [
             f"{len(store.photos):,} photos of {width}x{height} pixels take "
-            f"{amount(store.files.bytes)}, in memory they may take {amount(store.most)}: they are "
+            f"{amount(store.files.size)}, in memory they may take {amount(store.most)}: they are "
             f"read as they are needed and kept in {folder} until the run is done; --memory GB or "
             "--photo-mb MB allows more."
         ]

@@ -14,8 +14,8 @@ import struct
 import threading
 import weakref
 import zlib
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 import PIL
@@ -58,7 +58,7 @@ class PhotoFiles:
             raise
 
     @property
-    def bytes(self) -> int:
+    def size(self) -> int:
         """What the pixels of all photos take."""
         return int(self.starts[-1])
 
@@ -66,7 +66,7 @@ class PhotoFiles:
         """Raises BadFile where the photos do not fit beside what else is there."""
         have = getattr(os.fstat(self.pixels.fileno()), "st_blocks", 0) * 512
         free = shutil.disk_usage(self.folder).free
-        if (needed := self.bytes - have) > free:
+        if (needed := self.size - have) > free:
             raise BadFile(
                 f"{self.folder.parent}: the photos do not fit into memory, and on disk they need "
                 f"{amount(needed)} where {amount(free)} are free; make room, or give a larger "
@@ -87,15 +87,14 @@ class PhotoFiles:
                     return None
                 self.known[number] = found[0], found[1]
             checksum, flags = self.known[number]
-            data = np.empty(size, np.uint8)
             self.pixels.seek(self.starts[number])
-            count = self.pixels.readinto(memoryview(data))
-        if count != size or zlib.crc32(data) != checksum:
+            data = self.pixels.read(size) or b""
+        if len(data) != size or zlib.crc32(data) != checksum:
             with self.lock:
                 self.known.pop(number, None)
             return None
         width, height = view.divided(self.reader.factor).size
-        parts = list(np.split(data, [4 * width * height, 8 * width * height]))
+        parts = np.split(np.frombuffer(data, np.uint8), [4 * width * height, 8 * width * height])
         rgba = parts[0].reshape(height, width, 4)
         floats = [part.view(np.float32).reshape(height, width) for part in parts[1:] if len(part)]
         weight = floats.pop(0) if flags & WEIGHTED else None
@@ -142,7 +141,7 @@ class PhotoFiles:
             remove_named(self.folder)
 
 
-def open_folder(place: Path | None) -> tuple[Path, bool, BinaryIO, int | None]:
+def open_folder(place: Path | None) -> tuple[Path, bool, FileIO, int | None]:
     """(folder, whether it goes with this run, its index, handle of its lock).  Raises BadFile."""
     try:
         if place is not None and (index := open_named(place)) is not None:
@@ -156,7 +155,7 @@ def open_folder(place: Path | None) -> tuple[Path, bool, BinaryIO, int | None]:
         raise BadFile(f"{where}: photos cannot be kept there ({error.strerror}).") from None
 
 
-def open_named(place: Path) -> BinaryIO | None:
+def open_named(place: Path) -> FileIO | None:
     """The index of a folder that a later run may find; None where another run has it now."""
     place.parent.mkdir(parents=True, exist_ok=True)
     if place.is_symlink() or (place.exists() and not (place.is_dir() and is_ours(place))):
@@ -186,13 +185,13 @@ def is_ours(folder: Path) -> bool:
         return (file.read(len(MAGIC)) or MAGIC) == MAGIC
 
 
-def open_ours(path: Path) -> BinaryIO:
+def open_ours(path: Path) -> FileIO:
     """A file to read and write, made where it is absent; never through a link."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-    return open(os.open(path, flags, 0o666), "r+b", buffering=0)  # type: ignore[return-value]
+    return FileIO(os.open(path, flags, 0o666), "r+b")
 
 
-def alone(file: BinaryIO) -> bool:
+def alone(file: FileIO) -> bool:
     """Whether no other run has the file; it is ours until it is closed."""
     if LOCKS:
         return lock(file.fileno())
@@ -208,7 +207,7 @@ def alone(file: BinaryIO) -> bool:
     return True
 
 
-def write_at(file: BinaryIO, start: int, data: bytes) -> None:
+def write_at(file: FileIO, start: int, data: bytes) -> None:
     """All of the data.  Raises OSError where the disk is full."""
     file.seek(start)
     left = memoryview(data)
@@ -216,7 +215,7 @@ def write_at(file: BinaryIO, start: int, data: bytes) -> None:
         left = left[file.write(left) :]
 
 
-def end(folder: Path, own: bool, index: BinaryIO, pixels: BinaryIO, handle: int | None) -> None:
+def end(folder: Path, own: bool, index: FileIO, pixels: FileIO, handle: int | None) -> None:
     """Closes the files; a folder that goes with this run is removed."""
     index.close()
     pixels.close()

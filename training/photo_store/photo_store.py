@@ -128,15 +128,15 @@ class StoredPhoto(LoadedPhoto):
         self.__dict__.update(about)
 
     @property
-    def rgba(self) -> np.ndarray:  # type: ignore[override]
+    def rgba(self) -> np.ndarray:
         return self.store.get(self.number).rgba
 
     @property
-    def weight(self) -> np.ndarray | None:  # type: ignore[override]
+    def weight(self) -> np.ndarray | None:
         return self.store.get(self.number).weight
 
     @property
-    def depth(self) -> np.ndarray | None:  # type: ignore[override]
+    def depth(self) -> np.ndarray | None:
         return self.store.get(self.number).depth if self.has_depth else None
 
     @property

@@ -59,13 +59,13 @@ class Targets:
 
     def depth_term(self, photo: LoadedPhoto, share: float) -> DepthTerm | None:
         """What is to be learned from the photo's depth; None where it has none or share is 0."""
-        if not (photo.has_depth and share > 0):
+        if not (share > 0 and photo.has_depth) or (depth := photo.depth) is None:
             return None
         size, key = photo.view.size, (photo.modality, photo.name, photo.view.size)
         if size not in self.depth_losses:
             self.depth_losses[size] = DepthLoss(self.device, size)
         loss = self.depth_losses[size]
-        target = self.kept_depths.get(key) or loss.target(photo.depth)
+        target = self.kept_depths.get(key) or loss.target(depth)
         if key not in self.kept_depths and self.bytes + target.bytes <= self.most:
             self.kept_depths[key] = target
             self.bytes += target.bytes
