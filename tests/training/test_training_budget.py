@@ -67,7 +67,7 @@ def test_a_processor_s_seconds_are_those_that_it_computed():
 
 
 def test_reading_photos_costs_none_of_the_budget():
-    """Not by who reads: a step, or a thread beside it, which processor time counts with the step."""
+    """Be it a step that reads or a thread beside it, which processor time counts with the step."""
     store = SimpleNamespace(read_s=0.0, waited_s=0.0, ahead=0, trouble="")
     steps = Steps("cpu", lambda: read(store))
     steps.photos = TrainingPhotos([], [], store)
