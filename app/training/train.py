@@ -23,6 +23,7 @@ from shapeshift.app.training.run_loop import (
 from shapeshift.app.training.train_options import Options, settings_of
 
 if TYPE_CHECKING:
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
 USUAL_STEPS = 2000  # those of TrainSettings
@@ -35,7 +36,6 @@ def run(options: Options) -> int:
     from shapeshift.app.training.saving import (
         check_writable,
         memory_for_training,
-        photos_path,
         save,
         save_checkpoint,
         saved_when_it_fails,
@@ -49,11 +49,10 @@ def run(options: Options) -> int:
         report,
     )
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
-    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
     check_calibrate(options)
-    room = PhotoRoom(photo_bytes(options), photos_path(options.out))
+    room = room_of(options)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
@@ -93,15 +92,17 @@ def run(options: Options) -> int:
     return INTERRUPTED if interrupted else 0
 
 
-def photo_bytes(options: Options) -> int | None:
-    """Bytes of memory that --photo-mb gives photos.  Raises UsageError."""
+def room_of(options: Options) -> "PhotoRoom":
+    """Where the photos may lie.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.saving import photos_path
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
 
-    if options.photo_mb is None:
-        return None
-    if not 0 < options.photo_mb < float("inf"):
-        raise UsageError(f"--photo-mb is {options.photo_mb}, expected MB above 0.")
-    return int(options.photo_mb * 1e6)
+    megabytes = options.photo_mb
+    if megabytes is not None and not 0 < megabytes < float("inf"):
+        raise UsageError(f"--photo-mb is {megabytes}, expected MB above 0.")
+    most = None if megabytes is None else int(megabytes * 1e6)
+    return PhotoRoom(most, photos_path(options.out))
 
 
 def check_calibrate(options: Options) -> None:
