@@ -16,8 +16,8 @@ from shapeshift.app.paths import plain
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
-    from shapeshift.scene.captures.capture import Capture
     from shapeshift.decomposition.poses.pose_report import PoseReport
+    from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.run import Progress
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
