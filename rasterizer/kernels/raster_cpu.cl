@@ -190,12 +190,14 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
     grad_z[k] = LOAD_PIXELS(0, z);
 #endif
   }
+  // Only as far as the forward pass went: behind it nothing was drawn.
   float splats[BATCH * RECORD];
   const int end = tile_end[tile], last_intersection = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end; p += BATCH) {
     const int n = min(BATCH, end - p);
     const int ahead = min(BATCH, end - p - n);
     for (int j = 0; j < ahead; j++) {  // of the next batch: the work on this one hides the misses
+      // A record lies in one or two cache lines.
       const int splat = intersections[p + n + j];
       PREFETCH(record + (size_t)RECORD * splat);
       PREFETCH(record + (size_t)RECORD * splat + RECORD - 1);
@@ -211,6 +213,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
     for (int j = 0; j < n; j++) {
       const float* s = splats + RECORD * j;
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
+      // As in the forward pass, to the bit: the same exponents, so the same decisions.
       const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
       const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[POWER_THRESHOLD];
@@ -274,11 +277,11 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
         const floatp g = select(alpha * grad_alpha, (floatp)(0), raw > MAX_ALPHA);
         // d ln alpha / d mean = Q d with Q the conic, d ln alpha / d Q = -d d^T / 2: what is summed
         // is g d and g d d^T, and Q and the factors follow after the sum.
-        const floatp gx = g * dx, gy = g * dy;
+        const floatp gx = g * dx, gy = g * dy;  // first moments
         sum_p += g;
         sum_x += gx;
         sum_y += gy;
-        sum_xx = fma(gx, dx, sum_xx);
+        sum_xx = fma(gx, dx, sum_xx);  // second moments
         sum_xy = fma(gx, dy, sum_xy);
         sum_yy = fma(gy, dy, sum_yy);
 #ifdef ABSOLUTE
@@ -290,12 +293,13 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
         extra_x = fma(w, pixel_error[k], extra_x);
 #endif
 #ifdef WEIGHT
-        sum_w += w;
+        sum_w += w;  // in pixels
 #endif
       }
       // Nobody else writes to this slot, so the sums need no atomics.
       __global float* out = slots + (size_t)RECORD * slot[j];
-      // Then the factors that all pixels share.
+      // Then the factors that all pixels share: the conic turns sums of g d into the gradient of
+      // the mean, and dalpha / dopacity = alpha / opacity.
       const float16 one = sums12(sum_x, sum_y, sum_xx, sum_xy, sum_yy, sum_p, sum_r, sum_g, sum_b,
                                  extra_x, extra_y, sum_w);
       vstore8((float8)(A * one.s0 + B * one.s1, B * one.s0 + C * one.s1, -0.5f * one.s2, -one.s3,
@@ -304,6 +308,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
       vstore4(one.s89ab, 0, out + 8);
 #ifdef SURFACE
       // The mean on the screen moves u and v the other way.
+      // Sums of what d Z is by the eight numbers of the fraction, and by l, x and y of the mean.
       const float16 by = sums12(by_z, by_u, by_v, by_uu, by_uv, by_vv, by_low, by_high, by_l, by_x,
                                 by_y, by_y);
       out[MEAN_X] -= f.s1 * by.s8 + 2 * (f.s3 * by.s9 + f.s4 * by.sa);

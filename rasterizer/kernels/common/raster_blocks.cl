@@ -22,6 +22,7 @@
 
 // One number of each pixel of a block.  LANE_X and LANE_Y: pixel centres, from its corner.
 #if PIXELS == 16
+// Four rows of four: where vectors have sixteen lanes, a splat touches half as many blocks.
 #define SHIFT_H 2  // log2 of BLOCK_H
 typedef float16 floatp;
 typedef int16 intp;
@@ -35,6 +36,7 @@ typedef int16 intp;
                          2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
 inline float largest(floatp a) { return max8(fmax(a.lo, a.hi)); }
 #else
+// Two rows of four.  As halves of wider vectors, sixteen would take all registers twice.
 #define SHIFT_H 1
 typedef float8 floatp;
 typedef int8 intp;
@@ -69,10 +71,12 @@ inline floatp exp2p(floatp x) {
 // Sums over the pixels of twelve numbers, (a, b, ..., l) and four more that mean nothing, as one
 // tree: each step adds the halves, quarters ... of several of them at a time.
 #if PIXELS == 16
+// (a, b) with eight lanes each that are left of sixteen.
 inline float16 add_halves(float16 a, float16 b) {
   return (float16)(a.lo, b.lo) + (float16)(a.hi, b.hi);
 }
 
+// (a, b, c, d) with four lanes each.
 inline float16 sums_of_four(float16 a, float16 b, float16 c, float16 d) {
   const float16 ab = add_halves(a, b), cd = add_halves(c, d);
   return (float16)(ab.s0123, ab.s89ab, cd.s0123, cd.s89ab) +
@@ -83,11 +87,13 @@ inline float16 sums12(float16 a, float16 b, float16 c, float16 d, float16 e, flo
                       float16 h, float16 i, float16 j, float16 k, float16 l) {
   const float16 one = sums_of_four(a, b, c, d), two = sums_of_four(e, f, g, h);
   const float16 three = sums_of_four(i, j, k, l);
+  // Neighbours twice: two lanes each, then the sums.
   const float16 first = (float16)(one.even, two.even) + (float16)(one.odd, two.odd);
   const float8 last = three.even + three.odd;
   return (float16)(first.even + first.odd, last.even + last.odd, (float4)(0));
 }
 #else
+// The first eight as one tree (vector.cl), four by themselves.
 inline float16 sums12(float8 a, float8 b, float8 c, float8 d, float8 e, float8 f, float8 g,
                       float8 h, float8 i, float8 j, float8 k, float8 l) {
   return (float16)(sums8(a, b, c, d, e, f, g, h), sum8(i), sum8(j), sum8(k), sum8(l), (float4)(0));
@@ -183,6 +189,7 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* intersectio
   return n;
 }
 
+// The transmittance at the start.
 // 1 on the pixels of block k that lie in the image: those outside need nothing and stop nothing.
 inline floatp inside(int k, int x0, int y0, int width, int height) {
   const floatp x = LANE_X + (float)(x0 + k / DOWN * BLOCK_W);
