@@ -41,6 +41,7 @@ class Device:
     units: int  # compute units: how many work-groups run at once
     pool: Any = field(repr=False)  # pyopencl.tools.MemoryPool or what stands in
     programs: dict = field(default_factory=dict, repr=False)
+    lanes: int = 8  # floats of the widest vectors that it computes with
     most_bytes: int = 0  # of one array, as the driver says; 0: it says nothing
 
     def empty(self, shape, dtype=np.float32) -> "Array":
@@ -195,6 +196,7 @@ def _opened(device: "cl.Device") -> Device:
         _kind(device),
         device.max_compute_units,
         MemoryPool(ImmediateAllocator(queue)),
+        lanes=device.native_vector_width_float,
         most_bytes=device.max_mem_alloc_size,
     )
 
