@@ -34,7 +34,7 @@ MOST_BYTES = 1 << 16
 
 
 @dataclass(frozen=True)
-class Part:
+class TablePart:
     """One model of a comparison."""
 
     method: str  # joint | separate | splats
@@ -64,23 +64,23 @@ class Part:
         return TrainedFile(self.file, float(facts.get("seconds", 0.0)), int(facts.get("steps", 0)))
 
 
-def parts_of(capture: "Capture", out: Path, methods: Sequence[str]) -> list[Part]:
+def parts_of(capture: "Capture", out: Path, methods: Sequence[str]) -> list[TablePart]:
     """All models of some methods."""
     from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name
 
     notes, parts = out / NOTES, []
     for method in methods:
         if method == "joint":
-            parts.append(Part("joint", "", out / "joint.shift", notes))
+            parts.append(TablePart("joint", "", out / "joint.shift", notes))
             continue
         ending = ".ply" if method == "splats" else ".shift"
         for number, stop in enumerate(capture.stops):
             file = out / method / layer_name(number, stop, ending)
-            parts.append(Part(method, stop.name, file, notes))
+            parts.append(TablePart(method, stop.name, file, notes))
     return parts
 
 
-def chosen_part(capture: "Capture", options: "Options") -> Part:
+def chosen_part(capture: "Capture", options: "Options") -> TablePart:
     """The one that --only names.  Raises UsageError."""
     parts = parts_of(capture, options.out, ("joint", "separate", "splats"))
     for part in parts:
@@ -90,7 +90,7 @@ def chosen_part(capture: "Capture", options: "Options") -> Part:
     raise UsageError(f"--only is '{options.only}', expected one of {known}.")
 
 
-def train_part(part: Part, device, capture: "Capture", asked: TrainOptions, rig: str,
+def train_part(part: TablePart, device, capture: "Capture", asked: TrainOptions, rig: str,
                resume: bool) -> bool:  # fmt: skip
     """Its model and facts on disk, the bytes that the whole comparison makes; False after Ctrl-C.
 
@@ -110,7 +110,9 @@ def train_part(part: Part, device, capture: "Capture", asked: TrainOptions, rig:
     return True
 
 
-def train_splats_part(part: Part, device, capture: "Capture", asked: TrainOptions) -> dict | None:
+def train_splats_part(
+    part: TablePart, device, capture: "Capture", asked: TrainOptions
+) -> dict | None:
     from shapeshift.runtime_models.splats.ply.write_ply import write_ply
     from shapeshift.training.baselines.plain import PlainTrainer, one_modality
 
@@ -126,7 +128,7 @@ def train_splats_part(part: Part, device, capture: "Capture", asked: TrainOption
 
 
 def train_anchors_part(
-    part: Part, device, capture: "Capture", asked: TrainOptions, rig: str, resume: bool
+    part: TablePart, device, capture: "Capture", asked: TrainOptions, rig: str, resume: bool
 ) -> dict | None:
     from shapeshift.app.training.saving import save_checkpoint
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
@@ -180,7 +182,7 @@ def train_by_cluster(
     return runs
 
 
-def task_of(part: Part, options: "Options") -> Task:
+def task_of(part: TablePart, options: "Options") -> Task:
     """`table --only` of it."""
     words = replace(
         options, only=part.name, cluster=NONE, certificates=None, gpus=0,
