@@ -1,8 +1,11 @@
-"""Frames of a film as tasks of a cluster: runs of them, drawn by `film --only` into one folder."""
+"""Frames of a film as tasks of a cluster: runs of them, drawn by `film --only` into one folder.
+
+`options` are those of film.py, which imports this.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.cluster.open_cluster import NONE, open_cluster
 from shapeshift.app.cluster.task import Task, forget
@@ -10,7 +13,6 @@ from shapeshift.app.cluster.words import absolute, words_for
 from shapeshift.app.paths import full
 
 if TYPE_CHECKING:
-    from shapeshift.app.film.film import Options
     from shapeshift.app.film.film_plan import FilmPlan
     from shapeshift.app.film.frame_folder import FrameFolder
 
@@ -18,7 +20,7 @@ RUN = 50  # frames of a task: opening the scene and compiling kernels then cost 
 
 
 def draw_by_cluster(
-    options: "Options", plan: "FilmPlan", folder: "FrameFolder", numbers: Sequence[int]
+    options: Any, plan: "FilmPlan", folder: "FrameFolder", numbers: Sequence[int]
 ) -> None:
     """The frames that are not there, by the workers of --cluster."""
     tasks = frame_tasks(options, plan, folder, numbers)
@@ -28,7 +30,7 @@ def draw_by_cluster(
 
 
 def frame_tasks(
-    options: "Options", plan: "FilmPlan", folder: "FrameFolder", numbers: Sequence[int]
+    options: Any, plan: "FilmPlan", folder: "FrameFolder", numbers: Sequence[int]
 ) -> list[Task]:
     """A task for each run of frames, of those that lack any."""
     from shapeshift.app.film.film_plan import is_named

@@ -1,11 +1,14 @@
-"""The models of a comparison one by one: what `table --only` trains, and tasks of it."""
+"""The models of a comparison one by one: what `table --only` trains, and tasks of it.
+
+`options` are those of table.py, which imports this.
+"""
 
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.cluster.open_cluster import NONE, open_cluster
 from shapeshift.app.cluster.task import Task
@@ -26,7 +29,6 @@ from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.app.training.train_options import settings_of
 
 if TYPE_CHECKING:
-    from shapeshift.app.training.table import Options
     from shapeshift.scene.captures.capture import Capture
 
 NOTES = "parts"  # in --out: what is done, and checkpoints
@@ -80,7 +82,7 @@ def parts_of(capture: "Capture", out: Path, methods: Sequence[str]) -> list[Tabl
     return parts
 
 
-def chosen_part(capture: "Capture", options: "Options") -> TablePart:
+def chosen_part(capture: "Capture", options: Any) -> TablePart:
     """The one that --only names.  Raises UsageError."""
     parts = parts_of(capture, options.out, ("joint", "separate", "splats"))
     for part in parts:
@@ -156,7 +158,7 @@ def train_anchors_part(
 
 
 def train_by_cluster(
-    capture: "Capture", options: "Options", methods: Sequence[str]
+    capture: "Capture", options: Any, methods: Sequence[str]
 ) -> dict[str, dict[str, TrainedFile]]:
     """method: modality: what its training left, of all models by the workers of --cluster."""
     from shapeshift.runtime_models.splats.layers.write_layer_list import (
@@ -182,7 +184,7 @@ def train_by_cluster(
     return runs
 
 
-def task_of(part: TablePart, options: "Options") -> Task:
+def task_of(part: TablePart, options: Any) -> Task:
     """`table --only` of it."""
     words = replace(
         options, only=part.name, cluster=NONE, certificates=None, gpus=0,
