@@ -102,17 +102,18 @@ class Ruler:
         if not text or text != name_line(text) or text in (each.name for each in self.lengths):
             return False
         self.chosen = text
-        self._change(name, name=text)
+        found = self._named(name)
+        self._change(found, text, found.note)
         return True
 
     def write_note(self, name: str, text: str) -> None:
-        self._change(name, note=name_line(text.strip()) if text.strip() else "")
+        self._change(self._named(name), name, name_line(text.strip()) if text.strip() else "")
 
     def know(self, name: str, metres: float) -> bool:
         """All lengths are scaled so that this distance is what it is known to be; False: it cannot
         be, and the person has been told.
         """
-        found = next(each for each in self.lengths if each.name == name)
+        found = self._named(name)
         pairs = zip(found.points, found.covariances, strict=True)
         try:
             scale = Scale.of_known([Point(p, spread) for p, spread in pairs], metres)
@@ -148,9 +149,12 @@ class Ruler:
             return places, None
         return places, measure(self.kind, points, self.scale)
 
-    def _change(self, changed: str, **what: str) -> None:
-        lengths = (replace(each, **what) if each.name == changed else each for each in self.lengths)
-        self._keep(tuple(lengths))
+    def _change(self, changed: LengthMark, name: str, note: str) -> None:
+        new = replace(changed, name=name, note=note)
+        self._keep(tuple(new if each is changed else each for each in self.lengths))
+
+    def _named(self, name: str) -> LengthMark:
+        return next(each for each in self.lengths if each.name == name)
 
     def _keep(self, lengths: tuple[LengthMark, ...]) -> None:
         self._inspecting.edit(replace(self._inspecting.file, lengths=lengths))
