@@ -93,7 +93,12 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   const int first = c * chunk;
   const int last = packed ? first + (int)status[c].x : min(count, first + chunk);
   for (int i = first; i < last; i++) {
-    const uint2 pair = pairs[i];
+    const uint2 pair = pairs[i], soon = pairs[min(i + SOON, last - 1)];
+    const int its_place = next[(soon.y - origin) >> shift & mask_of(bins)];
+    if (final)
+      PREFETCH_TO_WRITE(sorted_splats + its_place);
+    else
+      PREFETCH_TO_WRITE(sorted_pairs + its_place);
     // The chunk's own row of the table says where the next key of this digit goes.
     const int to = next[(pair.y - origin) >> shift & mask_of(bins)]++;
     if (final)
