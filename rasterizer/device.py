@@ -1,5 +1,6 @@
 """The OpenCL device that everything here runs on: GPU before CPU, a plain word where is none."""
 
+import os
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     import pyopencl as cl
     from pyopencl.array import Array
 
+GPU = "SHAPESHIFT_GPU"  # in the environment: which GPU, where several processes share them
 INSTALL = (
     "on Debian or Ubuntu run `apt-get install pocl-opencl-icd` (fastest on a CPU), elsewhere "
     "`pip install pocl-binary-distribution`, or install the driver of your GPU"
@@ -169,7 +171,12 @@ def open_device(kind: str | None = None) -> Device:
     if not usable:
         wanted = f" of kind {kind!r}" if kind and found else ""
         raise NoDevice(f"There is no OpenCL device{wanted} on this machine: {INSTALL}.")
-    return _opened(max(usable, key=_preference))
+    usable.sort(key=_preference, reverse=True)
+    alike = [d for d in usable if _kind(d) == _kind(usable[0])]
+    number = os.environ.get(GPU, "")
+    if _kind(usable[0]) == "gpu" and number.isascii() and number.isdigit():
+        return _opened(alike[int(number) % len(alike)])
+    return _opened(usable[0])
 
 
 @cache  # PoCL keeps 8 MB of every set of programs that is built anew, even when all is released
