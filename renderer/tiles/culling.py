@@ -32,6 +32,7 @@ class Culling:
 
     def __init__(self) -> None:
         self.allowed = True  # off: what tests and tools compare with
+        self.left_out: int | None = None  # clusters of the last frame's last views; None: not asked
         self._clusters: Clusters | None = None
         self._rested = self._paused = 0
 
@@ -57,9 +58,10 @@ class Culling:
 
     def note(self, device: Device, unseen: "Array | None") -> None:
         """What a projection left out, (C,) as find_unseen.cl has it."""
+        self.left_out = None
         if unseen is not None:
-            flags = device.view(unseen)
-            if np.count_nonzero(flags) < LEAST_SHARE * len(flags):
+            self.left_out = int(np.count_nonzero(device.view(unseen)))
+            if self.left_out < LEAST_SHARE * unseen.shape[0]:
                 self._paused = PAUSE
 
     def seen_rows(

@@ -203,9 +203,7 @@ class Film:
             renderer.update(scene)
             stats = renderer.draw(views)
             images = [renderer.image(i).copy() for i in range(len(views))]
-            unseen = getattr((renderer.drawing._projected or [None])[-1], "unseen", None)
-            if unseen is not None:
-                self.left_out += int(np.count_nonzero(renderer.drawing.device.download(unseen)))
+            self.left_out += renderer.drawing.culling.left_out or 0
             told.append((stats.drawn, stats.culled, stats.sorts, images))
         renderer.drawing.culling.allowed = True
         return told
@@ -301,7 +299,7 @@ def test_boxes_wait_until_a_scene_rests(renderer):
     for number in range(culling.RESTS + 4):
         renderer.update(Scene((SceneObject("cloud", layers, x=0.05 * number),)))
         renderer.draw([view])
-        assert drawing._projected[-1].unseen is None
+        assert drawing.culling.left_out is None
     for number in range(culling.RESTS + 1):
         assert (drawing.culling.in_use(LEAST) is None) == (number < culling.RESTS)
         renderer.draw([view])
@@ -323,7 +321,7 @@ def test_where_all_is_in_view_nobody_is_asked(renderer):
     asked = []
     for _ in range(culling.RESTS + 1 + 2 * culling.PAUSE):
         renderer.draw([far])
-        asked.append(renderer.drawing._projected[-1].unseen is not None)
+        asked.append(renderer.drawing.culling.left_out is not None)
     first = culling.RESTS
     assert asked.index(True) == first and sum(asked[first : first + culling.PAUSE]) == 1
     assert asked[first + culling.PAUSE]
