@@ -41,6 +41,7 @@ class Device:
     units: int  # compute units: how many work-groups run at once
     pool: Any = field(repr=False)  # pyopencl.tools.MemoryPool or what stands in
     programs: dict = field(default_factory=dict, repr=False)
+    lanes: int = 8  # floats of the widest vectors that it computes with
     most_bytes: int = 0  # of one array, as the driver says; 0: it says nothing
 
     def empty(self, shape, dtype=np.float32) -> "Array":
@@ -60,9 +61,17 @@ class Device:
     def zeros(self, shape, dtype=np.float32) -> "Array":
         """A device array of zeros."""
         array = self.empty(shape, dtype)
-        if array.size:
-            array.fill(0)
+        self.clear(array)
         return array
+
+    def clear(self, array: "Array") -> None:
+        """Enqueue zeros into an array; its own fill() is a kernel that a first use compiles."""
+        import pyopencl as cl
+
+        if array.size:
+            data: Any = array.base_data  # a buffer: the pool has no other memory
+            where = (array.offset, array.nbytes)
+            cl.enqueue_fill_buffer(self.queue, data, np.zeros(1, np.uint8), *where)
 
     def upload(self, host: np.ndarray) -> "Array":
         """A copy of a numpy array on the device, C order."""
@@ -195,6 +204,7 @@ def _opened(device: "cl.Device") -> Device:
         _kind(device),
         device.max_compute_units,
         MemoryPool(ImmediateAllocator(queue)),
+        lanes=device.native_vector_width_float,
         most_bytes=device.max_mem_alloc_size,
     )
 

@@ -175,7 +175,7 @@ class TilesDrawing(Drawing):
         if shade.heats:
             blend_heat(self.device, rows, self._color, kept, at_once)
         elif kept is not None and slot.count:
-            kept[rows].fill(0)
+            self.device.clear(kept[rows])
 
     def seen_splats(
         self, i: int, views: Sequence[View], settings: RenderSettings
