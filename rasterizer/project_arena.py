@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.rasterizer.clusters import CLUSTER, Clusters, clusters_of, find_unseen
+from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, clusters_of, find_unseen
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import (
     CULL_REASONS,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.rasterizer.clusters import CLUSTER, Clusters, bound_clusters
+from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, bound_clusters
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project_arena import clusters_unseen
 from shapeshift.renderer.resample import scaled

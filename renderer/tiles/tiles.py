@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles, bin_tiles, sort_order
-from shapeshift.rasterizer.clusters import Clusters
+from shapeshift.rasterizer.clusters.clusters import Clusters
 from shapeshift.rasterizer.device import Device, open_device
 from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat

@@ -15,7 +15,7 @@ from shapeshift.rasterizer.device import Device
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-KERNELS = Path(__file__).parent / "kernels"
+KERNELS = Path(__file__).parents[1] / "kernels" / "clusters"
 CLUSTER = 256  # rows; common/limits.cl has it, too
 BOUNDS = 12  # floats of a cluster
 GROUP = 64  # work-items
@@ -25,7 +25,7 @@ GROUP = 64  # work-items
 class Clusters:
     """Boxes of CLUSTER rows each, in the frame of their object."""
 
-    bounds: "Array"  # (C, 12) float32: see kernels/bound_clusters.cl
+    bounds: "Array"  # (C, 12) float32: see kernels/clusters/bound_clusters.cl
     min_alpha: float  # fainter splats are in no box
 
 
@@ -50,7 +50,7 @@ def bound_clusters(
 def find_unseen(
     device: Device, clusters: Clusters, views: int, pose: int, frame, unseen: "Array", again: bool
 ) -> None:
-    """Fills unseen (C,) int32 with flags as kernels/find_unseen.cl has them.
+    """Fills unseen (C,) int32 with flags as kernels/clusters/find_unseen.cl has them.
 
     frame: that of project_arena, with so many views and floats an object.  again: what is not 0 in
     `unseen` is true of the arrays that a projection will fill.
