@@ -93,6 +93,7 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   const int first = c * chunk;
   const int last = packed ? first + (int)status[c].x : min(count, first + chunk);
   for (int i = first; i < last; i++) {
+    // Bins lie far apart: the place of a key that comes soon is asked for now.
     const uint2 pair = pairs[i], soon = pairs[min(i + SOON, last - 1)];
     const int its_place = next[(soon.y - origin) >> shift & mask_of(bins)];
     if (final)
@@ -143,6 +144,7 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
     sorted_bounds[i] = here;  // side by side for the next pass
     __global int* corner = mine + BOUNDS_ROW(here) * tiles_x + BOUNDS_COLUMN(here);
     if (here.x & MASKED) {
+      // No loop over bits, whose end nobody foresees: two rows always, four where there are more.
       count_row(corner, here.y & 0xff);
       count_row(corner + tiles_x, here.y >> 8 & 0xff);
       if (here.y >> 16) {
@@ -150,6 +152,7 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
         count_row(corner + 3 * tiles_x, here.y >> 24);
       }
     } else if (here.x & BOX) {
+      // Both walks of a box take the same operations, or a list would overflow.
       const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * splat, here);
       const int rows = here.y >> 16;
       for (int first = 0; first < rows; first += LANES) {
@@ -162,6 +165,7 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
       }
     }
   }
+  // Sums along the tiles turn beginnings and ends into counts; rows end before the next begins.
   int sum = 0;
   for (int t = 0; t < bins; t++) {
     sum += mine[t];

@@ -8,8 +8,8 @@
 // ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
 // OWN_COLORS = 1: the second view has colours of its own.
 // Reads:   frame (limits, views, poses), mean_opacity (N, 4), covariance (N, 8), color (N, 4),
-//          object_index (N,); unseen (clusters,) where there is one: CLUSTER splats that no view sees
-//          (clusters.py), of which nothing is read.
+//          object_index (N,); unseen (clusters,) where there is one: CLUSTER splats each that no
+//          view sees (clusters.py), of which nothing is read.
 // Writes:  of each view record (N, 12), depth (N,), tile_bounds (N, 2), culled (chunks, 6), status;
 //          of each order pairs (N, 2) of splat and key, and histograms of the keys' low digits.
 // Units:   metres in the object and in the camera, pixels on the screen, display sRGB.

@@ -13,7 +13,8 @@ __kernel void bound_clusters(int count, float min_alpha, __global const float* m
   const int c = get_global_id(0);
   const int first = c * CLUSTER, last = min(count, first + CLUSTER);
   if (first >= last) return;
-  float4 low = MAXFLOAT, high = -MAXFLOAT;  // w: the opacity
+  // x, y and z of the means, and the opacity, side by side.
+  float4 low = MAXFLOAT, high = -MAXFLOAT;
   float variance = 0, object = object_index[first];
   int bright = 0;
   for (int i = first; i < last; i++) {

@@ -1,8 +1,9 @@
 // find_unseen: which clusters of an arena no view sees, by their boxes alone. Said only where each
 // of their splats fails project_arena's gate "frustum", or the near plane, and passes the one
 // before: with half extents sqrt(T (u Sigma u + low pass)), u = fx / z (1, 0, -tangent), all of
-//  left of a picture:  fx x + (cx + sqrt(T low pass)) z + fx sqrt(T variance (1 + tangent^2)) < 0
-// and so on for its other sides: planes, whatever z is.
+// left of a picture:  fx x + (cx + sqrt(T low pass)) z + fx sqrt(T variance (1 + tangent^2)) < 0
+// and so on for its other sides: planes, whatever z is, so that a box needs its farthest corner
+// alone.  The root of a sum is at most the sum of the roots.
 // Reads:   frame as project_arena has it (limits, views, poses), bounds of bound_clusters.cl.
 // Writes:  unseen (clusters,): 0 where a view may see one, else from bit 1 on, one more than the
 //          splats that pass the gate "opacity"; bit 0 where it was not 0 before and `again` is 1.
@@ -29,11 +30,13 @@ inline Interval along(__global const float* row, float3 middle, float3 extent) {
 // Whether all of a box lies beyond one of two sides of a picture, `side` pixels apart.
 inline bool beside(Interval across, Interval depth, float focal, float centre, float side,
                    float blur, float aside) {
+  // What float32 may lose of each term, in the gate or here, is on the side of being seen.
   const float far_across = fabs(across.middle) + across.extent;
   const float far_along = fabs(depth.middle) + depth.extent;
   const float lost =
       ROUNDING * (focal * far_across + (fabs(centre) + side + blur) * far_along + aside);
   const float least = centre + blur, most = side - centre + blur;
+  // The farthest corner: half of the box along both axes, and how far an ellipse reaches beyond.
   const float room = focal * across.extent + aside + lost;
   const float before = focal * across.middle + least * depth.middle + fabs(least) * depth.extent;
   const float behind = most * depth.middle - focal * across.middle + fabs(most) * depth.extent;
@@ -51,7 +54,9 @@ inline bool outside(__global const float* limits, __global const float* view,
   const float square = far_x * far_x + far_y * far_y + far_z * far_z;
   // Positive, so that NaN and what is too far for a gate are no reason to leave anything out.
   if (!(square * (1 + ROUNDING) < limits[MAX_DISTANCE_2])) return false;
+  // Behind the near plane nothing is projected, and the gate "frustum" counts it.
   if (z.middle + z.extent < view[NEAR]) return true;
+  // The Jacobian's tangent is held by these (camera.cl): it stretches a splat that lies aside.
   const float tan_x = fmax(-view[MIN_TAN_X], view[MAX_TAN_X]),
               tan_y = fmax(-view[MIN_TAN_Y], view[MAX_TAN_Y]);
   // Poses are rigid; the factor is for those that are nearly so.
@@ -60,6 +65,7 @@ inline bool outside(__global const float* limits, __global const float* view,
   const float blur = reach * sqrt(limits[LOW_PASS]);
   const float per_x = view[CAMERA_FX] * sqrt(1 + tan_x * tan_x),
               per_y = view[CAMERA_FY] * sqrt(1 + tan_y * tan_y);
+  // Where rounding may make Sigma' negative the gates say "size": such a box is left to them.
   const float zoom = fmax(per_x, per_y) / fmax(z.middle - z.extent, view[NEAR]);
   if (!(LOST * variance * zoom * zoom < limits[LOW_PASS])) return false;
   const float aside = reach * sqrt(variance);
@@ -75,10 +81,11 @@ __kernel void find_unseen(int clusters, int views, int pose, int again,
   if (c >= clusters) return;
   __global const float* mine = bounds + 12 * c;
   __global const float *view = frame + LIMITS, *poses = view + views * VIEW_SIZE;
-  const int object = (int)mine[9];
+  const int object = (int)mine[9];  // -1: its box says nothing
   bool nowhere = object >= 0;
   for (int v = 0; v < views && nowhere; v++)
     nowhere = outside(frame, view + v * VIEW_SIZE, poses + pose * object + 12 * v, mine);
+  // Rows of a cluster that was left out in the frame before say so already.
   const int before = again && unseen[c] != 0;
   unseen[c] = nowhere ? ((int)mine[8] + 1) << 1 | before : 0;
 }
