@@ -132,7 +132,8 @@ def work(leg: Path, tree: Path, leaves_out: bool) -> None:
     from shapeshift.scene.scene import Scene, SceneObject
 
     model = read_model(leg)
-    case = Case(**json.loads(sys.stdin.readline()))
+    asked = json.loads(sys.stdin.readline())
+    case = Case(**{**asked, "size": tuple(asked["size"])})
     made = made_of(model, case)
     views = views_of(made, case)
     renderer, scene = Renderer(None, "tiles"), Scene((SceneObject("scene", made, x=1.0),))
