@@ -10,6 +10,7 @@ from shapeshift.runtime_models.model import AnchorModel, Model
 from shapeshift.scene.cameras.framing import frame_points
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.selectors.selector import Painted
 
 HYSTERESIS = 1.15  # times the size from which a level is drawn: larger, it is left again
 
@@ -71,16 +72,17 @@ def levels_of(model: Model) -> tuple[Model, ...]:
 
 
 def at_level(obj: SceneObject, level: int) -> SceneObject:
-    """The object as it is drawn; whole where its tint has a row for each of its anchors."""
-    if not level or not has_levels(obj.model) or tints_anchors(obj):
+    """The object as it is drawn; whole where anchors of it are marked or painted one by one."""
+    if not level or not has_levels(obj.model) or is_marked(obj):
         return obj
     return replace(obj, model=levels_of(obj.model)[level])
 
 
-def tints_anchors(obj: SceneObject) -> bool:
-    """Whether anchors are marked one by one."""
+def is_marked(obj: SceneObject) -> bool:
+    """Whether something of it has a number for each of its anchors."""
     tint = obj.tint
-    return tint is not None and (np.ndim(tint.color) > 1 or np.ndim(tint.strength) > 0)
+    tinted = tint is not None and (np.ndim(tint.color) > 1 or np.ndim(tint.strength) > 0)
+    return tinted or any(isinstance(selector, Painted) for selector in obj.selectors)
 
 
 def choose_level(model: Model, pixels: float, now: int) -> int:

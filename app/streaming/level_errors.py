@@ -17,8 +17,8 @@ TURN = 0.3  # radians: of the first
 LEAST_DB = {"stops": 40.0, "between": 36.0}  # of a level where it begins, to all there is
 MOST_CHANGE = 6.0  # of 255, in the mean of the model's pixels, as one level follows another
 COVERED = 0.02  # of a pixel, from which on it is the model's
-SMALLEST_PX = 12.0  # that is tried
-STEP = 2**0.25  # from one to the next
+STEP = 2**0.25  # from one size that is tried to the next ...
+TRIES = 8  # ... so often: down to 0.3 times the first
 MOST_DB = 200.0  # of pictures that are equal
 
 Pictures = dict[str, list[tuple[np.ndarray, np.ndarray]]]  # colours and coverage, by where x stood
@@ -83,11 +83,9 @@ class LevelMeter:
         self, level: AnchorModel, before: AnchorModel, below: float
     ) -> LevelErrors | None:
         """The errors at the largest size up to `below` where the level is good; None: at none."""
-        pixels = below
-        while pixels >= SMALLEST_PX:
-            if (found := self.errors(level, before, pixels)).good:
+        for number in range(TRIES):
+            if (found := self.errors(level, before, below / STEP**number)).good:
                 return found
-            pixels /= STEP
         return None
 
     def close(self) -> None:

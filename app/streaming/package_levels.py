@@ -23,10 +23,10 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.scene.cameras.framing import orbit_path
 from shapeshift.scene.pose import View
 
-SHARES = (0.14, 0.04)  # of the anchors, that the coarser levels have
-SIZES_PX = (150.0, 75.0)  # at which they are meant to be good, and learn to be
+SHARES = (0.25, 0.08)  # of the anchors, that the coarser levels have
+SIZES_PX = (200.0, 90.0)  # at which they are meant to be good, and learn to be
 NEARER_AND_FARTHER = (1.25, 1.0, 0.5)  # times that size, in turns
-LARGER = 2**0.5  # times that size: from there on it is tried
+LARGER = 1.26  # times that size: from there on it is tried
 APART = 1.3  # times a level's size is the one before it: beyond what hysteresis keeps apart
 SECONDS = (0.65, 0.35)  # of the time that each may learn
 VIEWS = 12  # that it learns from

@@ -71,8 +71,9 @@ def cells_of(model: AnchorModel, cell: float) -> tuple[np.ndarray, int]:
 def cell_keys(model: AnchorModel, cell: float) -> np.ndarray:
     """(A,) a number of the cell of each anchor, labels apart.  Raises ValueError."""
     places = model.anchors.astype(np.float64)
-    sides = np.append(np.floor(np.ptp(places, axis=0) / cell) + 2, MOST_LABEL + 1)
-    if not (cell > 0 and np.prod(sides) < MOST_CELLS):
+    across = np.ptp(places, axis=0) / cell if cell > 0 else np.full(3, np.inf)
+    sides = np.append(np.floor(across) + 2, MOST_LABEL + 1)
+    if not np.prod(sides) < MOST_CELLS:
         raise ValueError(f"cells of {cell} m; a longer edge is wanted for anchors so far apart.")
     keys = np.floor((places - places.min(axis=0)) / cell)
     labels = np.zeros(len(places)) if model.labels is None else model.labels

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.lod.average_anchors import frames_of
-from shapeshift.runtime_models.model import HEADS, AnchorFrames, AnchorModel
+from shapeshift.runtime_models.model import HEADS, AnchorFrames, AnchorModel, BadFile
 from shapeshift.runtime_models.rotation import normalize
 from shapeshift.scene.pose import View
 from shapeshift.training.heads.networks import HeadLayout
@@ -105,7 +105,12 @@ def distill(
     if not seconds > 0:
         return coarse, 0
     start = process_time()
-    teacher = Drawn(device, finest)
+    try:
+        teacher = Drawn(device, finest)
+    except BadFile as why:
+        raise BadFile(
+            f"coarser levels cannot learn with it, --distill 0 averages alone: {why}"
+        ) from None
     pupil = Drawn(device, replace(coarse, frames=frames_of(coarse)))
     rng = np.random.default_rng([seed, 31])
     controls = controls_of(finest, (0.25, 0.5, 0.75))
