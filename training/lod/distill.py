@@ -68,7 +68,7 @@ def controls_of(model: AnchorModel, parts: Sequence[float]) -> list[np.ndarray]:
     return found
 
 
-class Drawn:
+class StillHeads:
     """A model as the training step draws it, its networks still."""
 
     def __init__(self, device, model: AnchorModel) -> None:
@@ -106,12 +106,12 @@ def distill(
         return coarse, 0
     start = process_time()
     try:
-        teacher = Drawn(device, finest)
+        teacher = StillHeads(device, finest)
     except BadFile as why:
         raise BadFile(
             f"coarser levels cannot learn with it, --distill 0 averages alone: {why}"
         ) from None
-    pupil = Drawn(device, replace(coarse, frames=frames_of(coarse)))
+    pupil = StillHeads(device, replace(coarse, frames=frames_of(coarse)))
     rng = np.random.default_rng([seed, 31])
     controls = controls_of(finest, (0.25, 0.5, 0.75))
     looks = [(v, c) for v in range(len(views)) for c in range(len(controls))]

@@ -10,7 +10,7 @@ from shapeshift.runtime_models.lod.average_anchors import average_anchors
 from shapeshift.runtime_models.model import HEADS, BadFile
 from shapeshift.scene.cameras.framing import orbit_path
 from shapeshift.scene.metrics import psnr
-from shapeshift.training.lod.distill import Drawn, PictureError, controls_of, distill
+from shapeshift.training.lod.distill import PictureError, StillHeads, controls_of, distill
 from tests.support.models import make_random_model, with_light
 
 SIZE = (40, 40)
@@ -22,7 +22,7 @@ def views(turn=0.0):
 
 def worst_db(device, model, coarse, turn):
     """Of views that it has not learned from, at all stops and between them."""
-    whole, part = Drawn(device, model), Drawn(device, coarse)
+    whole, part = StillHeads(device, model), StillHeads(device, coarse)
     found = []
     for view in views(turn):
         for control in controls_of(model, (0.4,)):
