@@ -20,7 +20,7 @@ from shapeshift.training.photos import BLACK, LoadedPhoto
 NEIGHBOURS = 3  # whose distance is an anchor's size, as the first scale of 3DGS
 SURFACE = 9  # nearest points, an anchor's own place among them, that say how a surface lies
 FLATNESS = (0.3, 2.0)  # least and most of an axis, in the geometric mean of the three
-SAME_PLACE = 0.7  # of its neighbours' distance, to a place of another shape
+SAME_PLACE = 1.0  # of its neighbours' distance, to a place of another shape
 SIZES = 30.0  # times, from the median: what is nearer or farther than that is an outlier
 COLOR_PHOTOS = 24  # that the first colours are taken from
 DARKEST, BRIGHTEST = 0.02, 0.98  # of a base colour: beyond, its logit would not move any more
