@@ -1,6 +1,6 @@
 """What captures past one machine need, reckoned from measured rows: workers, hours, storage.
 
-    python3 tools/training/scale_plan.py [--photos N --splats N]
+    python3 tools/app/scale_plan.py [--photos N --splats N]
 
 Prints the tables of docs/scale.md, which a test compares; with --photos and --splats those of
 another capture.  All figures come from rows of docs/bench, from the arrays of a training step

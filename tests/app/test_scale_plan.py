@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="module")
 def program():
-    path = ROOT / "tools" / "training" / "scale_plan.py"
+    path = ROOT / "tools" / "app" / "scale_plan.py"
     spec = importlib.util.spec_from_file_location("scale_plan", path)
     module = importlib.util.module_from_spec(spec)
     sys.modules["scale_plan"] = module  # its dataclasses look there
