@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.renderer.backends import choose_backends, open_drawing
 from shapeshift.renderer.colors.color_cache import ColorCache, centre_of, forget_colors
-from shapeshift.renderer.colors.decode_colors import decode_colors
+from shapeshift.renderer.colors.decode_colors import decode_colors, shades_of
 from shapeshift.renderer.colors.eye_colors import by_eye, drawn_together, eyes_among
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
@@ -27,7 +27,6 @@ from shapeshift.renderer.colors.palette import (
 )
 from shapeshift.renderer.colors.two_looks import (
     Look,
-    grade_of,
     looks_of,
     prepare_two,
     same_shape,
@@ -41,6 +40,7 @@ from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
 from shapeshift.renderer.resample import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
+from shapeshift.renderer.streaming.follow import Streaming
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_control
@@ -84,6 +84,7 @@ class Renderer:
         self._decoded: list[DecodedObject] = []
         self._false_key: list | None = None  # what the next was chosen for
         self._false_colors = FalseColors()
+        self.streaming = Streaming(self.drawing)
         self.drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
         self._views: list[View] = []  # of the last frame, in the size that is shown
@@ -100,7 +101,10 @@ class Renderer:
     def update(self, scene: Scene) -> None:
         """Takes over poses and control values; decodes only what is new or has another x."""
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
-            if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
+            models = [id(obj.model) for obj in scene.objects]
+            if [id(d.model) for d in self._decoded] != models or self.streaming.differs(
+                self.settings.budget
+            ):
                 self._rebuild(scene)
             for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
                 if not obj.seen:
@@ -128,27 +132,16 @@ class Renderer:
         """Which colours are decoded, and where palettes belong, as the controls ask for."""
         pairs = zip(self._decoded, scene.objects, strict=True)
         state = [(d.version, o.seen, o.tint is None, o.appearance) for d, o in pairs]
-        if state == self._false_key:
-            return
-        self._false_key = state
-        before = self._false_colors.way
-        self._false_colors = false_colors(scene, [decoded.x for decoded in self._decoded])
-        same_way = before == self._false_colors.way
-        for decoded, shade in zip(self._decoded, self._false_colors.shades, strict=True):
-            if not (same_way and shade.same(decoded.shade)):
-                decoded.shade = shade
-                forget_colors(decoded.colored)
-        for decoded, obj in zip(self._decoded, scene.objects, strict=True):
-            if (grade := grade_of(obj, self._false_colors)) != decoded.grade:
-                decoded.grade = grade
-                forget_colors(decoded.colored)
+        if state != self._false_key:
+            self._false_key = state
+            self._false_colors = shades_of(self._decoded, scene, self._false_colors)
 
     def _rebuild(self, scene: Scene) -> None:
         """A new arena for another set of objects; an empty one if the set does not fit."""
         models = [o.model for o in scene.objects]
         self._scene, self._decoded, self._false_key = Scene(()), [], None
         try:
-            self.drawing.allocate(models)
+            self.streaming.allocate(models, self.settings.budget)
         except ValueError:
             self.drawing.allocate([])
             raise
@@ -173,6 +166,8 @@ class Renderer:
         self._views = views
         # An eye that is not drawn keeps its picture, and how its colours came about.
         self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
+        with self._timer.time("stream", on_gpu=False):
+            self.streaming.follow(self._scene, self._decoded, views)
         full, views = views, [scaled(view, settings.render_scale) for view in views]
         own, sorts = own_colors(self.settings, self._scene, self._decoded, full), 0
         with self._framebuffer_kept():
@@ -254,6 +249,7 @@ class Renderer:
         stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
         stats.sorts, stats.order_age = sorts, self.drawing.order_age
         stats.color_sets = color_sets
+        stats.streaming = self.streaming.stats
         if self._debug:
             stats.debug = self._debug[0][1]
         return stats
@@ -350,6 +346,7 @@ class Renderer:
 
     def surface(self, view: View) -> Surface:
         """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""
+        self.streaming.follow(self._scene, self._decoded, [view])
         self._decode_colors([view])
         with self._framebuffer_kept():
             return self.drawing.surface(view, self._settings_of_frame())
@@ -384,6 +381,7 @@ class Renderer:
 
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""
+        self.streaming.close()
         self.drawing.close()
         for part in (self._resolve, self.gpu):
             if part is not None:

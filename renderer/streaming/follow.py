@@ -1,0 +1,93 @@
+"""A stream's splats into the arena, and what a look, a cut or a tint makes of them again."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shapeshift.rasterizer.pages import PAGE
+from shapeshift.renderer.colors.color_cache import forget_colors
+from shapeshift.renderer.cut import place_splats
+from shapeshift.renderer.decoded_object import DecodedObject
+from shapeshift.renderer.drawing import Drawing
+from shapeshift.renderer.settings import StreamStats
+from shapeshift.renderer.streaming.stream import Stream, has_leaves
+from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+
+class Streaming:
+    """The part of a renderer that deals with models in levels of detail; idle without any."""
+
+    def __init__(self, drawing: Drawing) -> None:
+        self._drawing = drawing
+        self._stream: Stream | None = None
+        self.converges = True  # a frame waits for all that it wants; False: it is one of many
+
+    def allocate(self, models: list[Model], budget: int) -> None:
+        """Room for these objects in the drawing.  budget: 0 for the models' own.
+
+        Raises BadFile where it leaves nothing for levels of detail.
+        """
+        self.close()
+        if any(map(has_leaves, models)):
+            self._stream = Stream(self._drawing, models, budget)
+        else:
+            self._drawing.allocate(models)
+
+    def differs(self, budget: int) -> bool:
+        """Whether room was made for another budget."""
+        return self._stream is not None and budget not in (0, self._stream.budget)
+
+    @property
+    def stats(self) -> StreamStats | None:
+        """Of the last frame."""
+        return self._stream.stats if self._stream is not None else None
+
+    def follow(self, scene: Scene, decoded: Sequence[DecodedObject], views: Sequence[View]) -> None:
+        """What the views want is there afterwards, or on its way.  Raises BadFile."""
+        if self._stream is not None:
+            self._stream.converges = self.converges
+            follow(self._drawing, self._stream, scene, decoded, views)
+
+    def close(self) -> None:
+        if self._stream is not None:
+            self._stream.close()
+        self._stream = None
+
+
+def follow(
+    drawing: Drawing, stream: Stream, scene: Scene, decoded: Sequence[DecodedObject],
+    views: Sequence[View],
+) -> None:  # fmt: skip
+    """Asks the stream, and gives what changed the look that its object has."""
+    cut = [i for i in stream.objects if decoded[i].own is not None]
+    before = {i: drawing.pages_of(i) for i in cut}
+    for i in stream.follow(scene, views):
+        obj, each = scene.objects[i], decoded[i]
+        assert isinstance(obj.model, SplatLayers)
+        if i in before:
+            keep_own(drawing, i, each, before[i], stream.placed)
+            place_splats(drawing, i, obj, each)
+        tinted = any(colored.untinted for colored in each.colored)
+        if obj.model.sh.shape[1] > 1 or each.grade is not None or tinted or obj.tint is not None:
+            for colored in each.colored:
+                colored.tint, colored.untinted = None, ()  # what lay under it lies elsewhere now
+            forget_colors(each.colored)
+
+
+def keep_own(
+    drawing: Drawing, i: int, decoded: DecodedObject, before: np.ndarray, placed: np.ndarray
+) -> None:
+    """Makes `decoded.own` that of the pages which object i has now.
+
+    before: the pages that it had; placed: those that were filled since, with splats as decoded.
+    """
+    assert decoded.own is not None
+    pages = drawing.pages_of(i)
+    own = drawing.read_splats(i)
+    stay = np.isin(pages, before) & ~np.isin(pages, placed)
+    at = np.searchsorted(before, pages[stay])
+    for now, old in zip(own, decoded.own, strict=True):
+        now.reshape(len(pages), PAGE, -1)[stay] = old.reshape(len(before), PAGE, -1)[at]
+    decoded.own, decoded.cuts, decoded.opacity = own, (), 1.0

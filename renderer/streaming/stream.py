@@ -1,0 +1,337 @@
+"""Splats of models in levels of detail, put into the arena as views and a budget want them.
+
+The file to read first in streaming/.  Of each frame: sight (which leaves are in the picture), seen
+(in how many pixels), choose (at which level), and the pages of what changes.
+"""
+
+import logging
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from shapeshift.rasterizer.device import Device, NoDevice, open_device
+from shapeshift.rasterizer.pages import PAGE
+from shapeshift.renderer.drawing import Drawing
+from shapeshift.renderer.limits import arena_rows
+from shapeshift.renderer.settings import StreamStats
+from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, steps_of
+from shapeshift.renderer.streaming.fetch import Fetcher
+from shapeshift.renderer.streaming.pages import ROOM, PageTable, fill_pages, pages_needed
+from shapeshift.renderer.streaming.seen import Look
+from shapeshift.renderer.streaming.sight import Sight, sight_of
+from shapeshift.renderer.streaming.weights import Weights, bytes_of
+from shapeshift.runtime_models.leaf_levels import LeafLevels, LeafSource, LeafSplats
+from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+CHANGED = 0.05  # of the budget: what a frame in motion may upload, in splats
+BESIDE = 1e-6  # pixels that a leaf beside the picture counts: last, and the coarsest of all
+SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
+LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
+
+
+def has_leaves(model: Model) -> bool:
+    return isinstance(model, SplatLayers) and model.leaves is not None
+
+
+class Stream:
+    """The leaves of all objects of a scene that have any."""
+
+    def __init__(self, drawing: Drawing, models: Sequence[Model], budget: int = 0) -> None:
+        """Makes room in the drawing.  budget: instead of the models' own; 0: theirs.
+
+        Raises BadFile where other objects leave nothing of the budget.
+        """
+        self._drawing = drawing
+        self.objects = [i for i, model in enumerate(models) if has_leaves(model)]
+        mine = [models[i] for i in self.objects]
+        self._models: list[SplatLayers] = [m for m in mine if isinstance(m, SplatLayers)]
+        self._sources: list[LeafSource] = [m.leaves for m in self._models if m.leaves is not None]
+        self.budget = budget or max(source.budget for source in self._sources) or auto_budget()
+        fixed = sum(map(arena_rows, models))
+        self._left = self.budget - fixed
+        if not self._left > 0:
+            raise BadFile(
+                f"objects without levels of detail have {fixed:,} splats and the budget is "
+                f"{self.budget:,}; give a larger --budget, or make levels of them: launch.py lod."
+            )
+        made = {id(source): steps_of(source.levels) for source in self._sources}
+        self._steps = joined([made[id(source)] for source in self._sources])
+        sizes = [len(source.part) for source in self._sources]
+        self._first = np.concatenate([[0], np.cumsum(sizes, dtype=int)])
+        self._object = np.repeat(np.arange(len(sizes)), sizes)  # of each leaf, in self.objects
+        self._every_count = every_count(self._sources)  # (L, K) splats
+        pairs = zip(self._models, self._sources, strict=True)
+        self._coarse = {id(source): CoarseLevels(model, source) for model, source in pairs}
+        self._finest = np.concatenate([finest_of(source.levels) for source in self._sources])
+        self._pages = pages_for(self._finest, self._left)
+        coefficients = max(source.coefficients for source in self._sources)
+        drawing.allocate_pages(list(models), self._pages, coefficients)
+        self._table = PageTable(self._pages, int(self._first[-1]))
+        self._weights = Weights(int(self._first[-1]), self._look())
+        self._fetcher = Fetcher()
+        self._last: tuple = ()  # the views and poses that all is there for
+        self.placed = np.zeros(0, np.int64)  # pages that were filled for the last frame
+        self.stats = StreamStats(self.budget, 0, 0, int(self._finest.sum()), 0, False, "")
+        self.converges = True  # each frame gets all that it wants, and forgets the one before
+
+    def _look(self) -> Look | None:
+        try:
+            device: Device = open_device()
+        except NoDevice as reason:
+            logging.getLogger("renderer").warning(f"What is hidden counts as seen: {reason}")
+            return None
+        return Look(device, self._models, self._first)
+
+    def follow(self, scene: Scene, views: Sequence[View]) -> list[int]:
+        """Puts in what these views want; the objects whose splats have changed.
+
+        Raises BadFile where a part cannot be read, and all were to be there.
+        """
+        mine = [scene.objects[i] for i in self.objects]
+        poses = [obj.world_from_object.matrix() for obj in mine]
+        shown = [obj.seen for obj in mine]
+        now = (*map(key_of, views), bytes_of(poses), *shown, self.converges)
+        if now == self._last and not self.stats.pending:
+            self.stats = self._stats(0, False, self.stats.in_sight)
+            return []
+        sight = self._sight(poses, shown, views)
+        weight = self._weights.of(sight, views, poses, shown, fresh=self.converges)
+        wanted, worth = self._choose(weight, sight)
+        changed = self._change(wanted, worth)
+        self._last = now
+        splats = int(self._table.splats[changed].sum())
+        pending = bool((wanted != self._table.level).any())
+        self.stats = self._stats(splats, pending, int(self._finest[sight.held].sum()))
+        return sorted({self.objects[i] for i in np.unique(self._object[changed])})
+
+    def _choose(self, weight: np.ndarray, sight: Sight) -> tuple[np.ndarray, np.ndarray]:
+        """Levels of all leaves that fit the budget and the pages, and what each is worth."""
+        beside = sight.wide & (weight <= 0) & (not self.converges)
+        held = None if self.converges else self._table.level
+        left = self._left
+        while True:
+            level, worth = choose(self._steps, np.where(beside, BESIDE, weight), left, held)
+            level = np.where(beside & (level >= 0), self._steps.coarsest, level)
+            if not self.converges:
+                level = self._finest_of(level, [~source.broken() for source in self._sources])
+            if pages_needed(self._counts(level)).sum() <= self._pages:
+                return level, worth
+            left = int(0.9 * left)
+
+    def _counts(self, level: np.ndarray) -> np.ndarray:
+        """(L,) splats of all leaves at these levels."""
+        rows = np.arange(len(level))
+        return np.where(level >= 0, self._every_count[rows, np.maximum(level, 0)], 0)
+
+    def _finest_of(self, level: np.ndarray, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """(L,) the finest level from the wanted one on that lies in one of these parts (a mask a
+        source), or is the coarsest, which is in memory.
+        """
+        kinds = self._every_count.shape[1]
+        numbers = np.arange(kinds)
+        there = np.zeros(self._every_count.shape, bool)
+        for source, first, mask in zip(self._sources, self._first, parts, strict=False):
+            own = source.levels.counts
+            there[first : first + len(own), : own.shape[1]] = mask[source.part] & (own > 0)
+        there |= numbers == self._steps.coarsest[:, None]
+        fits = there & (numbers >= level[:, None])
+        return np.where(level >= 0, np.argmax(fits, axis=1), level)
+
+    def _stats(self, changed: int, pending: bool, in_sight: int) -> StreamStats:
+        problem = next((source.problem for source in self._sources if source.problem), "")
+        shown = int(self._table.splats.sum())
+        return StreamStats(
+            self.budget, shown, in_sight, self.stats.whole, changed, pending, problem
+        )
+
+    def _sight(self, poses: list[np.ndarray], shown: list[bool], views: Sequence[View]) -> Sight:
+        """Of all leaves, one object after the other."""
+        each = [sight_of(s.levels, p, views) for s, p in zip(self._sources, poses, strict=True)]
+        held, wide, cover, distance = (
+            np.concatenate([getattr(one, name) for one in each])
+            for name in ("held", "wide", "cover", "distance")
+        )
+        there = np.array(shown)[self._object]
+        return Sight(held & there, wide & there, cover, distance)
+
+    def _change(self, wanted: np.ndarray, worth: np.ndarray) -> np.ndarray:
+        """Brings the arena nearer to the wanted levels; the leaves that changed."""
+        table, level = self._table, wanted
+        gone = np.flatnonzero((wanted == NOT_DRAWN) & (table.level != NOT_DRAWN))
+        pages = [table.free(gone)]
+        due = np.flatnonzero(wanted != table.level)
+        if not self.converges:
+            at_hand = [source.at_hand() for source in self._sources]
+            self._fetcher.want(self._missing(wanted, worth, at_hand))
+            level = self._finest_of(wanted, at_hand)
+            now = table.level
+            level = np.where((now != NOT_DRAWN) & (level != wanted) & (level > now), now, level)
+            due, level = self._first_of(np.flatnonzero(level != now), level, worth)
+        pages.append(table.free(due))
+        self._drawing.clear_pages(np.concatenate(pages))
+        self._upload(due, level[due])
+        return np.concatenate([gone, due])
+
+    def _missing(
+        self, wanted: np.ndarray, worth: np.ndarray, at_hand: Sequence[np.ndarray]
+    ) -> list[tuple[LeafSource, int]]:
+        """Parts that are wanted and not at hand, what is worth most first."""
+        found: dict[tuple[int, int], float] = {}
+        sources = {id(source): source for source in self._sources}
+        for source, first, there in zip(self._sources, self._first, at_hand, strict=False):
+            own = slice(first, first + len(source.part))
+            rows = np.flatnonzero((wanted[own] >= 0) & (wanted[own] != self._table.level[own])
+                                  & (wanted[own] != self._steps.coarsest[own]))  # fmt: skip
+            parts = source.part[rows, wanted[own][rows]]
+            most = np.zeros(len(there))
+            np.maximum.at(most, parts, worth[own][rows])
+            for part in np.flatnonzero((most > 0) & ~there & ~source.broken()):
+                key = (id(source), int(part))
+                found[key] = max(found.get(key, 0.0), float(most[part]))
+        order = sorted(found, key=lambda key: (-found[key], key[1]))
+        return [(sources[which], part) for which, part in order]
+
+    def _first_of(
+        self, due: np.ndarray, level: np.ndarray, worth: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What of the changes this frame makes, and all levels after it.
+
+        What comes into sight comes at its coarsest at least, and what has to go for it goes; finer
+        ones, best first, until CHANGED of the budget is uploaded.  Never more than the budget.
+        """
+        table, base = self._table, self._steps.base
+        new = due[table.level[due] == NOT_DRAWN]
+        counts, there = self._counts(level), table.splats
+        cost, had = counts[due], there[due]
+        downs = due[(cost < had)]
+        downs = downs[np.argsort(worth[downs], kind="stable")]
+        room = int(CHANGED * self.budget)
+        freed = np.cumsum(there[downs] - counts[downs])
+        total = int(there.sum())
+        needed = total + int(base[new].sum()) - self._left
+        number = int(np.searchsorted(freed, needed)) + 1 if needed > 0 else 0
+        number = max(number, int(np.searchsorted(np.cumsum(counts[downs]), room, side="right")))
+        downs = downs[:number]
+        total -= int((there[downs] - counts[downs]).sum())
+        new = new[np.argsort(-worth[new], kind="stable")]
+        new = new[: int(np.searchsorted(total + np.cumsum(base[new]), self._left, side="right"))]
+        total += int(base[new].sum())
+        ups = np.union1d(
+            new[level[new] != self._steps.coarsest[new]], due[(had > 0) & (cost > had)]
+        )
+        ups = ups[np.argsort(-worth[ups], kind="stable")]
+        from_now = np.where(there[ups] > 0, there[ups], base[ups])
+        fits = total + np.cumsum(counts[ups] - from_now) <= self._left
+        uploaded = np.cumsum(counts[ups]) <= max(room - int(counts[downs].sum()), 0)
+        uploaded[:1] = True  # or a large leaf would never come
+        ups = ups[fits & uploaded]
+        after = table.level.copy()
+        after[new] = self._steps.coarsest[new]
+        after[downs], after[ups] = level[downs], level[ups]
+        return np.unique(np.concatenate([new, downs, ups])), after
+
+    def _upload(self, leaves: np.ndarray, levels: np.ndarray) -> None:
+        """Reads leaves (n,) at levels (n,) into free pages: each part once for all copies."""
+        self.placed = np.zeros(0, np.int64)
+        numbers = np.array([id(source) for source in self._sources])
+        object_of = self._object[leaves]
+        for source in {id(source): source for source in self._sources}.values():
+            mine = np.flatnonzero(numbers[object_of] == id(source))
+            own = leaves[mine] - self._first[object_of[mine]]
+            kinds = source.levels.counts.shape[1]
+            pairs, copy_of = np.unique(own * kinds + levels[mine], return_inverse=True)
+            number = {int(pair): n for n, pair in enumerate(pairs)}
+            for part in self._read(source, pairs // kinds, pairs % kinds):
+                given = part.leaves * kinds + part.levels
+                place = np.full(len(pairs), -1)
+                place[[number[int(pair)] for pair in given]] = np.arange(len(given))
+                there = place[copy_of] >= 0
+                which = place[copy_of][there]
+                self._place(part, which, leaves[mine][there])
+
+    def _read(
+        self, source: LeafSource, leaves: np.ndarray, levels: np.ndarray
+    ) -> Iterator[LeafSplats]:
+        """LeafSplats of all of these; coarsest levels are in memory already."""
+        coarse = levels == source.levels.coarsest[leaves]
+        if coarse.any():
+            yield self._coarse[id(source)].picked(leaves[coarse], levels[coarse])
+        if not coarse.all():
+            yield from source.read(leaves[~coarse], levels[~coarse])
+
+    def _place(self, part: LeafSplats, which: np.ndarray, leaves: np.ndarray) -> None:
+        """Some leaves of a part into pages, as many as fit."""
+        needed = np.cumsum(pages_needed(part.counts[which]))
+        fit = int(np.searchsorted(needed, self._table.room, side="right"))
+        which, leaves = which[:fit], leaves[:fit]
+        if not len(which):
+            return
+        owner = np.array(self.objects)[self._object[leaves]]
+        filled = fill_pages(part, which, owner)
+        pages = self._table.take(leaves, part.levels[which], part.counts[which])
+        self.placed = np.union1d(self.placed, pages)
+        if len(pages):
+            self._drawing.place_pages(pages, filled.owner, filled.splats)
+            if part.sh.shape[1] == 1:
+                self._drawing.shade_pages(pages)
+
+    def close(self) -> None:
+        self._fetcher.close()
+
+
+def key_of(view: View) -> tuple:
+    """What of a view says which leaves it wants."""
+    pose = view.world_from_eye
+    return (*pose.position, *pose.wxyz, *view.tangents, *view.size, view.near)
+
+
+def finest_of(levels: LeafLevels) -> np.ndarray:
+    """(L,) splats of the finest level of each leaf."""
+    finest = np.argmax(levels.counts > 0, axis=1)
+    return levels.counts[np.arange(len(finest)), finest]
+
+
+def auto_budget() -> int:
+    """What suits the processor, or a GPU."""
+    try:
+        device = open_device()
+    except NoDevice:
+        return LEAST_AUTO
+    if device.kind == "gpu":
+        return MOST_AUTO
+    return int(min(max(SPLATS_A_UNIT * device.units, LEAST_AUTO), MOST_AUTO))
+
+
+def every_count(sources: Sequence[LeafSource]) -> np.ndarray:
+    """(L, K) splats of all leaves of several sources; K of the one that has most."""
+    most = max(source.levels.counts.shape[1] for source in sources)
+    counts = [source.levels.counts for source in sources]
+    return np.concatenate([np.pad(c, ((0, 0), (0, most - c.shape[1]))) for c in counts])
+
+
+def pages_for(finest: np.ndarray, budget: int) -> int:
+    """Pages for so many splats: one of each leaf is not full, but no more than ROOM allows."""
+    splats = min(int(finest.sum()), budget)
+    full = splats // PAGE + min(len(finest), budget) + 1
+    return min(full, int(ROOM * budget) // PAGE + 1)
+
+
+class CoarseLevels:
+    """The splats of a model by leaf."""
+
+    def __init__(self, model: SplatLayers, source: LeafSource) -> None:
+        self._model, leaf = model, source.coarse_leaf
+        self._order = np.argsort(leaf, kind="stable")
+        self._counts = np.bincount(leaf, minlength=len(source.part))
+        self._starts = np.cumsum(self._counts) - self._counts
+
+    def picked(self, leaves: np.ndarray, levels: np.ndarray) -> LeafSplats:
+        """Leaves (n,), one after the other."""
+        counts = self._counts[leaves]
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        rows = self._order[np.repeat(self._starts[leaves], counts) + within]
+        m = self._model
+        arrays = (array[rows] for array in (m.means, m.scales, m.wxyz, m.opacity, m.sh))
+        return LeafSplats(leaves, levels, counts, *arrays)
