@@ -12,7 +12,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.leaf_levels import LeafSplats
-from shapeshift.runtime_models.model import Model
+from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import View
@@ -40,7 +40,7 @@ class Drawing(ABC):
         """The same, with pages of rasterizer/pages.py for what a budget draws of models with
         leaves (streaming/); coefficients: harmonics of each of their splats.
         """
-        raise TypeError("this drawing has no pages.")
+        raise BadFile("only tiles draw by a budget; add --drawing tiles, or leave --budget out.")
 
     def pages_of(self, i: int) -> np.ndarray:
         """Pages that hold splats of object i, rising: the order of `read_splats`."""

@@ -166,8 +166,7 @@ class Renderer:
         self._views = views
         # An eye that is not drawn keeps its picture, and how its colours came about.
         self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
-        with self._timer.time("stream", on_gpu=False):
-            self.streaming.follow(self._scene, self._decoded, views)
+        self.streaming.follow(self._scene, self._decoded, views, self._timer)
         full, views = views, [scaled(view, settings.render_scale) for view in views]
         own, sorts = own_colors(self.settings, self._scene, self._decoded, full), 0
         with self._framebuffer_kept():
@@ -346,7 +345,7 @@ class Renderer:
 
     def surface(self, view: View) -> Surface:
         """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""
-        self.streaming.follow(self._scene, self._decoded, [view])
+        self.streaming.follow(self._scene, self._decoded, [view], self._timer)
         self._decode_colors([view])
         with self._framebuffer_kept():
             return self.drawing.surface(view, self._settings_of_frame())

@@ -68,14 +68,14 @@ def joined(each: list[Steps]) -> Steps:
     """The steps of several objects; leaves are numbered on."""
     first = np.cumsum([0, *(len(steps.base) for steps in each)])
     moved = [steps.leaf + start for steps, start in zip(each, first[:-1], strict=True)]
+
+    def column(name: str) -> np.ndarray:
+        return np.concatenate([getattr(steps, name) for steps in each])
+
     return Steps(
-        *(
-            np.concatenate([getattr(steps, name) for steps in each])
-            for name in ("coarsest", "base")
-        ),
-        np.concatenate(moved),
-        *(np.concatenate([getattr(s, name) for s in each]) for name in ("level", "more", "gain")),
-    )
+        column("coarsest"), column("base"), np.concatenate(moved), column("level"), column("more"),
+        column("gain"),
+    )  # fmt: skip
 
 
 def choose(

@@ -11,6 +11,7 @@ from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import StreamStats
 from shapeshift.renderer.streaming.stream import Stream, has_leaves
+from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
@@ -44,11 +45,15 @@ class Streaming:
         """Of the last frame."""
         return self._stream.stats if self._stream is not None else None
 
-    def follow(self, scene: Scene, decoded: Sequence[DecodedObject], views: Sequence[View]) -> None:
+    def follow(
+        self, scene: Scene, decoded: Sequence[DecodedObject], views: Sequence[View],
+        timer: PassTimer,
+    ) -> None:  # fmt: skip
         """What the views want is there afterwards, or on its way.  Raises BadFile."""
         if self._stream is not None:
             self._stream.converges = self.converges
-            follow(self._drawing, self._stream, scene, decoded, views)
+            with timer.time("stream", on_gpu=False):
+                follow(self._drawing, self._stream, scene, decoded, views)
 
     def close(self) -> None:
         if self._stream is not None:
@@ -89,5 +94,6 @@ def keep_own(
     stay = np.isin(pages, before) & ~np.isin(pages, placed)
     at = np.searchsorted(before, pages[stay])
     for now, old in zip(own, decoded.own, strict=True):
-        now.reshape(len(pages), PAGE, -1)[stay] = old.reshape(len(before), PAGE, -1)[at]
+        shape = (-1, PAGE, now.shape[1])
+        now.reshape(shape)[stay] = old.reshape(shape)[at]
     decoded.own, decoded.cuts, decoded.opacity = own, (), 1.0

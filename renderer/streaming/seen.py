@@ -28,8 +28,8 @@ class Look:
     def __init__(self, device: Device, models: Sequence[SplatLayers], first: np.ndarray) -> None:
         """first: (O,) the number of the first leaf of each model, over all of them."""
         self._device = device
-        counts = np.cumsum([model.splat_count for model in models])
-        self.objects = int(np.searchsorted(counts, MOST, side="right"))  # that take part
+        ends = np.cumsum([model.splat_count for model in models])
+        self.objects = int(np.searchsorted(ends, MOST, side="right"))  # that take part
         mine = models[: self.objects]
         self.leaves = int(first[self.objects])  # the first so many are theirs
         size = sum(model.splat_count for model in mine)

@@ -15,8 +15,6 @@ from shapeshift.scene.appearance import Appearance
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-Arrays = "tuple[Array, Array, Array]"  # mean_opacity (N, 4), covariance (N, 8), object_index (N,)
-
 
 class PagedRows:
     """The last rows of the arena: pages, each of one object or of none."""
@@ -29,8 +27,14 @@ class PagedRows:
         self._sh = device.zeros((PAGE // 8 * pages, 3 * coefficients, 8))
         self.follows_eye = coefficients > 1
 
-    def place(self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats, arena: Arrays) -> None:
-        """Writes splats (n PAGE,), absent ones among them, to pages (n,) of these objects (n,)."""
+    def place(
+        self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats,
+        arena: "tuple[Array, Array, Array]",
+    ) -> None:  # fmt: skip
+        """Writes splats (n PAGE,), absent ones among them, to pages (n,) of these objects (n,).
+
+        arena: mean_opacity (N, 4), covariance (N, 8) and object_index (N,).
+        """
         device, count = self._device, len(given.means)
         mean_opacity, covariance = device.empty((count, 4)), device.empty((count, 8))
         pack(
@@ -39,8 +43,7 @@ class PagedRows:
         )  # fmt: skip
         at = pages + self.first // PAGE
         index = device.upload(np.repeat(owner.astype(np.int32), PAGE))
-        pairs = zip((mean_opacity, covariance, index), arena, strict=True)
-        for rows, array in pairs:
+        for rows, array in zip((mean_opacity, covariance, index), arena, strict=True):
             scatter_pages(device, rows, at, array)
         scatter_pages(device, upload_sh(device, given.sh), pages, self._sh)
         self.owner[pages] = owner
