@@ -21,6 +21,12 @@ class LeafLevels:
         """(L,) the last level that each leaf has."""
         return self.counts.shape[1] - 1 - np.argmax(self.counts[:, ::-1] > 0, axis=1)
 
+    @property
+    def finest_counts(self) -> np.ndarray:
+        """(L,) splats of the finest level that each leaf has."""
+        finest = np.argmax(self.counts > 0, axis=1)
+        return self.counts[np.arange(len(finest)), finest]
+
 
 @dataclass(frozen=True)
 class LeafSplats:

@@ -176,6 +176,8 @@ def describe(model: Model, path: str | Path) -> dict:
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]
             drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))
+            if model.leaves is not None:  # the model's own splats are the coarsest of each leaf
+                facts["splats"] = int(model.leaves.levels.finest_counts.sum())
             if "leaves" in model.provenance:
                 drawn["leaves"] = model.provenance["leaves"]
         return facts | {"mode": model.mode} | drawn | describe_labels(model)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
-from shapeshift.app.opening import DrawingOptions
+from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, print_json, say
 
@@ -22,7 +22,7 @@ LARGEST_RESULT = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
-class Options(DrawingOptions):
+class Options(ReadingOptions):
     """Time frames on an orbit and an x sweep, and measure the image error with them."""
 
     scene: Annotated[Path, POSITIONAL]

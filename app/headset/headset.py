@@ -210,6 +210,7 @@ def wear(options: Options) -> int:
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
+            renderer.streaming.converges = False  # a frame is late if it waits for its leaves
             rules = Rules(obstacles=options.obstacles)
             say_missing(link, options, worn)
             xr_app = XrApp(

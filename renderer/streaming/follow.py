@@ -45,6 +45,11 @@ class Streaming:
         """Of the last frame."""
         return self._stream.stats if self._stream is not None else None
 
+    @property
+    def due(self) -> bool:
+        """Whether another frame of the same views would show more."""
+        return self._stream is not None and self._stream.due
+
     def follow(
         self, scene: Scene, decoded: Sequence[DecodedObject], views: Sequence[View],
         timer: PassTimer,

@@ -14,18 +14,20 @@ from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import StreamStats
+from shapeshift.renderer.streaming.ahead import views_ahead
 from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, steps_of
 from shapeshift.renderer.streaming.fetch import Fetcher
 from shapeshift.renderer.streaming.pages import ROOM, PageTable, fill_pages, pages_needed
 from shapeshift.renderer.streaming.seen import Look
 from shapeshift.renderer.streaming.sight import Sight, sight_of
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
-from shapeshift.runtime_models.leaf_levels import LeafLevels, LeafSource, LeafSplats
+from shapeshift.runtime_models.leaf_levels import LeafSource, LeafSplats
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
 CHANGED = 0.05  # of the budget: what a frame in motion may upload, in splats
+EACH = 8  # frames, one in so many looks ahead
 BESIDE = 1e-6  # pixels that a leaf beside the picture counts: last, and the coarsest of all
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
 LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
@@ -64,7 +66,7 @@ class Stream:
         self._every_count = every_count(self._sources)  # (L, K) splats
         pairs = zip(self._models, self._sources, strict=True)
         self._coarse = {id(source): CoarseLevels(model, source) for model, source in pairs}
-        self._finest = np.concatenate([finest_of(source.levels) for source in self._sources])
+        self._finest = np.concatenate([source.levels.finest_counts for source in self._sources])
         self._pages = pages_for(self._finest, self._left)
         coefficients = max(source.coefficients for source in self._sources)
         drawing.allocate_pages(list(models), self._pages, coefficients)
@@ -73,6 +75,10 @@ class Stream:
         self._fetcher = Fetcher()
         self._last: tuple = ()  # the views and poses that all is there for
         self.placed = np.zeros(0, np.int64)  # pages that were filled for the last frame
+        self._views: tuple[Sequence[View], Sequence[View]] = ((), ())  # of the last two frames
+        self._poses: list[np.ndarray] = []
+        self._shown: list[bool] = []
+        self._frame = self._decoded = 0  # frames; parts that were at hand in the last
         self.stats = StreamStats(self.budget, 0, 0, int(self._finest.sum()), 0, False, "")
         self.converges = True  # each frame gets all that it wants, and forgets the one before
 
@@ -96,6 +102,8 @@ class Stream:
         if now == self._last and not self.stats.pending:
             self.stats = self._stats(0, False, self.stats.in_sight)
             return []
+        self._views = (self._views[1], views)
+        self._poses, self._shown = poses, shown
         sight = self._sight(poses, shown, views)
         weight = self._weights.of(sight, views, poses, shown, fresh=self.converges)
         wanted, worth = self._choose(weight, sight)
@@ -164,7 +172,9 @@ class Stream:
         due = np.flatnonzero(wanted != table.level)
         if not self.converges:
             at_hand = [source.at_hand() for source in self._sources]
-            self._fetcher.want(self._missing(wanted, worth, at_hand))
+            missing = self._missing(wanted, worth, at_hand)
+            self._fetcher.want([*missing, *self._ahead(at_hand)])
+            self._decoded = sum(int(np.count_nonzero(there)) for there in at_hand)
             level = self._finest_of(wanted, at_hand)
             now = table.level
             level = np.where((now != NOT_DRAWN) & (level != wanted) & (level > now), now, level)
@@ -193,6 +203,27 @@ class Stream:
         order = sorted(found, key=lambda key: (-found[key], key[1]))
         return [(sources[which], part) for which, part in order]
 
+    def _ahead(self, at_hand: Sequence[np.ndarray]) -> list[tuple[LeafSource, int]]:
+        """Parts that the eye will want if it goes on as it does, and that are not at hand."""
+        self._frame += 1
+        if self._frame % EACH:
+            return []
+        views = views_ahead(*self._views)
+        if not views:
+            return []
+        sight = self._sight(self._poses, self._shown, views)
+        weight = np.where(sight.held, self._weights.guessed(sight), 0.0)
+        wanted, worth = choose(self._steps, weight, self._left)
+        return self._missing(wanted, worth, at_hand)
+
+    @property
+    def due(self) -> bool:
+        """Whether another frame of the same views would show more."""
+        if not self.stats.pending:
+            return False
+        decoded = sum(int(np.count_nonzero(source.at_hand())) for source in self._sources)
+        return self.stats.changed > 0 or decoded != self._decoded
+
     def _first_of(
         self, due: np.ndarray, level: np.ndarray, worth: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -202,10 +233,10 @@ class Stream:
         ones, best first, until CHANGED of the budget is uploaded.  Never more than the budget.
         """
         table, base = self._table, self._steps.base
-        new = due[table.level[due] == NOT_DRAWN]
-        counts, there = self._counts(level), table.splats
-        cost, had = counts[due], there[due]
-        downs = due[(cost < had)]
+        counts, there, now = self._counts(level), table.splats, table.level
+        new = due[now[due] == NOT_DRAWN]
+        downs = due[level[due] > now[due]]
+        downs = np.setdiff1d(downs, new)
         downs = downs[np.argsort(worth[downs], kind="stable")]
         room = int(CHANGED * self.budget)
         freed = np.cumsum(there[downs] - counts[downs])
@@ -218,16 +249,15 @@ class Stream:
         new = new[np.argsort(-worth[new], kind="stable")]
         new = new[: int(np.searchsorted(total + np.cumsum(base[new]), self._left, side="right"))]
         total += int(base[new].sum())
-        ups = np.union1d(
-            new[level[new] != self._steps.coarsest[new]], due[(had > 0) & (cost > had)]
-        )
+        finer = due[(now[due] != NOT_DRAWN) & (level[due] < now[due])]
+        ups = np.union1d(new[level[new] != self._steps.coarsest[new]], finer)
         ups = ups[np.argsort(-worth[ups], kind="stable")]
-        from_now = np.where(there[ups] > 0, there[ups], base[ups])
-        fits = total + np.cumsum(counts[ups] - from_now) <= self._left
-        uploaded = np.cumsum(counts[ups]) <= max(room - int(counts[downs].sum()), 0)
-        uploaded[:1] = True  # or a large leaf would never come
-        ups = ups[fits & uploaded]
-        after = table.level.copy()
+        more = counts[ups] - np.where(now[ups] == NOT_DRAWN, base[ups], there[ups])
+        left = max(room - int(counts[downs].sum()), 0)
+        taken = np.cumsum(counts[ups]) <= left
+        taken[:1] = True  # or a large leaf would never come
+        ups = ups[taken & (total + np.cumsum(more) <= self._left)]
+        after = now.copy()
         after[new] = self._steps.coarsest[new]
         after[downs], after[ups] = level[downs], level[ups]
         return np.unique(np.concatenate([new, downs, ups])), after
@@ -285,12 +315,6 @@ def key_of(view: View) -> tuple:
     """What of a view says which leaves it wants."""
     pose = view.world_from_eye
     return (*pose.position, *pose.wxyz, *view.tangents, *view.size, view.near)
-
-
-def finest_of(levels: LeafLevels) -> np.ndarray:
-    """(L,) splats of the finest level of each leaf."""
-    finest = np.argmax(levels.counts > 0, axis=1)
-    return levels.counts[np.arange(len(finest)), finest]
 
 
 def auto_budget() -> int:

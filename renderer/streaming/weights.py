@@ -42,11 +42,15 @@ class Weights:
         if fresh or self._is_stale(views, poses):
             self._look_again(sight, views, poses, shown, fresh)
         self._age += 1
+        pixels = np.where(self._known, self.pixels, self.guessed(sight))
+        return np.where(sight.held, np.maximum(pixels, FLOOR), 0.0)
+
+    def guessed(self, sight: Sight) -> np.ndarray:
+        """(L,) pixels by what boxes cover, less what was hidden where a look was had."""
         both = self._known & sight.held
         seen, cover = self.pixels[both].sum(), sight.cover[both].sum()
         part = min(seen / cover, 1.0) if 0 < seen and 0 < cover else 1.0
-        pixels = np.where(self._known, self.pixels, part * sight.cover)
-        return np.where(sight.held, np.maximum(pixels, FLOOR), 0.0)
+        return np.maximum(part * sight.cover, FLOOR)
 
     def _is_stale(self, views: Sequence[View], poses: Sequence[np.ndarray]) -> bool:
         if len(views) != len(self._looked) or not self._looked:

@@ -69,7 +69,7 @@ def test_the_budget_is_never_exceeded(tiles, folder, budget):
     for eye in ((0, 0.5, 6), (6, 0.5, 0), (0, 0.2, 0.4)):
         _, stats = drawn(tiles, scene, view_at(eye))
         assert stats.drawn <= stats.streaming.shown <= budget
-        assert stats.splats == scene.splat_count
+        assert stats.splats == scene.splat_count == 4000
 
 
 def test_more_budget_is_a_better_picture(tiles, wall):
