@@ -12,7 +12,7 @@ from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import StreamStats
 from shapeshift.renderer.streaming.stream import Stream, has_leaves
 from shapeshift.renderer.timing import PassTimer
-from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.runtime_models.model import Model
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
@@ -75,12 +75,11 @@ def follow(
     before = {i: drawing.pages_of(i) for i in cut}
     for i in stream.follow(scene, views):
         obj, each = scene.objects[i], decoded[i]
-        assert isinstance(obj.model, SplatLayers)
         if i in before:
             keep_own(drawing, i, each, before[i], stream.placed)
             place_splats(drawing, i, obj, each)
         tinted = any(colored.untinted for colored in each.colored)
-        if obj.model.sh.shape[1] > 1 or each.grade is not None or tinted or obj.tint is not None:
+        if stream.follows_eye or each.grade is not None or tinted or obj.tint is not None:
             for colored in each.colored:
                 colored.tint, colored.untinted = None, ()  # what lay under it lies elsewhere now
             forget_colors(each.colored)

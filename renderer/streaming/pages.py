@@ -1,5 +1,6 @@
 """Which leaf lies in which pages of the arena, at which level."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,3 +80,16 @@ def fill_pages(part: LeafSplats, which: np.ndarray, owner: np.ndarray) -> Filled
         picked(part.wxyz), opacity, picked(part.sh),
     )  # fmt: skip
     return Filled(np.repeat(owner, pages), splats)
+
+
+def together(parts: Sequence[Filled]) -> tuple[np.ndarray, LeafSplats]:
+    """The owners of the pages of all parts, and their splats; of the most harmonics among them."""
+    most = max(part.splats.sh.shape[1] for part in parts)
+
+    def column(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part.splats, name) for part in parts])
+
+    sh = [np.pad(p.splats.sh, ((0, 0), (0, most - p.splats.sh.shape[1]), (0, 0))) for p in parts]
+    names = ("leaves", "levels", "counts", "means", "scales", "wxyz", "opacity")
+    splats = LeafSplats(*map(column, names), np.concatenate(sh))
+    return np.concatenate([part.owner for part in parts]), splats

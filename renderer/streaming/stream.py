@@ -17,7 +17,14 @@ from shapeshift.renderer.settings import StreamStats
 from shapeshift.renderer.streaming.ahead import views_ahead
 from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, steps_of
 from shapeshift.renderer.streaming.fetch import Fetcher
-from shapeshift.renderer.streaming.pages import ROOM, PageTable, fill_pages, pages_needed
+from shapeshift.renderer.streaming.pages import (
+    ROOM,
+    Filled,
+    PageTable,
+    fill_pages,
+    pages_needed,
+    together,
+)
 from shapeshift.renderer.streaming.seen import Look
 from shapeshift.renderer.streaming.sight import Sight, sight_of
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
@@ -30,6 +37,7 @@ CHANGED = 0.05  # of the budget: what a frame in motion may upload, in splats
 EACH = 8  # frames, one in so many looks ahead
 BESIDE = 1e-6  # pixels that a leaf beside the picture counts: last, and the coarsest of all
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
+AT_ONCE = 1 << 16  # splats that are uploaded together
 LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
 
 
@@ -70,6 +78,8 @@ class Stream:
         self._pages = pages_for(self._finest, self._left)
         coefficients = max(source.coefficients for source in self._sources)
         drawing.allocate_pages(list(models), self._pages, coefficients)
+        self.follows_eye = coefficients > 1  # then its colours are decoded a frame
+        self._waiting: list[tuple[np.ndarray, Filled]] = []  # pages that are still to be written
         self._table = PageTable(self._pages, int(self._first[-1]))
         self._weights = Weights(int(self._first[-1]), self._look())
         self._fetcher = Fetcher()
@@ -280,6 +290,9 @@ class Stream:
                 there = place[copy_of] >= 0
                 which = place[copy_of][there]
                 self._place(part, which, leaves[mine][there])
+        self._flush()
+        if not self.follows_eye:
+            self._drawing.shade_pages(self.placed)
 
     def _read(
         self, source: LeafSource, leaves: np.ndarray, levels: np.ndarray
@@ -296,16 +309,19 @@ class Stream:
         needed = np.cumsum(pages_needed(part.counts[which]))
         fit = int(np.searchsorted(needed, self._table.room, side="right"))
         which, leaves = which[:fit], leaves[:fit]
-        if not len(which):
-            return
         owner = np.array(self.objects)[self._object[leaves]]
-        filled = fill_pages(part, which, owner)
         pages = self._table.take(leaves, part.levels[which], part.counts[which])
-        self.placed = np.union1d(self.placed, pages)
+        self._waiting.append((pages, fill_pages(part, which, owner)))
+        if sum(len(each) for each, _ in self._waiting) * PAGE >= AT_ONCE:
+            self._flush()
+
+    def _flush(self) -> None:
+        """Uploads what waits: few large writes instead of one a file."""
+        pages = np.concatenate([np.zeros(0, np.int64), *(each for each, _ in self._waiting)])
         if len(pages):
-            self._drawing.place_pages(pages, filled.owner, filled.splats)
-            if part.sh.shape[1] == 1:
-                self._drawing.shade_pages(pages)
+            self._drawing.place_pages(pages, *together([filled for _, filled in self._waiting]))
+            self.placed = np.union1d(self.placed, pages)
+        self._waiting.clear()
 
     def close(self) -> None:
         self._fetcher.close()

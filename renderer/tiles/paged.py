@@ -25,7 +25,7 @@ class PagedRows:
         self.rows = slice(first, first + PAGE * pages)
         self.owner = np.full(pages, -1, np.int32)  # object of each page
         self._sh = device.zeros((PAGE // 8 * pages, 3 * coefficients, 8))
-        self.follows_eye = coefficients > 1
+        self._coefficients = coefficients
 
     def place(
         self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats,
@@ -45,7 +45,9 @@ class PagedRows:
         index = device.upload(np.repeat(owner.astype(np.int32), PAGE))
         for rows, array in zip((mean_opacity, covariance, index), arena, strict=True):
             scatter_pages(device, rows, at, array)
-        scatter_pages(device, upload_sh(device, given.sh), pages, self._sh)
+        more = self._coefficients - given.sh.shape[1]  # other scenes have higher degrees
+        sh = np.pad(given.sh, ((0, 0), (0, more), (0, 0)))
+        scatter_pages(device, upload_sh(device, sh), pages, self._sh)
         self.owner[pages] = owner
         device.queue.finish()
 

@@ -28,6 +28,7 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
 )
 from shapeshift.runtime_models.splats.sog.sog_chunk import SogChunk
 
+AT_ONCE = 1 << 16  # splats that are converted together: some 100 bytes each for a moment
 FARTHEST = 1e12  # metres of a box; as of a scene
 
 
@@ -131,11 +132,13 @@ class StreamedLeaves:
     def _runs(
         self, leaves: np.ndarray, levels: np.ndarray
     ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """(file, its leaves, their levels), file by file."""
-        files = self.part[leaves, levels]
+        """(file, its leaves, their levels), file by file, AT_ONCE splats or a leaf at a time."""
+        files, counts = self.part[leaves, levels], self.levels.counts[leaves, levels]
         for file in np.unique(files):
-            mine = files == file
-            yield int(file), leaves[mine], levels[mine]
+            mine = np.flatnonzero(files == file)
+            block = (np.cumsum(counts[mine]) - counts[mine]) // AT_ONCE
+            for rows in np.split(mine, np.flatnonzero(np.diff(block)) + 1):
+                yield int(file), leaves[rows], levels[rows]
 
     def _chunk(self, file: int) -> SogChunk:
         """A file's pictures.  Raises BadFile, then and ever after."""
