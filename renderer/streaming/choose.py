@@ -1,7 +1,7 @@
 """choose: which level of detail each leaf is drawn at, within a budget of splats.
 
 Every step of a leaf to a finer level is worth the error that it removes, times the pixels that the
-leaf is seen in, over the splats that it adds.  Steps are taken best first, until one does not fit.
+leaf is seen in, over the splats that it adds.  Upgrades are taken best first, until one does not fit.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ KEPT = 1.15  # times its worth counts a step that is taken already, so that leve
 
 
 @dataclass(frozen=True)
-class Steps:
+class Upgrades:
     """What a budget can be spent on, of all leaves; a leaf's own in their order."""
 
     coarsest: np.ndarray  # (L,) level that a leaf begins with
@@ -26,7 +26,7 @@ class Steps:
     gain: np.ndarray  # (S,) error that it removes, a splat; falling within a leaf
 
 
-def steps_of(levels: LeafLevels) -> Steps:
+def steps_of(levels: LeafLevels) -> Upgrades:
     """The lower convex hull of each leaf's errors over its counts: what lies above it, no budget
     would stop at.  The finest level is always reached, and no finer level counts as a worse one.
     """
@@ -52,10 +52,10 @@ def steps_of(levels: LeafLevels) -> Steps:
         now[left] = best
     if not parts:
         nothing = np.zeros(0, np.int64)
-        return Steps(levels.coarsest, base_of(levels), nothing, nothing, nothing, np.zeros(0))
+        return Upgrades(levels.coarsest, base_of(levels), nothing, nothing, nothing, np.zeros(0))
     leaf, level, more, gain = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.argsort(leaf, kind="stable")
-    return Steps(levels.coarsest, base_of(levels), leaf[order], level[order], more[order],
+    return Upgrades(levels.coarsest, base_of(levels), leaf[order], level[order], more[order],
                  gain[order])  # fmt: skip
 
 
@@ -64,7 +64,7 @@ def base_of(levels: LeafLevels) -> np.ndarray:
     return levels.counts[np.arange(len(levels.counts)), levels.coarsest].astype(np.int64)
 
 
-def joined(each: list[Steps]) -> Steps:
+def joined(each: list[Upgrades]) -> Upgrades:
     """The steps of several objects; leaves are numbered on."""
     first = np.cumsum([0, *(len(steps.base) for steps in each)])
     moved = [steps.leaf + start for steps, start in zip(each, first[:-1], strict=True)]
@@ -72,14 +72,14 @@ def joined(each: list[Steps]) -> Steps:
     def column(name: str) -> np.ndarray:
         return np.concatenate([getattr(steps, name) for steps in each])
 
-    return Steps(
+    return Upgrades(
         column("coarsest"), column("base"), np.concatenate(moved), column("level"), column("more"),
         column("gain"),
     )  # fmt: skip
 
 
 def choose(
-    steps: Steps, weight: np.ndarray, budget: int, held: np.ndarray | None = None
+    steps: Upgrades, weight: np.ndarray, budget: int, held: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """(L,) levels, NOT_DRAWN where a leaf is not wanted, and (L,) what the last step of each is
     worth.  Together they never have more than `budget` splats.
@@ -104,7 +104,7 @@ def choose(
         at = held[steps.leaf]
         value = np.where((at != NOT_DRAWN) & (at <= steps.level), KEPT * value, value)
     rows = np.flatnonzero(mine)
-    # Steps of no gain come last, and within a leaf they keep their order.
+    # Upgrades of no gain come last, and within a leaf they keep their order.
     rows = rows[np.argsort(-value[rows], kind="stable")]
     rows = rows[: int(np.searchsorted(np.cumsum(steps.more[rows]), left, side="right"))]
     level[steps.leaf[rows]] = steps.level[rows]  # of several of a leaf the last one stays

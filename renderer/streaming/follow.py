@@ -22,7 +22,7 @@ class Streaming:
 
     def __init__(self, drawing: Drawing) -> None:
         self._drawing = drawing
-        self._stream: Stream | None = None
+        self.stream: Stream | None = None
         self.converges = True  # a frame waits for all that it wants; False: it is one of many
 
     def allocate(self, models: list[Model], budget: int) -> None:
@@ -32,38 +32,38 @@ class Streaming:
         """
         self.close()
         if any(map(has_leaves, models)):
-            self._stream = Stream(self._drawing, models, budget)
+            self.stream = Stream(self._drawing, models, budget)
         else:
             self._drawing.allocate(models)
 
     def differs(self, budget: int) -> bool:
         """Whether room was made for another budget."""
-        return self._stream is not None and budget not in (0, self._stream.budget)
+        return self.stream is not None and budget not in (0, self.stream.budget)
 
     @property
     def stats(self) -> StreamStats | None:
         """Of the last frame."""
-        return self._stream.stats if self._stream is not None else None
+        return self.stream.stats if self.stream is not None else None
 
     @property
     def due(self) -> bool:
         """Whether another frame of the same views would show more."""
-        return self._stream is not None and self._stream.due
+        return self.stream is not None and self.stream.due
 
     def follow(
         self, scene: Scene, decoded: Sequence[DecodedObject], views: Sequence[View],
         timer: PassTimer,
     ) -> None:  # fmt: skip
         """What the views want is there afterwards, or on its way.  Raises BadFile."""
-        if self._stream is not None:
-            self._stream.converges = self.converges
+        if self.stream is not None:
+            self.stream.converges = self.converges
             with timer.time("stream", on_gpu=False):
-                follow(self._drawing, self._stream, scene, decoded, views)
+                follow(self._drawing, self.stream, scene, decoded, views)
 
     def close(self) -> None:
-        if self._stream is not None:
-            self._stream.close()
-        self._stream = None
+        if self.stream is not None:
+            self.stream.close()
+        self.stream = None
 
 
 def follow(

@@ -29,7 +29,7 @@ class PageTable:
         self.level[leaves], self.splats[leaves] = NOT_DRAWN, 0
         return pages
 
-    def take(self, leaves: np.ndarray, levels: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    def reserve(self, leaves: np.ndarray, levels: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """Pages for so many splats of each leaf (n,), one leaf after the other.
 
         ValueError where there are not as many free.

@@ -16,7 +16,7 @@ WIDEST = math.radians(80)  # from straight on; wider pictures have no tangents
 
 
 @dataclass(frozen=True)
-class Sight:
+class LeafSight:
     """Of the leaves of one object."""
 
     held: np.ndarray  # (L,) bool: a view may show it
@@ -25,7 +25,7 @@ class Sight:
     distance: np.ndarray  # (L,) metres from the eye to its box
 
 
-def sight_of(levels: LeafLevels, world_from_object: np.ndarray, views: Sequence[View]) -> Sight:
+def sight_of(levels: LeafLevels, world_from_object: np.ndarray, views: Sequence[View]) -> LeafSight:
     """In any of the views; world_from_object (4, 4), rigid."""
     middle, half = (levels.high + levels.low) / 2, (levels.high - levels.low) / 2
     shape = (len(middle),)
@@ -42,7 +42,7 @@ def sight_of(levels: LeafLevels, world_from_object: np.ndarray, views: Sequence[
         focal = view.size[0] / (view.tangents[1] - view.tangents[0])
         pixels = (focal * radius / np.maximum(away, 0.3 * radius + view.near)) ** 2
         cover = np.maximum(cover, np.minimum(pixels, view.size[0] * view.size[1]))
-    return Sight(held, wide | held, cover, distance)
+    return LeafSight(held, wide | held, cover, distance)
 
 
 def _inside(

@@ -26,7 +26,7 @@ from shapeshift.renderer.streaming.pages import (
     together,
 )
 from shapeshift.renderer.streaming.seen import Look
-from shapeshift.renderer.streaming.sight import Sight, sight_of
+from shapeshift.renderer.streaming.sight import LeafSight, sight_of
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
 from shapeshift.runtime_models.leaf_levels import LeafSource, LeafSplats
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
@@ -69,7 +69,7 @@ class Stream:
         made = {id(source): steps_of(source.levels) for source in self._sources}
         self._steps = joined([made[id(source)] for source in self._sources])
         sizes = [len(source.part) for source in self._sources]
-        self._first = np.concatenate([[0], np.cumsum(sizes, dtype=int)])
+        self.first = np.concatenate([[0], np.cumsum(sizes, dtype=int)])
         self._object = np.repeat(np.arange(len(sizes)), sizes)  # of each leaf, in self.objects
         self._every_count = every_count(self._sources)  # (L, K) splats
         pairs = zip(self._models, self._sources, strict=True)
@@ -80,8 +80,8 @@ class Stream:
         drawing.allocate_pages(list(models), self._pages, coefficients)
         self.follows_eye = coefficients > 1  # then its colours are decoded a frame
         self._waiting: list[tuple[np.ndarray, Filled]] = []  # pages that are still to be written
-        self._table = PageTable(self._pages, int(self._first[-1]))
-        self._weights = Weights(int(self._first[-1]), self._look())
+        self.table = PageTable(self._pages, int(self.first[-1]))
+        self.weights = Weights(int(self.first[-1]), self._look())
         self._fetcher = Fetcher()
         self._last: tuple = ()  # the views and poses that all is there for
         self.placed = np.zeros(0, np.int64)  # pages that were filled for the last frame
@@ -98,7 +98,7 @@ class Stream:
         except NoDevice as reason:
             logging.getLogger("renderer").warning(f"What is hidden counts as seen: {reason}")
             return None
-        return Look(device, self._models, self._first)
+        return Look(device, self._models, self.first)
 
     def follow(self, scene: Scene, views: Sequence[View]) -> list[int]:
         """Puts in what these views want; the objects whose splats have changed.
@@ -114,20 +114,20 @@ class Stream:
             return []
         self._views = (self._views[1], views)
         self._poses, self._shown = poses, shown
-        sight = self._sight(poses, shown, views)
-        weight = self._weights.of(sight, views, poses, shown, fresh=self.converges)
+        sight = self.find_sight(poses, shown, views)
+        weight = self.weights.of(sight, views, poses, shown, fresh=self.converges)
         wanted, worth = self._choose(weight, sight)
         changed = self._change(wanted, worth)
         self._last = now
-        splats = int(self._table.splats[changed].sum())
-        pending = bool((wanted != self._table.level).any())
+        splats = int(self.table.splats[changed].sum())
+        pending = bool((wanted != self.table.level).any())
         self.stats = self._stats(splats, pending, int(self._finest[sight.held].sum()))
         return sorted({self.objects[i] for i in np.unique(self._object[changed])})
 
-    def _choose(self, weight: np.ndarray, sight: Sight) -> tuple[np.ndarray, np.ndarray]:
+    def _choose(self, weight: np.ndarray, sight: LeafSight) -> tuple[np.ndarray, np.ndarray]:
         """Levels of all leaves that fit the budget and the pages, and what each is worth."""
         beside = sight.wide & (weight <= 0) & (not self.converges)
-        held = None if self.converges else self._table.level
+        held = None if self.converges else self.table.level
         left = self._left
         while True:
             level, worth = choose(self._steps, np.where(beside, BESIDE, weight), left, held)
@@ -150,7 +150,7 @@ class Stream:
         kinds = self._every_count.shape[1]
         numbers = np.arange(kinds)
         there = np.zeros(self._every_count.shape, bool)
-        for source, first, mask in zip(self._sources, self._first, parts, strict=False):
+        for source, first, mask in zip(self._sources, self.first, parts, strict=False):
             own = source.levels.counts
             there[first : first + len(own), : own.shape[1]] = mask[source.part] & (own > 0)
         there |= numbers == self._steps.coarsest[:, None]
@@ -159,12 +159,14 @@ class Stream:
 
     def _stats(self, changed: int, pending: bool, in_sight: int) -> StreamStats:
         problem = next((source.problem for source in self._sources if source.problem), "")
-        shown = int(self._table.splats.sum())
+        shown = int(self.table.splats.sum())
         return StreamStats(
             self.budget, shown, in_sight, self.stats.whole, changed, pending, problem
         )
 
-    def _sight(self, poses: list[np.ndarray], shown: list[bool], views: Sequence[View]) -> Sight:
+    def find_sight(
+        self, poses: list[np.ndarray], shown: list[bool], views: Sequence[View]
+    ) -> LeafSight:
         """Of all leaves, one object after the other."""
         each = [sight_of(s.levels, p, views) for s, p in zip(self._sources, poses, strict=True)]
         held, wide, cover, distance = (
@@ -172,11 +174,11 @@ class Stream:
             for name in ("held", "wide", "cover", "distance")
         )
         there = np.array(shown)[self._object]
-        return Sight(held & there, wide & there, cover, distance)
+        return LeafSight(held & there, wide & there, cover, distance)
 
     def _change(self, wanted: np.ndarray, worth: np.ndarray) -> np.ndarray:
         """Brings the arena nearer to the wanted levels; the leaves that changed."""
-        table, level = self._table, wanted
+        table, level = self.table, wanted
         gone = np.flatnonzero((wanted == NOT_DRAWN) & (table.level != NOT_DRAWN))
         pages = [table.free(gone)]
         due = np.flatnonzero(wanted != table.level)
@@ -200,9 +202,9 @@ class Stream:
         """Parts that are wanted and not at hand, what is worth most first."""
         found: dict[tuple[int, int], float] = {}
         sources = {id(source): source for source in self._sources}
-        for source, first, there in zip(self._sources, self._first, at_hand, strict=False):
+        for source, first, there in zip(self._sources, self.first, at_hand, strict=False):
             own = slice(first, first + len(source.part))
-            rows = np.flatnonzero((wanted[own] >= 0) & (wanted[own] != self._table.level[own])
+            rows = np.flatnonzero((wanted[own] >= 0) & (wanted[own] != self.table.level[own])
                                   & (wanted[own] != self._steps.coarsest[own]))  # fmt: skip
             parts = source.part[rows, wanted[own][rows]]
             most = np.zeros(len(there))
@@ -221,8 +223,8 @@ class Stream:
         views = views_ahead(*self._views)
         if not views:
             return []
-        sight = self._sight(self._poses, self._shown, views)
-        weight = np.where(sight.held, self._weights.guessed(sight), 0.0)
+        sight = self.find_sight(self._poses, self._shown, views)
+        weight = np.where(sight.held, self.weights.guessed(sight), 0.0)
         wanted, worth = choose(self._steps, weight, self._left)
         return self._missing(wanted, worth, at_hand)
 
@@ -242,7 +244,7 @@ class Stream:
         What comes into sight comes at its coarsest at least, and what has to go for it goes; finer
         ones, best first, until CHANGED of the budget is uploaded.  Never more than the budget.
         """
-        table, base = self._table, self._steps.base
+        table, base = self.table, self._steps.base
         counts, there, now = self._counts(level), table.splats, table.level
         new = due[now[due] == NOT_DRAWN]
         downs = due[level[due] > now[due]]
@@ -279,7 +281,7 @@ class Stream:
         object_of = self._object[leaves]
         for source in {id(source): source for source in self._sources}.values():
             mine = np.flatnonzero(numbers[object_of] == id(source))
-            own = leaves[mine] - self._first[object_of[mine]]
+            own = leaves[mine] - self.first[object_of[mine]]
             kinds = source.levels.counts.shape[1]
             pairs, copy_of = np.unique(own * kinds + levels[mine], return_inverse=True)
             number = {int(pair): n for n, pair in enumerate(pairs)}
@@ -307,10 +309,10 @@ class Stream:
     def _place(self, part: LeafSplats, which: np.ndarray, leaves: np.ndarray) -> None:
         """Some leaves of a part into pages, as many as fit."""
         needed = np.cumsum(pages_needed(part.counts[which]))
-        fit = int(np.searchsorted(needed, self._table.room, side="right"))
+        fit = int(np.searchsorted(needed, self.table.room, side="right"))
         which, leaves = which[:fit], leaves[:fit]
         owner = np.array(self.objects)[self._object[leaves]]
-        pages = self._table.take(leaves, part.levels[which], part.counts[which])
+        pages = self.table.reserve(leaves, part.levels[which], part.counts[which])
         self._waiting.append((pages, fill_pages(part, which, owner)))
         if sum(len(each) for each, _ in self._waiting) * PAGE >= AT_ONCE:
             self._flush()

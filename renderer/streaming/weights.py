@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shapeshift.renderer.streaming.seen import Look
-from shapeshift.renderer.streaming.sight import Sight
+from shapeshift.renderer.streaming.sight import LeafSight
 from shapeshift.scene.pose import View
 
 FLOOR = 4.0  # pixels: of a leaf that is in the picture, but hidden
@@ -30,7 +30,7 @@ class Weights:
         self._age = 0  # frames
 
     def of(
-        self, sight: Sight, views: Sequence[View], poses: Sequence[np.ndarray],
+        self, sight: LeafSight, views: Sequence[View], poses: Sequence[np.ndarray],
         shown: Sequence[bool], fresh: bool,
     ) -> np.ndarray:  # fmt: skip
         """(L,) pixels, 0 of what is in no picture.  fresh: a look of these views and nothing else.
@@ -45,7 +45,7 @@ class Weights:
         pixels = np.where(self._known, self.pixels, self.guessed(sight))
         return np.where(sight.held, np.maximum(pixels, FLOOR), 0.0)
 
-    def guessed(self, sight: Sight) -> np.ndarray:
+    def guessed(self, sight: LeafSight) -> np.ndarray:
         """(L,) pixels by what boxes cover, less what was hidden where a look was had."""
         both = self._known & sight.held
         seen, cover = self.pixels[both].sum(), sight.cover[both].sum()
@@ -67,7 +67,7 @@ class Weights:
         return self._poses != bytes_of(poses) and self._age >= PATIENCE
 
     def _look_again(
-        self, sight: Sight, views: Sequence[View], poses: Sequence[np.ndarray],
+        self, sight: LeafSight, views: Sequence[View], poses: Sequence[np.ndarray],
         shown: Sequence[bool], fresh: bool,
     ) -> None:  # fmt: skip
         assert self._look is not None

@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 from typing import Generic, Protocol, TypeVar
 
 
-class Part(Protocol):
+class CachedPart(Protocol):
     """What is kept."""
 
     size: int  # bytes
@@ -15,7 +15,7 @@ class Part(Protocol):
         """Called once nobody will be given it any more."""
 
 
-P = TypeVar("P", bound=Part)
+P = TypeVar("P", bound=CachedPart)
 
 
 class PartCache(Generic[P]):

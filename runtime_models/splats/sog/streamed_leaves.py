@@ -41,7 +41,7 @@ class StreamedLeaves:
         nodes = [leaf for leaf in streamed.leaves if any(run.count for run in leaf[1].values())]
         self.budget = reading.leaves.budget
         self.problem = ""
-        self._cache, self._reading = reading.leaves.cache, reading
+        self.cache, self._reading = reading.leaves.cache, reading
         self._ours = ours_from_file(reading.up or COLMAP_UP, reading.flip)
         self._origin, self._antialiased = (0.0, 0.0, 0.0), False
         files = [*streamed.files]
@@ -117,7 +117,7 @@ class StreamedLeaves:
         )  # fmt: skip
 
     def at_hand(self) -> np.ndarray:
-        return np.array([(*self._key, n) in self._cache for n in range(len(self._files))])
+        return np.array([(*self._key, n) in self.cache for n in range(len(self._files))])
 
     def broken(self) -> np.ndarray:
         return self._broken
@@ -148,7 +148,7 @@ class StreamedLeaves:
             return SogChunk(path, self._reading.account)
 
         try:
-            return self._cache.get((*self._key, file), decode)
+            return self.cache.get((*self._key, file), decode)
         except (BadFile, OSError) as error:
             self._broken[file] = True
             where = path.relative_to(self._folder).as_posix()

@@ -49,8 +49,8 @@ def test_the_first_frame_has_the_coarsest_of_all_that_is_in_sight(moving, folder
     model = open_levels(folder, BUDGET)
     moving.update(scene_of(model))
     stats = moving.draw([view_at()]).streaming
-    held = moving.streaming._stream._sight([np.eye(4)], [True], [view_at()]).held
-    assert (moving.streaming._stream._table.level[held] >= 0).all()
+    held = moving.streaming.stream.find_sight([np.eye(4)], [True], [view_at()]).held
+    assert (moving.streaming.stream.table.level[held] >= 0).all()
     assert stats.pending and stats.shown >= model.splat_count * held.mean() * 0.5
 
 
@@ -65,8 +65,8 @@ def test_a_view_that_rests_becomes_what_a_still_picture_has(moving, folder):
     with Renderer(None, "tiles") as still:
         still.update(scene_of(open_levels(folder, BUDGET)))
         still.draw([view])
-        expected, held = still.image(0), still.streaming._stream._table
-    table = moving.streaming._stream._table
+        expected, held = still.image(0), still.streaming.stream.table
+    table = moving.streaming.stream.table
     drawn = held.level >= 0
     assert (table.level[drawn] == held.level[drawn]).mean() > 0.9
     with Renderer(None, "tiles") as other:
@@ -80,11 +80,11 @@ def test_in_motion_few_change_and_never_more_than_the_budget(moving, folder, mon
     monkeypatch.setattr(module, "CHANGED", 0.1)
     moving.update(scene_of(open_levels(folder, BUDGET)))
     rest(moving, orbit(1)[0])
-    stream: Stream = moving.streaming._stream
+    stream: Stream = moving.streaming.stream
     for view in orbit(60):
-        before = stream._table.level.copy()
+        before = stream.table.level.copy()
         stats = moving.draw([view]).streaming
-        table = stream._table
+        table = stream.table
         assert table.splats.sum() == stats.shown <= BUDGET
         uploaded = np.flatnonzero((table.level != before) & (table.level >= 0))
         # What comes into sight is there at once, and at least one leaf gets finer.
@@ -102,7 +102,7 @@ def test_what_is_in_the_arena_is_what_the_table_says(moving, folder):
     moving.update(scene_of(model))
     for view in orbit(40):
         moving.draw([view])
-    table, drawing = moving.streaming._stream._table, moving.drawing
+    table, drawing = moving.streaming.stream.table, moving.drawing
     mean_opacity, _, _ = drawing.splat_points()
     rows = mean_opacity.reshape(-1, 32, 4)
     assert not rows[table.leaf_of < 0][..., 3].any()
@@ -129,7 +129,7 @@ def test_pages_of_many_files_come_through_a_cache_that_holds_one(moving, folder)
     moving.update(scene_of(model))
     moving.streaming.converges = True
     stats = moving.draw([view_at()]).streaming
-    assert stats.shown > 0.9 * BUDGET and model.leaves._cache.taken <= 1
+    assert stats.shown > 0.9 * BUDGET and model.leaves.cache.taken <= 1
 
 
 def test_steps_lead_on():

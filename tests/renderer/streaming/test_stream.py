@@ -89,16 +89,16 @@ def test_what_a_wall_hides_gets_its_floor_alone(tiles, wall):
     """
     model = open_levels(wall, 4000)
     drawn(tiles, scene_of(model), view_at((0, 0, 7), fov_y=1.4, size=(240, 120)))
-    stream: Stream = tiles.streaming._stream
+    stream: Stream = tiles.streaming.stream
     middle = (model.leaves.levels.low + model.leaves.levels.high) / 2
     behind = (middle[:, 2] < 0) & (middle[:, 0] < 0.2)
     beside = (middle[:, 2] < 0) & (middle[:, 0] > 2.6)
-    level, coarsest = stream._table.level, model.leaves.levels.coarsest
+    level, coarsest = stream.table.level, model.leaves.levels.coarsest
     assert (level[behind] == coarsest[behind]).mean() > 0.9
     assert level[beside].min() <= coarsest.max() - 2
-    splats = stream._table.splats
+    splats = stream.table.splats
     assert splats[beside].sum() > 2 * splats[behind].sum()
-    seen = stream._weights.pixels
+    seen = stream.weights.pixels
     assert seen[behind].sum() < 0.03 * seen[beside].sum()
     assert seen.sum() <= 1.6 * 240 * 120  # a pixel's splats give 1 in all; the look is wider
 
@@ -125,10 +125,10 @@ def test_objects_share_one_budget_and_copies_the_files(tiles, folder):
     scene = replace(scene_of(model), objects=(one, replace(two, world_from_object=far)))
     _, stats = drawn(tiles, scene, view_at())
     assert stats.streaming.shown <= 3000 and stats.streaming.whole == 8000
-    stream = tiles.streaming._stream
-    per_object = [stream._table.splats[a:b].sum() for a, b in pairwise(stream._first)]
+    stream = tiles.streaming.stream
+    per_object = [stream.table.splats[a:b].sum() for a, b in pairwise(stream.first)]
     assert per_object[0] > 2 * per_object[1] > 0
-    assert model.leaves._cache.decoded <= model.leaves.part.max() + 1
+    assert model.leaves.cache.decoded <= model.leaves.part.max() + 1
     _, stats = drawn(tiles, scene, view_at(), view_at((0.06, 0.5, 6)))  # two eyes
     assert stats.streaming.shown <= 3000
 

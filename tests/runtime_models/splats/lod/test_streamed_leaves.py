@@ -74,11 +74,11 @@ def test_a_file_is_decoded_once_while_it_is_kept_and_again_when_not(folder):
     leaf = np.arange(1)
     for _ in range(3):
         list(source.read(leaf, leaf))
-    assert source._cache.decoded == 2  # of the coarsest level, and of the finest
+    assert source.cache.decoded == 2  # of the coarsest level, and of the finest
     tight = open_levels(folder, 0, cache=1).leaves
     for _ in range(3):
         list(tight.read(leaf, leaf))
-    assert tight._cache.decoded == 4 and tight._cache.taken == 0
+    assert tight.cache.decoded == 4 and tight.cache.taken == 0
 
 
 def test_no_errors_in_the_tree_count_by_how_many_fewer_splats_there_are(copied):
