@@ -1,7 +1,8 @@
 """choose: which level of detail each leaf is drawn at, within a budget of splats.
 
 Every step of a leaf to a finer level is worth the error that it removes, times the pixels that the
-leaf is seen in, over the splats that it adds.  Upgrades are taken best first, until one does not fit.
+leaf is seen in, over the splats that it adds.  Steps are taken best first, until
+one does not fit.
 """
 
 from dataclasses import dataclass
