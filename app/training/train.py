@@ -2,6 +2,7 @@
 
 import shlex
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,7 @@ from shapeshift.app.training.run_loop import (
 from shapeshift.app.training.train_options import Options, settings_of
 
 if TYPE_CHECKING:
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
 USUAL_STEPS = 2000  # those of TrainSettings
@@ -36,7 +38,7 @@ def run(options: Options) -> int:
         memory_for_training,
         save,
         save_checkpoint,
-        saved_when_memory_ends,
+        saved_when_it_fails,
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
@@ -50,10 +52,11 @@ def run(options: Options) -> int:
     from shapeshift.training.train import Trainer
 
     check_calibrate(options)
+    room = room_of(options)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
-        return run_baseline(options)
+        return run_baseline(options, replace(room, folder=None))
     check_plain_options(options)
     check_writable(options.out)  # now, not after the training
     refuse_foreign(options.out)
@@ -67,11 +70,11 @@ def run(options: Options) -> int:
         settings = calibrated(device, capture, settings, options.calibrate)
     with memory_for_training(), working(READING) as shown:
         given = with_extrinsics(capture, settings.rig)
-        trainer = Trainer(device, given, settings, resume, report=shown)
+        trainer = Trainer(device, given, settings, resume, report=shown, room=room)
     say(describe(trainer), *trainer.warnings)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     began, before = time.monotonic(), trainer.iteration
-    with saved_when_memory_ends(trainer, options.out, checkpoint):
+    with saved_when_it_fails(trainer, options.out, checkpoint):
         interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
     step_s = (time.monotonic() - began) / max(trainer.iteration - before, 1)
     save(trainer, options.out, checkpoint)
@@ -85,7 +88,21 @@ def run(options: Options) -> int:
         say(*found)
     for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
+    trainer.photos.close(keep=interrupted)
     return INTERRUPTED if interrupted else 0
+
+
+def room_of(options: Options) -> "PhotoRoom":
+    """Where the photos may lie.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.saving import photos_path
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
+
+    megabytes = options.photo_mb
+    if megabytes is not None and not 0 < megabytes < float("inf"):
+        raise UsageError(f"--photo-mb is {megabytes}, expected MB above 0.")
+    most = None if megabytes is None else int(megabytes * 1e6)
+    return PhotoRoom(most, photos_path(options.out))
 
 
 def check_calibrate(options: Options) -> None:

@@ -48,6 +48,10 @@ class Options(MachineOptions):
         default_factory=dict
     )
     splats: Annotated[Asked, FieldsOf(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
+    photo_mb: Annotated[float | None, EXPERT] = None
+    """MB of memory that photos may take.  What does not fit is kept in NAME.photos beside --out
+    until the training is done, and read from there as it is needed: the scene is the same to the
+    byte.  Default: half of --memory."""
     resume: bool = False
     """Continue from the checkpoint with its settings; --iterations or --seconds may be larger."""
     calibrate: Annotated[str | None, MODALITY] = None

@@ -1,16 +1,20 @@
 """Tiles of scenes with models in levels of detail: their splats lie in pages of the arena."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.limits import arena_rows
+from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.tiles.paged import PagedRows
 from shapeshift.renderer.tiles.tiles import TilesDrawing
 from shapeshift.runtime_models.leaf_levels import LeafSplats
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
+from shapeshift.scene.pose import View
 
 NO_EYE = np.zeros(3)  # for colours that look alike from everywhere
 
@@ -33,16 +37,15 @@ class PagedTiles(TilesDrawing):
         self._is_paged = tuple(getattr(model, "leaves", None) is not None for model in models)
 
     def place_pages(self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats) -> None:
-        arena = (self._mean_opacity, self._covariance, self._object_index)
-        self._pages.place(pages, owner, given, arena)
-        self._changed = True
+        self._pages.place(pages, owner, given, self._arena)
+        self._splats_moved()
 
     def pages_of(self, i: int) -> np.ndarray:
         return self._pages.pages_of(i)
 
     def clear_pages(self, pages: np.ndarray) -> None:
         self._pages.clear(pages, self._mean_opacity)
-        self._changed = True
+        self._splats_moved()
 
     def shade_pages(self, pages: np.ndarray) -> None:
         for color in self._colors:
@@ -72,6 +75,11 @@ class PagedTiles(TilesDrawing):
         if grade is not None:
             pages.grade(i, self._color, grade)
 
+    def seen_splats(
+        self, i: int, views: Sequence[View], settings: RenderSettings
+    ) -> np.ndarray | None:
+        return None if self._is_paged[i] else super().seen_splats(i, views, settings)
+
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         if not self._is_paged[i]:
             return super().read_splats(i)
@@ -86,7 +94,7 @@ class PagedTiles(TilesDrawing):
         self._pages.write(i, mean_opacity, self._mean_opacity)
         if covariance is not None:
             self._pages.write(i, covariance, self._covariance)
-        self._changed = True
+        self._splats_moved()
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
         if not self._is_paged[i]:
