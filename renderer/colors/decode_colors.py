@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from shapeshift.renderer.colors.color_cache import color_key, forget_colors
-from shapeshift.renderer.colors.false_colors import FalseColors, false_colors
+from shapeshift.renderer.colors.color_cache import color_key
 from shapeshift.renderer.colors.tint import tinted
-from shapeshift.renderer.colors.two_looks import Look, grade_of
+from shapeshift.renderer.colors.two_looks import Look
 from shapeshift.renderer.colors.wanted import wanted_anchors, wanted_of_follower, wanted_splats
 from shapeshift.renderer.cut import place_splats, restore_shapes
 from shapeshift.renderer.decoded_object import DecodedObject
@@ -63,17 +62,3 @@ def decode_colors(
                 drawing.decode_color(i, shade, eye, wanted, at_once, grade)
                 ran[1] += 1
     return ran[0], ran[1]
-
-
-def shades_of(objects: list[DecodedObject], scene: Scene, before: FalseColors) -> FalseColors:
-    """Where palettes belong now; objects whose shade or grade is another one lose their colours."""
-    colors = false_colors(scene, [decoded.x for decoded in objects])
-    for decoded, shade in zip(objects, colors.shades, strict=True):
-        if not (before.way == colors.way and shade.same(decoded.shade)):
-            decoded.shade = shade
-            forget_colors(decoded.colored)
-    for decoded, obj in zip(objects, scene.objects, strict=True):
-        if (grade := grade_of(obj, colors)) != decoded.grade:
-            decoded.grade = grade
-            forget_colors(decoded.colored)
-    return colors

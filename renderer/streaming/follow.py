@@ -26,15 +26,20 @@ class Streaming:
         self.converges = True  # a frame waits for all that it wants; False: it is one of many
 
     def allocate(self, models: list[Model], budget: int) -> None:
-        """Room for these objects in the drawing.  budget: 0 for the models' own.
+        """Room for these objects in the drawing, none where they do not fit.  budget: 0 for the
+        models' own.
 
-        Raises BadFile where it leaves nothing for levels of detail.
+        Raises ValueError, as BadFile where the budget leaves nothing for levels of detail.
         """
         self.close()
-        if any(map(has_leaves, models)):
-            self.stream = Stream(self._drawing, models, budget)
-        else:
-            self._drawing.allocate(models)
+        try:
+            if any(map(has_leaves, models)):
+                self.stream = Stream(self._drawing, models, budget)
+            else:
+                self._drawing.allocate(models)
+        except ValueError:
+            self._drawing.allocate([])
+            raise
 
     def differs(self, budget: int) -> bool:
         """Whether room was made for another budget."""

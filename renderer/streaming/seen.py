@@ -22,7 +22,7 @@ PART = 4  # of the picture's sides
 MOST = 1 << 20  # splats of a look; objects beyond are taken by what their boxes cover
 
 
-class Look:
+class CoarseLook:
     """The coarsest levels of a scene's leaves on an OpenCL device."""
 
     def __init__(self, device: Device, models: Sequence[SplatLayers], first: np.ndarray) -> None:

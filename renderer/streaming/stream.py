@@ -25,7 +25,7 @@ from shapeshift.renderer.streaming.pages import (
     pages_needed,
     together,
 )
-from shapeshift.renderer.streaming.seen import Look
+from shapeshift.renderer.streaming.seen import CoarseLook
 from shapeshift.renderer.streaming.sight import LeafSight, sight_of
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
 from shapeshift.runtime_models.leaf_levels import LeafSource, LeafSplats
@@ -92,13 +92,13 @@ class Stream:
         self.stats = StreamStats(self.budget, 0, 0, int(self._finest.sum()), 0, False, "")
         self.converges = True  # each frame gets all that it wants, and forgets the one before
 
-    def _look(self) -> Look | None:
+    def _look(self) -> CoarseLook | None:
         try:
             device: Device = open_device()
         except NoDevice as reason:
             logging.getLogger("renderer").warning(f"What is hidden counts as seen: {reason}")
             return None
-        return Look(device, self._models, self.first)
+        return CoarseLook(device, self._models, self.first)
 
     def follow(self, scene: Scene, views: Sequence[View]) -> list[int]:
         """Puts in what these views want; the objects whose splats have changed.

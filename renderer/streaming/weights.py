@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shapeshift.renderer.streaming.seen import Look
+from shapeshift.renderer.streaming.seen import CoarseLook
 from shapeshift.renderer.streaming.sight import LeafSight
 from shapeshift.scene.pose import View
 
@@ -19,7 +19,7 @@ PATIENCE = 15  # frames between looks where objects move and the eye rests
 class Weights:
     """Pixels of leaves, looked at anew as the eye moves."""
 
-    def __init__(self, leaves: int, look: Look | None) -> None:
+    def __init__(self, leaves: int, look: CoarseLook | None) -> None:
         self.pixels = np.zeros(leaves)
         self._look = look
         self.looks = 0

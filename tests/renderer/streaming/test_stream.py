@@ -106,11 +106,11 @@ def test_what_a_wall_hides_gets_its_floor_alone(tiles, wall):
 def test_pixels_of_leaves_add_up_to_the_coverage(tiles, wall):
     """From outside: sums over the look's leaves are the coverage of the same picture."""
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.renderer.streaming.seen import PART, Look
+    from shapeshift.renderer.streaming.seen import PART, CoarseLook
     from shapeshift.renderer.streaming.sight import look_view
 
     model, view = open_levels(wall, ALL), view_at((0, 0, 7))
-    look = Look(open_device(), [model], np.array([0, len(model.leaves.part)]))
+    look = CoarseLook(open_device(), [model], np.array([0, len(model.leaves.part)]))
     pixels = look.pixels([view], [np.eye(4)], len(model.leaves.part))
     coarse = replace(model, leaves=None)
     (image,), _ = drawn(tiles, scene_of(coarse), look_view([view], PART))
