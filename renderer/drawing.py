@@ -37,7 +37,7 @@ class Drawing(ABC):
         """Room for these objects; what was decoded before is gone."""
 
     def allocate_pages(self, models: list[Model], pages: int, coefficients: int) -> None:
-        """The same, with pages of rasterizer/pages.py for what a budget draws of models with
+        """The same, with pages of rasterizer/paging/pages.py for what a budget draws of models with
         leaves (streaming/); coefficients: harmonics of each of their splats.
         """
         raise BadFile("only tiles draw by a budget; add --drawing tiles, or leave --budget out.")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shapeshift.rasterizer.pages import PAGE
+from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer.colors.color_cache import forget_colors
 from shapeshift.renderer.cut import place_splats
 from shapeshift.renderer.decoded_object import DecodedObject

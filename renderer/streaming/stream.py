@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from shapeshift.rasterizer.device import Device, NoDevice, open_device
-from shapeshift.rasterizer.pages import PAGE
+from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import StreamStats

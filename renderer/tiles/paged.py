@@ -7,7 +7,7 @@ import numpy as np
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.pack import pack
-from shapeshift.rasterizer.pages import PAGE, gather_pages, scatter_pages
+from shapeshift.rasterizer.paging.pages import PAGE, gather_pages, scatter_pages
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.runtime_models.leaf_levels import LeafSplats
 from shapeshift.scene.appearance import Appearance

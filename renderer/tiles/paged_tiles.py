@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shapeshift.rasterizer.pages import PAGE
+from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import RenderSettings

@@ -10,7 +10,7 @@ from shapeshift.rasterizer.device import Device
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-KERNEL = Path(__file__).parent / "kernels" / "pages.cl"
+KERNEL = Path(__file__).parents[1] / "kernels" / "paging" / "pages.cl"
 PAGE = 32  # rows: the coarsest level of a leaf has 32 to 64 splats, and pages are not shared
 GROUP = 64  # work-items
 
