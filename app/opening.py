@@ -18,8 +18,10 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture
 
-LEAST_CACHE, MOST_CACHE = 64, 1 << 20  # MB: a file of half a million splats takes 9 to 20
-LEAST_BUDGET, MOST_BUDGET = 1000, 1_000_000_000  # splats
+LEAST_CACHE = 64  # MB: a file of half a million splats takes 9 to 20
+MOST_CACHE = 1 << 20
+LEAST_BUDGET = 1000  # splats
+MOST_BUDGET = 1_000_000_000
 PATIENCE_S = 1.0  # what takes longer shows a progress bar
 
 
