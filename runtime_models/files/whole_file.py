@@ -106,6 +106,20 @@ def open_lines(path: Path) -> IO[str]:
         return open(path, "w", encoding="utf-8", newline="\n")
 
 
+def open_locked(path: Path) -> IO[str] | None:
+    """A short text file to read and write in place, ours alone while it is open and not removed.
+
+    None while somebody else has it; on Windows everybody gets it.  A link is not followed.
+    """
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+    with naming(path):
+        file = open(os.open(path, flags, 0o666), "r+", encoding="utf-8", newline="\n")
+    if not LOCKS or (lock(file.fileno()) and os.fstat(file.fileno()).st_nlink):
+        return file
+    file.close()
+    return None
+
+
 def make_folders(root: Path, below: Path | str, rights: int = 0o777) -> Path:
     """`root`, which may be a link of the user's, and in it the folders of ours, which may not.
 

@@ -1,0 +1,56 @@
+"""What the tasks of a run are at: one bar over all of them, and their own sentences below it."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from shapeshift.app.cluster.run_task import progress_words
+from shapeshift.app.progress import progress_bar
+
+MOST_SHOWN = 3  # tasks whose words stand beside the bar
+
+
+class Board:
+    """Hears lines of tasks by name; made by `board`."""
+
+    def __init__(self, show: Callable[..., None], say: Callable[[str], None]) -> None:
+        self._show, self._say = show, say
+        self._now: dict[str, str] = {}  # what those under way said last
+
+    def hear(self, name: str, command: str, line: str) -> None:
+        """A line of a task's standard error, or of who runs it."""
+        words = progress_words(line, command)
+        if words is None:
+            self._say(f"{name}: {line}")
+            words = self._now.get(name, "")
+        self._now[name] = words
+        self._update()
+
+    def end(self, name: str) -> None:
+        """The task is done, or has failed."""
+        self._now.pop(name, None)
+        self._update(advance=1)
+
+    def leave(self, name: str) -> None:
+        """The task waits for another attempt."""
+        self._now.pop(name, None)
+        self._update()
+
+    def _update(self, advance: int = 0) -> None:
+        shown = [f"{name}: {words}" if words else name for name, words in self._now.items()]
+        more = f"; {len(shown) - MOST_SHOWN} more" if len(shown) > MOST_SHOWN else ""
+        self._show(description="; ".join(shown[:MOST_SHOWN]) + more, advance=advance)
+
+
+@contextmanager
+def board(count: int, done: int) -> Iterator[Board]:
+    """A bar over so many tasks, of which some are done already."""
+    with progress_bar() as bar:
+        task = bar.add_task("starting", total=count, completed=done)
+
+        def show(**facts) -> None:
+            bar.update(task, **facts)
+
+        def say(text: str) -> None:
+            bar.console.print(text, soft_wrap=True)
+
+        yield Board(show, say)

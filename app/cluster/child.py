@@ -1,0 +1,44 @@
+"""The program as a task: it ends with whoever started it, and keeps what it has by then.
+
+It reads standard input, whose other end its parent holds.  Where that closes, because the parent
+wants so or was killed, this process is interrupted as by Ctrl-C, and after a while for good.
+"""
+
+import os
+import signal
+import sys
+import threading
+import time
+
+GRACE_S = 20.0  # to save what there is
+
+
+def main() -> int:
+    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
+    from shapeshift.app.cli import main as run_program
+
+    return run_program()
+
+
+def end_with_parent() -> None:
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
+    interrupt()
+    time.sleep(GRACE_S)
+    end_group()
+
+
+def interrupt() -> None:
+    if os.name == "nt":
+        import _thread
+
+        _thread.interrupt_main()
+    else:  # the main thread may be asleep
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+
+def end_group() -> None:
+    """This process with all that it has started."""
+    if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
+        os.killpg(os.getpgrp(), signal.SIGKILL)
+    os._exit(1)

@@ -1,0 +1,181 @@
+"""Runs one task in a process of its own, on the machine where this is called."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import IO
+
+from shapeshift.app.cluster.child import GRACE_S
+from shapeshift.app.cluster.task import Task
+from shapeshift.app.errors import UsageError
+from shapeshift.app.program import ROOT, is_installed
+from shapeshift.app.progress import PERIOD
+from shapeshift.runtime_models.files.whole_file import LOCKS, open_locked
+
+START = (
+    "import sys; sys.path[:0] = {paths!r}; "
+    "from shapeshift.app.cluster.child import main; sys.exit(main())"
+)  # -P leaves the current folder out
+LINES_EVERY_S = 2.0  # of a task's progress
+LOOK_S = 0.5  # between looks at what else may end a task
+CREATE_NO_WINDOW = 0x08000000  # of Windows
+BAD_INPUT, FAULT = 2, 3  # exit codes with a sentence
+Hear = Callable[[str], None]  # a line of the task's standard error
+
+
+class TaskFailed(UsageError):
+    """A task ended otherwise than well; the message is its own last sentence."""
+
+
+class TaskStopped(Exception):
+    """A task was ended because nobody wants it any more; its checkpoint stays."""
+
+
+def run_task(task: Task, key: str, hear: Hear, wanted: Callable[[], bool] = lambda: True) -> None:
+    """Returns when all that the task writes is there, at once where it was before.
+
+    key: `task.key()` of who hands it out.  Raises TaskFailed, and TaskStopped once not `wanted`;
+    also after Ctrl-C no process of the task is left.
+    """
+    if task.is_done(key):
+        return
+    os.makedirs(os.path.dirname(task.writes[0]), exist_ok=True)
+    with alone(task, hear, wanted) as note:
+        if task.is_done(key):
+            return
+        begun = read_key(note)
+        words = task.words(begun if begun == key else "")
+        write_key(note, key)
+        child = start(task, words, note.fileno())
+        said = follow(child, task.argv[0], hear, wanted)
+        if child.returncode != 0:
+            raise TaskFailed(f"{task.name}: {why_failed(task, child.returncode, said)}")
+        lacking = [path for path in task.writes if not os.path.exists(path)]
+        if lacking:
+            raise TaskFailed(f"{task.name}: ended well, yet {lacking[0]} is not there.")
+        task.note_done(key)
+        task.begun_note.unlink(missing_ok=True)
+
+
+def why_failed(task: Task, code: int, said: str) -> str:
+    """A sentence: the task's own where it refused something, else how it ended and what it said."""
+    if said and code in (BAD_INPUT, FAULT):
+        return said.removeprefix(f"shapeshift {task.argv[0]}: ")
+    how = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
+    return f"{how}; its last words: {said}" if said else f"{how}."
+
+
+@contextmanager
+def alone(task: Task, hear: Hear, wanted: Callable[[], bool]) -> Iterator[IO[str]]:
+    """The note of an attempt, once no other attempt at this task lives.
+
+    One may: the worker that started it was killed, or cut off from the others.
+    """
+    note, said = open_locked(task.begun_note), False
+    while note is None:
+        if not said:
+            hear("waiting until an earlier attempt at it has ended")
+            said = True
+        time.sleep(LOOK_S)
+        if not wanted():
+            raise TaskStopped(task.name)
+        note = open_locked(task.begun_note)
+    with note:
+        yield note
+
+
+def read_key(note: IO[str]) -> str:
+    """The key of the attempt before; "" where there was none, or its note is not whole."""
+    note.seek(0)
+    with contextlib.suppress(ValueError):
+        noted = json.loads(note.read())
+        if isinstance(noted, dict) and isinstance(noted.get("key"), str):
+            return noted["key"]
+    return ""
+
+
+def write_key(note: IO[str], key: str) -> None:
+    """In place: the file is the lock."""
+    note.seek(0)
+    note.truncate()
+    note.write(json.dumps({"key": key}) + "\n")
+    note.flush()
+
+
+def start(task: Task, words: tuple[str, ...], note: int) -> subprocess.Popen[bytes]:
+    """The program in a process group of its own, which also holds the lock of its note."""
+    paths = [] if is_installed() else [str(ROOT)]
+    command = [sys.executable, "-P", "-c", START.format(paths=paths), *words]
+    environment = os.environ | {PERIOD: str(LINES_EVERY_S), "TERM": "dumb"}
+    environment["SHAPESHIFT_TASK"] = task.name
+    try:
+        return subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+            env=environment, start_new_session=True, pass_fds=[note] if LOCKS else [],
+            creationflags=CREATE_NO_WINDOW if sys.platform == "win32" else 0,
+        )  # fmt: skip
+    except OSError as error:
+        raise TaskFailed(f"{task.name}: could not be started ({error.strerror}).") from None
+
+
+def follow(
+    child: subprocess.Popen[bytes], command: str, hear: Hear, wanted: Callable[[], bool]
+) -> str:
+    """Its last line that is no progress, once it has ended."""
+    last = ""
+
+    def read() -> None:
+        nonlocal last
+        assert child.stderr is not None
+        with child.stderr:
+            for raw in child.stderr:
+                if line := raw.decode("utf-8", "replace").strip():
+                    last = line if progress_words(line, command) is None else last
+                    hear(line)
+
+    reader = threading.Thread(target=read, name="a task's lines", daemon=True)
+    reader.start()
+    try:
+        while child.poll() is None:
+            reader.join(LOOK_S)
+            if not wanted():
+                raise TaskStopped(command)
+            if not reader.is_alive():
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    child.wait(LOOK_S)
+    finally:
+        end(child)
+        reader.join(LOOK_S)
+    return last
+
+
+def progress_words(line: str, command: str) -> str | None:
+    """What a line of app/progress.py says of a command; None of any other line."""
+    if not (line.startswith(f"{command}: ") and line.endswith(" min)")):
+        return None
+    return line.removeprefix(f"{command}: ").rpartition(" (")[0]
+
+
+def end(child: subprocess.Popen[bytes]) -> None:
+    """Lets it save what there is; then, or at once after another Ctrl-C, all of its group ends."""
+    assert child.stdin is not None
+    with contextlib.suppress(OSError):
+        child.stdin.close()
+    try:
+        child.wait(GRACE_S)
+    except subprocess.TimeoutExpired:
+        pass
+    finally:
+        if hasattr(os, "killpg"):
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(child.pid, signal.SIGKILL)
+        elif child.poll() is None:
+            child.kill()
+        child.wait()

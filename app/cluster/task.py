@@ -1,0 +1,91 @@
+"""A task of a cluster: a command of this program, with the files that it reads and writes.
+
+Only words and names of files travel, never objects.  What is done stands in files beside what was
+written, so a second start does nothing twice, whoever did it first.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from shapeshift.runtime_models.files.json_fields import saved_object
+from shapeshift.runtime_models.files.whole_file import write_whole
+
+MOST_BYTES = 1 << 16  # of a note
+DONE, BEGUN = ".done.json", ".begun.json"  # notes beside the first file that is written
+
+
+@dataclass(frozen=True)
+class Task:
+    """`launch.py argv...`, run once anywhere that sees the same files.
+
+    All paths are absolute and stand in `argv` as they do in `reads` and `writes`.
+    """
+
+    name: str  # for people, and of its own among those that run together
+    argv: tuple[str, ...]  # a command with its options
+    reads: tuple[str, ...]  # files and folders
+    writes: tuple[str, ...]  # the same; all are there once it is done
+    slots: Mapping[str, int] = field(default_factory=dict)  # what it holds, such as {"gpu": 1}
+    checkpoint: str = ""  # a file that an attempt leaves that was ended early
+    resume: tuple[str, ...] = ()  # words for `argv` that make it go on from that file
+
+    def __post_init__(self) -> None:
+        if not (self.name and self.argv and self.writes):
+            raise ValueError(f"task '{self.name}': a name, a command and what it writes are wanted")
+        for path in (*self.reads, *self.writes, *filter(None, [self.checkpoint])):
+            if not os.path.isabs(path):
+                raise ValueError(f"task {self.name}: '{path}' is not absolute")
+
+    @property
+    def done_note(self) -> Path:
+        return Path(self.writes[0] + DONE)
+
+    @property
+    def begun_note(self) -> Path:
+        """Locked as long as an attempt lives."""
+        return Path(self.writes[0] + BEGUN)
+
+    def key(self) -> str:
+        """A hash of the command and of what it reads; where the files lie is not in it."""
+        from shapeshift.app.program import version
+
+        places = {path: f"<read {i}>" for i, path in enumerate(self.reads)}
+        places |= {path: f"<write {i}>" for i, path in enumerate(self.writes)}
+        words = [places.get(word, word) for word in self.argv]
+        inputs = [digest_of(Path(path)) for path in self.reads]
+        return hashlib.sha256(json.dumps([version(), words, inputs]).encode()).hexdigest()
+
+    def is_done(self, key: str) -> bool:
+        """Whether this very task, by its key, has left all that it writes."""
+        noted = saved_object(self.done_note, MOST_BYTES).get("key") == key
+        return noted and all(os.path.exists(path) for path in self.writes)
+
+    def note_done(self, key: str) -> None:
+        text = json.dumps({"task": self.name, "key": key}, ensure_ascii=False)
+        write_whole(self.done_note, text.encode() + b"\n")
+
+    def words(self, begun: str) -> tuple[str, ...]:
+        """The command of the next attempt; begun: the key of the one before, "" of none."""
+        goes_on = begun and self.checkpoint and os.path.exists(self.checkpoint)
+        return (*self.argv, *self.resume) if goes_on else self.argv
+
+
+_digests: dict[tuple[str, int, int], str] = {}  # by path, bytes and time
+
+
+def digest_of(path: Path) -> str:
+    """A hash of a file's bytes, or of all files of a folder with their names."""
+    if path.is_dir():
+        found = sorted(file for file in path.rglob("*") if file.is_file())
+        rows = [[file.relative_to(path).as_posix(), digest_of(file)] for file in found]
+        return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+    stat = path.stat()
+    known = (str(path), stat.st_size, stat.st_mtime_ns)
+    if known not in _digests:
+        with path.open("rb") as file:
+            _digests[known] = hashlib.file_digest(file, "sha256").hexdigest()
+    return _digests[known]
