@@ -2,6 +2,7 @@
 
 import shlex
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,6 +51,8 @@ def run(options: Options) -> int:
     from shapeshift.training.train import Trainer
 
     check_calibrate(options)
+    if (in_blocks := part_in_blocks(options)) is not None:
+        return in_blocks(options)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
@@ -86,6 +89,25 @@ def run(options: Options) -> int:
     for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
     return INTERRUPTED if interrupted else 0
+
+
+def part_in_blocks(options: Options) -> Callable[[Options], int] | None:
+    """What runs in the place of a run of the whole.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+
+    if options.block is not None and options.cut is not None:
+        raise UsageError("--block and --cut are two parts of --blocks; give one of them.")
+    if options.block is not None or options.cut is not None:
+        from shapeshift.app.training.blocks.train_block import run_block, run_cut
+
+        return run_cut if options.cut is not None else run_block
+    if options.blocks.strip() != "1":
+        from shapeshift.app.training.blocks.train_in_blocks import run_blocks
+
+        return run_blocks
+    if options.coarse_iterations is not None:
+        raise UsageError("--coarse-iterations is of --blocks; add --blocks, or leave it out.")
+    return None
 
 
 def check_calibrate(options: Options) -> None:

@@ -1,0 +1,102 @@
+"""Trains one block: goes on from its part of the coarse run, with heads of its own."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from shapeshift.runtime_models.model import AnchorModel, BadFile
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.training.blocks.block_start import BlockStart
+from shapeshift.training.density.densify import NewAnchors
+from shapeshift.training.photos import LoadedPhoto, read
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.train import Trainer
+from shapeshift.training.update.regions import cut_to
+
+MARGIN = 4.0  # voxels that the box is enlarged by for new anchors: a splat reaches two
+
+
+class BlockTrainer(Trainer):
+    """Anchors outside of the block are there because its photos show them; they learn, too, and do
+    not leave the run."""
+
+    def __init__(
+        self, device, start: BlockStart, capture: Capture, settings: TrainSettings,
+        resume: tuple | None = None,
+    ) -> None:  # fmt: skip
+        """settings: with the downscale and the background of the coarse run; resume: of a
+        checkpoint of this very block."""
+        self.start = start
+        found = start.capture_of(capture)
+        loaded = {split: cut_photos(found, split, settings) for split in ("train", "test")}
+        mine = {id(photo) for photo, _ in found}
+        photos = tuple(photo for photo in capture.photos if id(photo) in mine)
+        if resume is None:
+            length = {"run_length": settings.iterations}
+            resume = start.state, start.notes | length
+        super().__init__(device, replace(capture, photos=photos), settings, resume, loaded)
+
+    def lay_out(self) -> None:
+        super().lay_out()
+        self.most_inside = self.anchor_cap  # of anchors within the enlarged box
+
+    def inside(self, places: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """(N,) bool: which places (N, 3) are the block's, enlarged by so many voxels."""
+        return self.start.place.holds(places, margin * self.voxel)
+
+    def densify(self) -> None:
+        """As ever for the anchors inside; those outside neither go nor ask for others."""
+        outside = ~self.inside(self.device.download(self.adam["anchors"]), MARGIN)
+        self.anchor_cap = self.most_inside + int(outside.sum())
+        state = self.stats.state()
+        state["densify.grad2d"].reshape(len(outside), -1)[outside] = 0
+        state["densify.opacity"][outside] = 0
+        state["densify.contribution"][:, outside] = 0
+        self.stats.load(state)
+        super().densify()
+
+    def allowed(self, kept: np.ndarray, new: NewAnchors) -> tuple[np.ndarray, NewAnchors]:
+        inside = self.inside(new.anchors, MARGIN)
+        return kept, NewAnchors(new.anchors[inside], new.parents[inside])
+
+    def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
+        state, notes = super().checkpoint()
+        return state, notes | {"of_block": self.start.notes["of_block"]}
+
+    def model(self) -> AnchorModel:
+        """The anchors that stand in the block.  Raises BadFile where none does."""
+        whole = super().model()
+        rows = np.flatnonzero(self.inside(whole.anchors))
+        if not len(rows):
+            raise BadFile(
+                "no anchor of this block is left in its box; train with fewer blocks, or with more "
+                "photos of that place."
+            )
+        return replace(whole.with_anchors(rows), provenance=self.provenance(whole.provenance))
+
+    def provenance(self, own: dict[str, Any]) -> dict[str, Any]:
+        """Of the block; the first look is that at the whole."""
+        kept = {"view": self.start.provenance["view"]} if "view" in self.start.provenance else {}
+        photos = sum(len(found) for found in self.schedule.photos.values())
+        return own | kept | {"block_photos": photos}
+
+
+def cut_photos(
+    found: list[tuple[Photo, np.ndarray]], split: str, settings: TrainSettings
+) -> list[LoadedPhoto]:
+    """The photos of a split, read one by one and cut to the pixels that count."""
+    factor, out = settings.downscale or 1, []
+    for photo, pixels in found:
+        if photo.split != split:
+            continue
+        whole = read(photo, factor, settings.masks)
+        if pixels.shape != whole.rgba.shape[:2]:
+            raise BadFile(
+                f"{photo.path} has {whole.rgba.shape[1]}x{whole.rgba.shape[0]} pixels, the coarse "
+                f"run saw {pixels.shape[1]}x{pixels.shape[0]}; train again with --blocks, anew."
+            )
+        part = whole if pixels.all() else cut_to(whole, pixels)
+        if part is not None:
+            out.append(part)
+    return out
