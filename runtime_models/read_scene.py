@@ -59,9 +59,9 @@ from shapeshift.runtime_models.splats.sog.sog_files import META
 
 PHOTOS = (".jpg", ".jpeg")  # a scene's own pictures are .png and .webp
 KNOWN = (
-    "a package (folder or .shift), a folder of blocks, a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
-    ".gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of a 3DGS or "
-    "Scaffold-GS run"
+    "a package (folder or .shift), a folder of blocks, a file of splats (.ply, .splat, .ksplat, "
+    ".spz, .sog, .glb, .gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of "
+    "a 3DGS or Scaffold-GS run"
 )
 
 
@@ -260,7 +260,9 @@ def describe_head(mlp: Mlp) -> dict:
 
 def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
-    in_folder = path.name in (MANIFEST, META, TREE, LIST, BLOCK_LIST) or is_lcc(path) or is_lcc2(path)
+    in_folder = (
+        path.name in (MANIFEST, META, TREE, LIST, BLOCK_LIST) or is_lcc(path) or is_lcc2(path)
+    )
     if in_folder and not path.is_dir():
         path = path.parent
     if isinstance(model, ScaffoldModel) and not path.is_dir():

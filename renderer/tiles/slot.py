@@ -36,8 +36,10 @@ def decoding_of(device: Device, model: Model, mlps: str) -> Decoding:
         made.sh = upload_sh(device, model.sh)
     elif isinstance(model, AnchorModel):
         if mlps == "opencl" and not (reason := uncovered(model)):
-            blocked = isinstance(model, BlockModel)
-            made.heads = BlockHeads(device, model) if blocked else ModelHeads(device, model)
+            if isinstance(model, BlockModel):
+                made.heads = BlockHeads(device, model)
+            else:
+                made.heads = ModelHeads(device, model)
         elif mlps == "opencl":
             made.instead = f"onnxruntime for a model: {reason}"
     elif follows_eye(model) and mlps == "opencl":

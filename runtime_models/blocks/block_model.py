@@ -8,6 +8,7 @@ share, exactly, for whoever knows only one set of them.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ class BlockModel(AnchorModel):
         edges = [0, *ends.tolist(), len(self.block)]
         k, shared = self.splats_per_anchor, self._shared()
         found = []
-        for start, stop in zip(edges, edges[1:], strict=False):
+        for start, stop in pairwise(edges):
             if start == stop:
                 continue
             rows = slice(start, stop)
@@ -193,10 +194,10 @@ def merged(model: BlockModel, head: str) -> Mlp:
     carry = np.zeros((count, first[0].shape[1]), np.float32)
     carry[:, at + lacking : at + lacking + count] = np.eye(count)
     biases = np.stack([mlp.biases[1] for mlp in mlps], axis=1)  # (out, blocks)
-    weights = np.concatenate([*first, carry]), np.concatenate([*last, biases], axis=1)
+    layers = np.concatenate([*first, carry]), np.concatenate([*last, biases], axis=1)
     bias = np.concatenate([*first_bias, np.zeros(count, np.float32)])
     return Mlp(
-        tuple(w.astype(np.float32) for w in weights),
+        tuple(layer.astype(np.float32) for layer in layers),
         (bias, np.zeros(len(biases), np.float32)),
         mlps[0].head, inputs, mlps[0].clip, mlps[0].gain,
     )  # fmt: skip

@@ -127,8 +127,9 @@ def read_blocks(folder: str | Path, reading: Reading | None = None) -> BlockMode
     size = sum(anchor_bytes(model) for model in models)
     with within.account.lend(size, "all blocks as one"):
         model = joined(models, names)
-    found = tuple(outside(m, b, listed, folder) for m, b in zip(models, listed.blocks, strict=False))
-    findings = (*model.findings, *(each for each in found if each is not None))
+    pairs = zip(models, listed.blocks, strict=False)
+    strays = (outside(part, block, listed, folder) for part, block in pairs)
+    findings = (*model.findings, *(each for each in strays if each is not None))
     files = {"files": [LIST, *listed.files]}
     return replace(model, findings=findings, provenance=model.provenance | files)
 

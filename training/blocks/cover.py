@@ -21,9 +21,9 @@ from shapeshift.training.photos import BLACK
 from shapeshift.training.step import TrainingStep
 
 LEAST_SHARE = 0.05  # of a photo's weight that lies in a block that it belongs to
-SHOWS = 0.02  # of a pixel is the block's: it counts in the block's run, with those beside it ...
+SHOWS = 0.1  # of a pixel is the block's: it counts in the block's run, with those beside it ...
 BESIDE_PX = 3  # ... up to so many pixels away
-LEFT_OUT = 0.02  # of the weight of a block's pixels: that of the anchors that its run does without
+LEFT_OUT = 0.03  # of the weight of a block's pixels: that of the anchors that its run does without
 CHANNELS = 3  # blocks that one picture tells apart
 Progress = Callable[[int, int], None]  # photos done, of all
 
@@ -98,19 +98,21 @@ def cover_of(
     sums = np.zeros((count, len(block)))
     mine: list[list[Seen]] = [[] for _ in range(count)]
     for i, photo in enumerate(photos):
+        if report is not None:
+            report(i, len(photos))
         drawn = picture.draw(photo, factor)
         weights = picture.weights(drawn)
         of_blocks = np.bincount(block[inside], weights[inside], minlength=count)
         belongs = (of_blocks >= LEAST_SHARE * weights.sum()) & (of_blocks > 0)
         wanted = np.flatnonzero(belongs).tolist()
-        shares = picture.shares(drawn, block, wanted) if wanted else []
+        if not wanted:
+            continue
+        shares = picture.shares(drawn, block, wanted)
         for number, share in zip(wanted, shares, strict=True):
             pixels = widened(share >= SHOWS, BESIDE_PX)
             if pixels.any():
                 mine[number].append(Seen(i, pixels))
                 sums[number] += picture.weights(drawn, pixels)
-        if report is not None:
-            report(i + 1, len(photos))
     return tuple(
         Cover(tuple(mine[b]), context_of(sums[b], block == b)) for b in range(count)
     )  # fmt: skip

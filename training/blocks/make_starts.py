@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shapeshift.runtime_models.blocks.block_box import BlockBox, turned
+from shapeshift.runtime_models.blocks.block_box import BlockBox
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder

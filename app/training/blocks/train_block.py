@@ -31,7 +31,8 @@ def run_cut(options: Options) -> int:
     state, notes = read_checkpoint(checkpoint_path(options.cut))
     coarse = Coarse(read_package(options.cut), state, notes)
     rules = CutRules(wanted_of(options.blocks), options.block_photos, most_anchors(options))
-    capture = with_extrinsics(open_capture(options.capture, options.memory), notes["settings"]["rig"])
+    capture = open_capture(options.capture, options.memory)
+    capture = with_extrinsics(capture, notes["settings"]["rig"])
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with progress_bar() as bar:
         task = bar.add_task("looking which photos show which block", total=len(capture.photos))

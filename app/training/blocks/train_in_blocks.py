@@ -1,4 +1,4 @@
-"""launch.py train --blocks: a coarse run of the whole, its cut, a task a block, one scene of all."""
+"""launch.py train --blocks: a coarse run of the whole, its cut, a task a block, one scene."""
 
 import shlex
 from collections.abc import Sequence
@@ -200,7 +200,7 @@ def join(work: Path, found: "CutList", out: Path) -> "AnchorModel":
     if found.far:
         names, paths = [*names, found.far], [*paths, work / CUT / found.far]
     models = [replace(read_package(path), pace=()) for path in paths]
-    whole = joined(models, names)
+    whole: AnchorModel = joined(models, names)
     if len(whole.stops) > 1:
         whole = with_pace(whole)
     blocks = tuple(
