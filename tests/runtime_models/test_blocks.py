@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.support.models import make_random_model
 
 from shapeshift.runtime_models.blocks.block_box import BlockBox, turned
 from shapeshift.runtime_models.blocks.block_model import BlockModel, joined, one_network
@@ -24,6 +23,7 @@ from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.read_scene import describe, files_of, read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
+from tests.support.models import make_random_model
 
 INF = math.inf
 LEFT = BlockBox((-INF, -INF, -INF), (0.1, INF, INF))
@@ -131,7 +131,7 @@ def test_writing_again_gives_the_same_bytes_and_foreign_folders_stay(folder, tmp
     for file in folder.iterdir():
         assert file.read_bytes() == (tmp_path / "b.blocks" / file.name).read_bytes()
     (folder / "notes.txt").write_text("mine")
-    with pytest.raises(BadFile, match="notes.txt"):
+    with pytest.raises(BadFile, match=r"notes\.txt"):
         write_blocks(listed, parts, folder)
     assert (folder / "notes.txt").read_text() == "mine"
 

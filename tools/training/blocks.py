@@ -35,7 +35,7 @@ from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.training.blocks.begin_block import begin_block  # noqa: E402
 from shapeshift.training.blocks.block_start import BlockStart, begun_anew  # noqa: E402
-from shapeshift.training.blocks.make_starts import CutList, read_cut  # noqa: E402
+from shapeshift.training.blocks.starts import CutList, read_cut  # noqa: E402
 from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint  # noqa: E402
 from shapeshift.training.evaluation.evaluate import ModelRenderer  # noqa: E402
 from shapeshift.training.photos import BLACK, LoadedPhoto, load_photos  # noqa: E402

@@ -5,7 +5,7 @@ One file a block, which is all that its run reads beside the capture.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,11 @@ class Place:
     middle: Corner  # metres, world: of the cube
     half: float  # metres; infinite: nothing is far
 
+    def __post_init__(self) -> None:
+        """ValueError, one sentence."""
+        if not self.half > 0:
+            raise ValueError(f"half the side of what is near is {self.half}")
+
     def holds(self, places: np.ndarray, margin: float = 0.0) -> np.ndarray:
         """(N,) bool of places (N, 3) in the world; margin: metres the box is enlarged by."""
         near = (np.abs(np.asarray(places, np.float64) - self.middle) <= self.half).all(axis=1)
@@ -47,7 +52,6 @@ class BlockPhoto:
     path: str
     modality: str
     split: str
-    pixels: np.ndarray  # (H, W) bool: those that count
 
 
 @dataclass(frozen=True)
@@ -59,15 +63,14 @@ class BlockStart:
     provenance: dict[str, Any]  # of the coarse run's package
 
     def write(self, path: Path) -> None:
-        bits = {f"pixels.{i}": np.packbits(p.pixels) for i, p in enumerate(self.photos)}
-        photos = [[p.path, p.modality, p.split, *p.pixels.shape] for p in self.photos]
+        photos = [[p.path, p.modality, p.split] for p in self.photos]
         box, place = self.place.box, self.place
         mine = {
             "low": finite(box.low), "high": finite(box.high), "turn_degrees": place.turn_degrees,
             "middle": list(place.middle), "half": finite([place.half])[0], "photos": photos,
             "provenance": self.provenance,
         }  # fmt: skip
-        write_checkpoint(path, self.state | bits, self.notes | {"block": mine})
+        write_checkpoint(path, self.state, self.notes | {"block": mine})
 
     @staticmethod
     def read(path: Path) -> "BlockStart":
@@ -84,10 +87,8 @@ class BlockStart:
                 mine.numbers("middle", 3), half,  # type: ignore[arg-type]  # three of them
             )  # fmt: skip
             photos = []
-            for i, (name, modality, split, height, width) in enumerate(mine.value("photos")):
-                bits = np.unpackbits(state.pop(f"pixels.{i}"), count=height * width)
-                pixels = bits.reshape(height, width).astype(bool)
-                photos.append(BlockPhoto(name, modality, split, pixels))
+            for name, modality, split in mine.value("photos"):
+                photos.append(BlockPhoto(str(name), str(modality), str(split)))
             provenance = mine.typed("provenance", dict, {})
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             if isinstance(error, BadFile):
@@ -95,8 +96,8 @@ class BlockStart:
             raise BadFile(f"{path}: not the start of a block ({error}); {ADVICE}.") from None
         return BlockStart(place, tuple(photos), state, notes, provenance)
 
-    def capture_of(self, capture: Capture) -> list[tuple[Photo, np.ndarray]]:
-        """Its photos in the capture, with the pixels that count.  Raises BadFile."""
+    def capture_of(self, capture: Capture) -> Capture:
+        """The capture with the photos of the block alone.  Raises BadFile."""
         known = {(path_in(capture, p), p.modality): p for p in capture.photos}
         found = []
         for mine in self.photos:
@@ -106,8 +107,8 @@ class BlockStart:
                     f"{capture.folder} has no photo '{mine.path:.200}' of '{mine.modality:.60}' "
                     f"any more; {ADVICE}, anew."
                 )
-            found.append((photo, mine.pixels))
-        return found
+            found.append(photo)
+        return replace(capture, photos=tuple(found))
 
 
 def finite(values: Sequence[float]) -> list[float | None]:
@@ -132,9 +133,8 @@ def path_in(capture: Capture, photo: Photo) -> str:
 def photos_of(cover: Cover, capture: Capture, photos: Sequence[Photo]) -> tuple[BlockPhoto, ...]:
     """The photos of a block as its run finds them again."""
     return tuple(
-        BlockPhoto(path_in(capture, p), p.modality, p.split, seen.pixels)
-        for seen in cover.photos
-        for p in (photos[seen.photo],)
+        BlockPhoto(path_in(capture, photos[i]), photos[i].modality, photos[i].split)
+        for i in cover.photos
     )
 
 

@@ -6,13 +6,11 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.model import AnchorModel, BadFile
-from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blocks.block_start import BlockStart
 from shapeshift.training.density.densify import NewAnchors
-from shapeshift.training.photos import LoadedPhoto, read
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
-from shapeshift.training.update.regions import cut_to
 
 MARGIN = 4.0  # voxels that the box is enlarged by for new anchors: a splat reaches two
 
@@ -28,14 +26,10 @@ class BlockTrainer(Trainer):
         """settings: with the downscale and the background of the coarse run; resume: of a
         checkpoint of this very block."""
         self.start = start
-        found = start.capture_of(capture)
-        loaded = {split: cut_photos(found, split, settings) for split in ("train", "test")}
-        mine = {id(photo) for photo, _ in found}
-        photos = tuple(photo for photo in capture.photos if id(photo) in mine)
         if resume is None:
             length = {"run_length": settings.iterations}
             resume = start.state, start.notes | length
-        super().__init__(device, replace(capture, photos=photos), settings, resume, loaded)
+        super().__init__(device, start.capture_of(capture), settings, resume)
 
     def lay_out(self) -> None:
         super().lay_out()
@@ -80,23 +74,3 @@ class BlockTrainer(Trainer):
         kept = {"view": self.start.provenance["view"]} if "view" in self.start.provenance else {}
         photos = sum(len(found) for found in self.schedule.photos.values())
         return own | kept | {"block_photos": photos}
-
-
-def cut_photos(
-    found: list[tuple[Photo, np.ndarray]], split: str, settings: TrainSettings
-) -> list[LoadedPhoto]:
-    """The photos of a split, read one by one and cut to the pixels that count."""
-    factor, out = settings.downscale or 1, []
-    for photo, pixels in found:
-        if photo.split != split:
-            continue
-        whole = read(photo, factor, settings.masks)
-        if pixels.shape != whole.rgba.shape[:2]:
-            raise BadFile(
-                f"{photo.path} has {whole.rgba.shape[1]}x{whole.rgba.shape[0]} pixels, the coarse "
-                f"run saw {pixels.shape[1]}x{pixels.shape[0]}; train again with --blocks, anew."
-            )
-        part = whole if pixels.all() else cut_to(whole, pixels)
-        if part is not None:
-            out.append(part)
-    return out

@@ -85,12 +85,9 @@ def cut_photos(
 
 def cut_photo(photo: LoadedPhoto, region: UpdateRegion) -> LoadedPhoto | None:
     """The smallest part of a photo, in whole STEPs, that holds the region; None: it sees little."""
-    return cut_to(photo, region.shadow(photo.view))
-
-
-def cut_to(photo: LoadedPhoto, pixels: np.ndarray) -> LoadedPhoto | None:
-    """The same of pixels (H, W) bool of the photo, the only ones that count."""
-    seen = pixels if photo.weight is None else pixels & (photo.weight > 0)
+    seen = region.shadow(photo.view)
+    if photo.weight is not None:
+        seen &= photo.weight > 0
     if not seen.sum() >= LEAST_PIXELS:
         return None
     used_rows, used_columns = (np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0))

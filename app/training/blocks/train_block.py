@@ -22,7 +22,7 @@ def run_cut(options: Options) -> int:
     from shapeshift.app.training.saving import check_writable
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.read_package import read_package
-    from shapeshift.training.blocks.make_starts import Coarse, CutRules, make_starts
+    from shapeshift.training.blocks.starts import Coarse, CutRules, make_starts
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.blocks.cut import Wanted
-    from shapeshift.training.blocks.make_starts import CutBlock, CutList
+    from shapeshift.training.blocks.starts import CutBlock, CutList
 
 ENDING = ".blocks"
 OF_BLOCKS = ("iterations", "max_anchors", "max_mb")  # settings that a block may have of its own
@@ -30,7 +30,7 @@ def run_blocks(options: Options) -> int:
     from shapeshift.app.cluster.open_cluster import open_cluster
     from shapeshift.app.training.saving import check_writable
     from shapeshift.runtime_models.blocks.write_blocks import refuse_foreign_folder
-    from shapeshift.training.blocks.make_starts import read_cut
+    from shapeshift.training.blocks.starts import read_cut
 
     wanted = wanted_of(options.blocks)
     refuse_options(options)
@@ -86,7 +86,7 @@ def refuse_options(options: Options) -> None:
 
 def refuse_one(options: Options, capture: "Capture") -> None:
     """Raises UsageError where --blocks auto would cut nothing: before the coarse run, not after."""
-    from shapeshift.training.blocks.make_starts import expected_anchors
+    from shapeshift.training.blocks.starts import expected_anchors
 
     count, most = len(expected_anchors(capture)), most_anchors(options)
     if count <= most:

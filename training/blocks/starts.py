@@ -190,7 +190,7 @@ def digest_of(start: BlockStart) -> str:
     for name, array in sorted(start.state.items()):
         digest.update(name.encode() + np.ascontiguousarray(array).tobytes())
     for photo in start.photos:
-        digest.update(photo.path.encode() + photo.pixels.tobytes())
+        digest.update(f"{photo.path}\n{photo.modality}\n".encode())
     return digest.hexdigest()
 
 
