@@ -71,6 +71,7 @@ class BlockTrainer(Trainer):
 
     def provenance(self, own: dict[str, Any]) -> dict[str, Any]:
         """Of the block; the first look is that at the whole."""
-        kept = {"view": self.start.provenance["view"]} if "view" in self.start.provenance else {}
+        whole = {name: v for name, v in self.start.provenance.items() if name == "view"}
         photos = sum(len(found) for found in self.schedule.photos.values())
-        return own | kept | {"block_photos": photos}
+        rest = {name: v for name, v in own.items() if name != "view"}
+        return rest | whole | {"block_photos": photos}

@@ -167,9 +167,9 @@ def write_one(
     settings = TrainSettings(**coarse.notes["settings"])
     layout = settings.layout(encoding_for([stop.x for stop in capture.stops]).d)
     state = part_of_state(coarse.state, np.flatnonzero(own | cover.context), layout)
-    provenance = {
-        key: coarse.model.provenance.get(key) for key in ("view", "background", "downscale")
-    }
+    known_before = coarse.model.provenance
+    kept = [key for key in ("view", "background", "downscale") if key in known_before]
+    provenance = {key: known_before[key] for key in kept}
     start = BlockStart(place, mine, state, begun_anew(coarse.notes), provenance)
     start.notes["of_block"] = digest_of(start)
     start.write(folder / f"{name}.start.npz")
