@@ -85,11 +85,15 @@ COMMANDS = {
         "training.table",
         "one model compared with separate ones and plain splats: dB, bytes, seconds",
     ),
+    "cluster": (
+        "cluster.command",
+        "let other machines take part: certificates, a scheduler, workers",
+    ),
     "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
-OPEN_ENDED = ("view", "vr", "serve")  # they last as long as somebody looks
+OPEN_ENDED = ("view", "vr", "serve", "cluster")  # they last as long as somebody looks
 BAD_INPUT = 2  # exit code
 FAULT = 3
 INTERRUPTED = 130

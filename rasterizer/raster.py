@@ -22,6 +22,11 @@ FORMS = {
 }
 
 
+def defines_of(device: Device, form: str) -> dict[str, int]:
+    """What both kernels of a form are built with: the CPU's blocks are as its vectors are wide."""
+    return {"PIXELS": 16} if form == "cpu" and device.lanes >= 16 else {}
+
+
 @dataclass(frozen=True)
 class RasterFrame:
     """An image on the device and what its backward pass needs."""
@@ -73,7 +78,7 @@ def rasterize(
     file, group, _ = FORMS[form]
     blocks = room_for_blocks(device, tiles, form)
     device.launch(
-        device.program(file)["rasterize"], number * group, group,
+        device.program(file, **defines_of(device, form))["rasterize"], number * group, group,
         width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends,
         *([] if blocks is None else [blocks]),
@@ -201,7 +206,8 @@ def rasterize_backward(
     slots = tiles.room(device, first_slot, RECORD)
     form = form or device.kind
     file, _, group = FORMS[form]
-    defines = {"ABSOLUTE": 1} if absolute and error is None else {}
+    defines = defines_of(device, form)
+    defines |= {"ABSOLUTE": 1} if absolute and error is None else {}
     defines |= {"SHARE": 1} if error is not None else {}
     defines |= {"WEIGHT": 1} if weight else {}
     kernel = device.program(file, **defines)["rasterize_backward"]

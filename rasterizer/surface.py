@@ -13,7 +13,7 @@ import numpy as np
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
-from shapeshift.rasterizer.raster import FORMS, RasterFrame, room_for_blocks
+from shapeshift.rasterizer.raster import FORMS, RasterFrame, defines_of, room_for_blocks
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -113,8 +113,9 @@ def rasterize_depth(
     form = form or device.kind
     file, group, _ = FORMS[form]
     blocks = room_for_blocks(device, tiles, form)
+    kernel = device.program(file, **WITH_DEPTH, **defines_of(device, form))["rasterize"]
     device.launch(
-        device.program(file, **WITH_DEPTH)["rasterize"], number * group, group,
+        kernel, number * group, group,
         width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends, surfaces, metres,
         *([] if blocks is None else [blocks]),
@@ -142,7 +143,8 @@ def rasterize_depth_backward(
     slots, depth_slots = (tiles.room(device, first_slot, n) for n in (RECORD, SURFACE))
     form = form or device.kind
     file, _, group = FORMS[form]
-    defines = WITH_DEPTH | ({"ABSOLUTE": 1} if absolute and error is None else {})
+    defines = WITH_DEPTH | defines_of(device, form)
+    defines |= {"ABSOLUTE": 1} if absolute and error is None else {}
     defines |= {"SHARE": 1} if error is not None else {}
     defines |= {"WEIGHT": 1} if weight else {}
     device.launch(

@@ -1,11 +1,12 @@
-"""Photos of a capture, read once and made smaller: what training and its scores know of them."""
+"""Photos of a capture, made smaller: what training and its scores know of them."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.runtime_models.files.memory import Memory, amount
+from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
@@ -16,6 +17,7 @@ from shapeshift.scene.pose import View
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
 PHOTOS = 0.5  # of the memory that files may take: what photos do as long as a run lasts
+SAMPLE = 200  # photos of a modality, at most, that are asked what all of them show alike
 BLACK = (0.0, 0.0, 0.0)
 
 
@@ -30,6 +32,19 @@ class LoadedPhoto:
     masked: bool = False  # whether it came with a mask or an alpha channel
 
     @property
+    def has_depth(self) -> bool:
+        return self.depth is not None
+
+    @property
+    def bytes(self) -> int:
+        arrays = (self.rgba, self.weight, self.depth)
+        return sum(array.nbytes for array in arrays if array is not None)
+
+    def in_memory(self) -> "LoadedPhoto":
+        """The photo with its pixels, wherever they lie."""
+        return self
+
+    @property
     def see_through(self) -> bool:
         return bool((self.rgba[..., 3] < 255).any())
 
@@ -41,12 +56,20 @@ class LoadedPhoto:
 
 
 def choose_downscale(photos: tuple[Photo, ...]) -> int:
-    """The smallest whole factor after which no side exceeds MOST_PIXELS and all fit into memory."""
-    longest = max(max(photo.view.size) for photo in photos)
-    factor = -(-longest // MOST_PIXELS)
-    while factor < longest and memory_of(photos, factor) > memory_for_photos():
-        factor += 1
-    return factor
+    """The smallest whole factor after which no side exceeds MOST_PIXELS."""
+    return -(-max(max(photo.view.size) for photo in photos) // MOST_PIXELS)
+
+
+def sampled(photos: list[LoadedPhoto]) -> list[LoadedPhoto]:
+    """At most SAMPLE photos of each modality, evenly, in their order."""
+    rows: dict[str, list[int]] = {}
+    for row, photo in enumerate(photos):
+        rows.setdefault(photo.modality, []).append(row)
+    kept: list[int] = []
+    for mine in rows.values():
+        count = min(len(mine), SAMPLE)
+        kept += [mine[i * len(mine) // count] for i in range(count)]
+    return [photos[row] for row in sorted(kept)]
 
 
 def memory_of(photos: tuple[Photo, ...], factor: int) -> int:
@@ -63,25 +86,6 @@ def bytes_a_pixel(photo: Photo) -> int:
 def memory_for_photos() -> int:
     """Bytes that all photos of a run may take together."""
     return int(PHOTOS * Memory().most)
-
-
-def memory_excess(photos: tuple[Photo, ...], factor: int) -> str:
-    """Why photos of this size do not fit into memory, in words; "" where they do."""
-    needed, may = memory_of(photos, factor), memory_for_photos()
-    if needed <= may:
-        return ""
-    width, height = photos[0].view.divided(factor).size
-    return (
-        f"{len(photos):,} photos of {width}x{height} pixels would take {amount(needed)} of "
-        f"memory, photos may take {amount(may)}"
-    )
-
-
-def memory_warnings(photos: tuple[Photo, ...], factor: int) -> list[str]:
-    """A sentence where photos are smaller than usual because of memory."""
-    usual = -(-max(max(photo.view.size) for photo in photos) // MOST_PIXELS)
-    why = memory_excess(photos, usual) if usual < factor else ""
-    return [f"{why}: they are made {factor} times smaller; --memory GB allows more."] if why else []
 
 
 def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> LoadedPhoto:
@@ -109,18 +113,39 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
     return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth, masked)
 
 
+@dataclass(frozen=True)
+class PhotoReader:
+    """How the photos of a capture are read, in whatever order."""
+
+    factor: int
+    masks: str
+    many: frozenset[tuple[str, ColmapCamera]]  # split and lens of so many that a matrix pays
+
+    @classmethod
+    def of(cls, photos: tuple[Photo, ...], factor: int, masks: str) -> "PhotoReader":
+        bent = Counter((photo.split, photo.lens) for photo in photos if photo.lens is not None)
+        return cls(factor, masks, frozenset(key for key, n in bent.items() if n >= LEAST_PHOTOS))
+
+    def bytes_of(self, photo: Photo) -> int:
+        """What the photo's pixels take."""
+        return math.prod(photo.view.divided(self.factor).size) * bytes_a_pixel(photo)
+
+    def way(self, photo: Photo) -> tuple[int, str, bool]:
+        """What is done to a photo's file, for who keeps what comes out."""
+        return self.factor, self.masks, (photo.split, photo.lens) in self.many
+
+    def read(self, photo: Photo) -> LoadedPhoto:
+        return read(photo, *self.way(photo))
+
+
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
-    """All photos of a split.  Raises BadFile, also where they would need too much memory."""
+    """All photos of a split, in memory: see open_photos where they may not fit.  Raises BadFile."""
     mine = tuple(photo for photo in capture.photos if photo.split == split)
-    if mine and (why := memory_excess(mine, factor)):
-        fits = choose_downscale(capture.photos)
-        raise BadFile(f"{capture.folder}: {why}; --downscale {fits} fits, --memory GB allows more.")
+    reader = PhotoReader.of(mine, factor, masks)
     # Photos of one lens after each other: of the matrices one is kept.
     of_lens: dict[ColmapCamera | None, list[int]] = {}
     for i, photo in enumerate(mine):
         of_lens.setdefault(photo.lens, []).append(i)
-    loaded: dict[int, LoadedPhoto] = {}
-    for lens, numbers in of_lens.items():
-        many = lens is not None and len(numbers) >= LEAST_PHOTOS
-        loaded |= {i: read(mine[i], factor, masks, many) for i in numbers}
+    order = [i for numbers in of_lens.values() for i in numbers]
+    loaded = {i: reader.read(mine[i]) for i in order}
     return [loaded[i] for i in range(len(mine))]

@@ -13,8 +13,9 @@ from shapeshift.training.drawing import Color, DrawnView
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import Target
+from shapeshift.training.photo_store.open_photos import TrainingPhotos
 from shapeshift.training.photos import LoadedPhoto
-from shapeshift.training.schedule import Budget
+from shapeshift.training.schedule import Budget, Schedule
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
@@ -53,11 +54,13 @@ class Run(ABC):
     settings: TrainSettings | PlainSettings
     budget: Budget
     adam: Adam
+    photos: TrainingPhotos
     targets: Targets
     exposures: Exposures
     drawing: DrawnView  # the last one
     iteration: int  # steps done
-    elapsed: float  # seconds that the steps took, by clock_of
+    schedule: Schedule
+    elapsed: float  # seconds that the steps took, by clock_of, without reading photos
     densified_at: int  # iteration of the last change of what is counted
     run_length: int | None  # iterations in all; None until a timed run's is known
 
@@ -81,11 +84,12 @@ class Run(ABC):
     def steps(self) -> Iterator[Progress]:
         """Train until the budget is used; yields after every step."""
         self.compile_kernels()
-        clock = clock_of(self.device)
+        clock, processor = clock_of(self.device), self.device.kind == "cpu"
         while self.budget.fraction(self.iteration, self.elapsed) < 1:
-            start = clock()
+            start = clock() - self.photos.seconds(processor)
+            self.photos.read_ahead(self.schedule.photo, self.iteration)
             loss, rolled_back = self.one_step()
-            self.elapsed += clock() - start
+            self.elapsed += clock() - self.photos.seconds(processor) - start
             fraction, count = self.budget.fraction(self.iteration, self.elapsed), self.param_group
             yield Progress(
                 self.iteration, fraction, loss, len(self.adam[count]), self.elapsed, rolled_back

@@ -28,13 +28,8 @@ from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.min_scale import MinScale
-from shapeshift.training.photos import (
-    BLACK,
-    LoadedPhoto,
-    choose_downscale,
-    load_photos,
-    memory_warnings,
-)
+from shapeshift.training.photo_store.open_photos import PhotoRoom, TrainingPhotos, open_photos
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale
 from shapeshift.training.run import SETTLE, Run
 from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
 from shapeshift.training.settings import Rates, TrainSettings
@@ -81,25 +76,28 @@ class Trainer(Run):
         capture: Capture,
         settings: TrainSettings,
         resume: tuple | None = None,
-        loaded: dict[str, list[LoadedPhoto]] | None = None,
+        loaded: dict[str, list[LoadedPhoto]] | TrainingPhotos | None = None,
         report: Report | None = None,
+        room: PhotoRoom | None = None,
     ) -> None:
         """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller.
 
         loaded: photos of the splits train and test, where they were read before; report: called
-        with words while the first points take long.
+        with words while the first points take long; room: where photos that are read now may lie.
         """
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
         self.stops = capture.stops
-        photos, self.held_out = (
-            loaded[split] if loaded else load_photos(capture, split, self.factor, settings.masks)
-            for split in ("train", "test")
-        )
-        photos, self.warnings = validate_views(photos, settings.masks)
-        if not settings.downscale:
-            self.warnings += memory_warnings(capture.photos, self.factor)
+        if loaded is None:
+            self.photos = open_photos(capture, self.factor, settings.masks, room)
+        elif isinstance(loaded, dict):
+            self.photos = TrainingPhotos(loaded["train"], loaded["test"])
+        else:
+            self.photos = loaded
+        self.held_out = self.photos.test
+        photos, self.warnings = validate_views(self.photos.train, settings.masks)
+        self.warnings += self.photos.warnings()
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         if empty := [name for name, found in by_modality.items() if not found]:
             raise BadFile(f"{capture.folder}: modality '{empty[0]}' has no training photos.")
@@ -110,7 +108,7 @@ class Trainer(Run):
         self.schedule = Schedule(by_modality, settings.seed, background)
         self.blending = ShapeBlending(settings.blended_shapes, settings.seed, self.stops)
         self.lay_out()
-        self.targets = Targets(device)
+        self.targets = Targets(device, self.photos.most)
         self.exposures = Exposures(device, by_modality, has_one_exposure(photos))
         self.lr_warmup = LrWarmup()
         self.photo_contrast: dict[tuple, float] = {}
@@ -225,7 +223,7 @@ class Trainer(Run):
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
-            whole = {(p.view.size, p.depth is None): p for p in photos}.values()
+            whole = {(p.view.size, p.has_depth): p for p in photos}.values()
             for photo in whole:
                 self.step.update(self.photo_gradients(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()

@@ -1,5 +1,6 @@
 """What the tasks of a run are at: one bar over all of them, and their own sentences below it."""
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -13,7 +14,7 @@ class Board:
     """Hears lines of tasks by name; made by `board`."""
 
     def __init__(self, show: Callable[..., None], say: Callable[[str], None]) -> None:
-        self._show, self._say = show, say
+        self._show, self._say, self._lock = show, say, threading.Lock()
         self._now: dict[str, str] = {}  # what those under way said last
 
     def hear(self, name: str, command: str, line: str) -> None:
@@ -21,19 +22,15 @@ class Board:
         words = progress_words(line, command)
         if words is None:
             self._say(f"{name}: {line}")
-            words = self._now.get(name, "")
-        self._now[name] = words
-        self._update()
+        with self._lock:
+            self._now[name] = self._now.get(name, "") if words is None else words
+            self._update()
 
     def end(self, name: str) -> None:
         """The task is done, or has failed."""
-        self._now.pop(name, None)
-        self._update(advance=1)
-
-    def leave(self, name: str) -> None:
-        """The task waits for another attempt."""
-        self._now.pop(name, None)
-        self._update()
+        with self._lock:
+            self._now.pop(name, None)
+            self._update(advance=1)
 
     def _update(self, advance: int = 0) -> None:
         shown = [f"{name}: {words}" if words else name for name, words in self._now.items()]

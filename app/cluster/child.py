@@ -14,10 +14,16 @@ GRACE_S = 20.0  # to save what there is
 
 
 def main() -> int:
-    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
+    watch_parent()
     from shapeshift.app.cli import main as run_program
 
     return run_program()
+
+
+def watch_parent() -> None:
+    """From the main thread, before anything else."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # workers ignore it, and hand that on
+    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
 
 
 def end_with_parent() -> None:

@@ -2,12 +2,28 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Protocol
 
 from shapeshift.app.cluster.task import Task
+from shapeshift.app.command_line import EXPERT, Opt
 from shapeshift.app.errors import UsageError
 
 NONE = "none"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClusterOptions:
+    """Options of commands whose work falls into tasks."""
+
+    cluster: Annotated[str, Opt(metavar="WHERE")] = NONE
+    """Who does the work: none (this process), local or local:N (so many processes of this
+    machine), tls://HOST:PORT (a scheduler of `cluster scheduler`), slurm:FILE (docs/cluster.md)."""
+    certificates: Annotated[Path | None, EXPERT] = None
+    """The folder of `cluster certificates`, for a cluster of other machines.  Default: none."""
+    gpus: Annotated[int, EXPERT] = 0
+    """GPUs of this machine that the processes of --cluster local share, one each."""
 
 
 class Cluster(Protocol):
@@ -23,10 +39,34 @@ class Cluster(Protocol):
 
 
 @contextmanager
-def open_cluster(where: str = NONE) -> Iterator[Cluster]:
+def open_cluster(
+    where: str = NONE, certificates: Path | None = None, gpus: int = 0
+) -> Iterator[Cluster]:
     """What runs tasks where --cluster says.  Raises UsageError."""
     from shapeshift.app.cluster.here import Here
+    from shapeshift.app.cluster.place import read_place
 
-    if where != NONE:
-        raise UsageError(f"--cluster is '{where}', expected none.")
-    yield Here()
+    place = read_place(where)
+    if gpus < 0 or (gpus and place.kind != "local"):
+        raise UsageError(
+            f"--gpus is {gpus}, expected the GPUs of this machine, with --cluster local; of other "
+            "machines `cluster worker --gpus` says how many there are."
+        )
+    if place.kind == "none":
+        yield Here()
+        return
+    from shapeshift.app.cluster.certificates import require_dask
+
+    require_dask()
+    from shapeshift.app.cluster import dask_cluster
+
+    if place.kind == "local":
+        opened = dask_cluster.local_cluster(max(place.workers, gpus), gpus)
+    elif place.kind == "scheduler":
+        opened = dask_cluster.scheduler_at(place.address, certificates)
+    else:
+        from shapeshift.app.cluster.slurm import slurm_cluster
+
+        opened = slurm_cluster(place.file, certificates)
+    with opened as cluster:
+        yield cluster

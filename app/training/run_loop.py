@@ -87,7 +87,7 @@ def train(
     from shapeshift.app.progress import progress_bar
 
     columns = ("{task.description}", "{task.fields[psnr]}", "{task.fields[loss]}")
-    look, saved = 1 / LOOKS, time.monotonic()
+    look, saved, troubled = 1 / LOOKS, time.monotonic(), False
     most = "" if trainer.settings.seconds is None else f" of {trainer.settings.seconds:g}"
     with (
         interrupts() as asked,
@@ -108,6 +108,9 @@ def train(
                     "with half the learning rates",
                     soft_wrap=True,
                 )
+            if trainer.photos.trouble and not troubled:
+                troubled = True
+                bar.console.print(trainer.photos.trouble, soft_wrap=True)
             if now.fraction >= look and trainer.settled:
                 look += 1 / LOOKS
                 bar.update(task, psnr=decibels(trainer.held_out_psnr()))

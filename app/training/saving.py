@@ -1,4 +1,4 @@
-"""What a training run leaves on disk, also where memory or the disk end it: see train.py."""
+"""What a training run leaves on disk, also where memory, disk or a photo end it: see train.py."""
 
 import tempfile
 from collections.abc import Iterator
@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.runtime_models.model import BadFile
 
 if TYPE_CHECKING:
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
 LESS = "fewer --max-anchors, or a larger --downscale, need less"
@@ -47,17 +49,43 @@ def memory_for_training() -> Iterator[None]:
         raise UsageError(f"there is not enough memory to begin; {LESS}.") from None
 
 
+def room_of(out: Path, megabytes: float | None) -> "PhotoRoom":
+    """Where the photos may lie; megabytes: --photo-mb.  Raises UsageError."""
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
+
+    if megabytes is not None and not 0 < megabytes < float("inf"):
+        raise UsageError(f"--photo-mb is {megabytes}, expected MB above 0.")
+    most = None if megabytes is None else int(megabytes * 1e6)
+    return PhotoRoom(most, photos_path(out))
+
+
 @contextmanager
-def saved_when_memory_ends(trainer: "Trainer", out: Path, checkpoint: Path) -> Iterator[None]:
-    """Writes what there is when memory ends, and raises UsageError that says so."""
+def saved_when_it_fails(trainer: "Trainer", out: Path, checkpoint: Path) -> Iterator[None]:
+    """Writes what there is when memory ends, or a photo that is read late cannot be read.
+
+    Raises UsageError or BadFile that says so.
+    """
+    done = False
     try:
         yield
+        done = True
+    except BadFile as why:
+        if not trainer.iteration:
+            raise
+        save(trainer, out, checkpoint)
+        raise BadFile(
+            f"{why}  The scene as it was after {trainer.iteration} steps is in {full(out)}; when "
+            "the photo is mended, --resume goes on."
+        ) from None
     except memory_errors():
         save(trainer, out, checkpoint)
         raise UsageError(
             f"memory was full after {trainer.iteration} steps, with {trainer.anchors_count:,} "
             f"anchors; the scene as it was then is in {full(out)}.  To train on, {LESS}."
         ) from None
+    finally:
+        if not done:
+            trainer.photos.close(keep=True)
 
 
 def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
@@ -90,6 +118,11 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
     raise UsageError(f"{why}; the scene and its checkpoint are in {elsewhere} instead.")
 
 
+def photos_path(out: Path) -> Path:
+    """Where the photos of a run that writes `out` are kept if they do not fit into memory."""
+    return out.with_name(out.name + ".photos")
+
+
 def cameras_path(out: Path) -> Path:
     """Where the refined cameras of a package `out` lie."""
     return out.with_name(out.name + ".cameras.json")
@@ -109,7 +142,6 @@ def save_cameras(trainer: "Trainer", out: Path) -> None:
 
 def resume_hint(checkpoint: Path) -> str:
     """What a run that could not be saved can go on from, in words."""
-    from shapeshift.runtime_models.model import BadFile
     from shapeshift.training.checkpoint import read_checkpoint
 
     try:

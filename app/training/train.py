@@ -3,10 +3,12 @@
 import shlex
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shapeshift.app.cluster.open_cluster import NONE
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
@@ -35,9 +37,10 @@ def run(options: Options) -> int:
     from shapeshift.app.training.saving import (
         check_writable,
         memory_for_training,
+        room_of,
         save,
         save_checkpoint,
-        saved_when_memory_ends,
+        saved_when_it_fails,
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
@@ -53,10 +56,11 @@ def run(options: Options) -> int:
     check_calibrate(options)
     if (in_blocks := part_in_blocks(options)) is not None:
         return in_blocks(options)
+    room = room_of(options.out, options.photo_mb)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
-        return run_baseline(options)
+        return run_baseline(options, replace(room, folder=None))
     check_plain_options(options)
     check_writable(options.out)  # now, not after the training
     refuse_foreign(options.out)
@@ -70,11 +74,11 @@ def run(options: Options) -> int:
         settings = calibrated(device, capture, settings, options.calibrate)
     with memory_for_training(), working(READING) as shown:
         given = with_extrinsics(capture, settings.rig)
-        trainer = Trainer(device, given, settings, resume, report=shown)
+        trainer = Trainer(device, given, settings, resume, report=shown, room=room)
     say(describe(trainer), *trainer.warnings)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     began, before = time.monotonic(), trainer.iteration
-    with saved_when_memory_ends(trainer, options.out, checkpoint):
+    with saved_when_it_fails(trainer, options.out, checkpoint):
         interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
     step_s = (time.monotonic() - began) / max(trainer.iteration - before, 1)
     save(trainer, options.out, checkpoint)
@@ -88,6 +92,7 @@ def run(options: Options) -> int:
         say(*found)
     for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
+    trainer.photos.close(keep=interrupted)
     return INTERRUPTED if interrupted else 0
 
 
@@ -107,6 +112,8 @@ def part_in_blocks(options: Options) -> Callable[[Options], int] | None:
         return run_blocks
     if options.coarse_iterations is not None:
         raise UsageError("--coarse-iterations is of --blocks; add --blocks, or leave it out.")
+    if options.cluster != NONE:
+        raise UsageError("--cluster shares out blocks; add --blocks, or leave it out.")
     return None
 
 

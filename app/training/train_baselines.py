@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.baselines.plain import PlainTrainer
     from shapeshift.training.baselines.plain_settings import PlainSettings
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
 
@@ -55,7 +56,8 @@ class Outcome:
         return sum(run.steps for run in self.runs.values())
 
 
-def run_baseline(options: Options) -> int:
+def run_baseline(options: Options, room: "PhotoRoom") -> int:
+    """room: for the photos of each model in turn."""
     from shapeshift.rasterizer.device import open_device
     from shapeshift.training.calibration.extrinsics import with_extrinsics
 
@@ -74,9 +76,9 @@ def run_baseline(options: Options) -> int:
         settings = calibrated(device, capture, settings, options.calibrate)
         capture = with_extrinsics(capture, settings.rig)
     if plain is not None:
-        outcome = train_splats(device, capture, plain, options.out)
+        outcome = train_splats(device, capture, plain, options.out, room)
     elif settings is not None:
-        outcome = train_separate(device, capture, settings, options.out)
+        outcome = train_separate(device, capture, settings, options.out, room)
     say(outcome_line(outcome, capture, options.out))
     return INTERRUPTED if outcome.interrupted else 0
 
@@ -113,7 +115,13 @@ def share_of(settings: "Kind", capture: "Capture") -> "Kind":
     )
 
 
-def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Path) -> Outcome:
+def train_splats(
+    device,
+    capture: "Capture",
+    settings: "PlainSettings",
+    out: Path,
+    room: "PhotoRoom | None" = None,
+) -> Outcome:
     """Plain splats of every modality into the folder `out`: a PLY each and layers.json."""
     from shapeshift.runtime_models.splats.layers.write_layer_list import (
         layer_name,
@@ -127,20 +135,27 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
     layers, runs, interrupted = [], {}, False
     for number, part in enumerate(parts):
         with working(READING) as report:
-            trainer = PlainTrainer(device, part, settings, report)
+            trainer = PlainTrainer(device, part, settings, report, room)
         say(describe_plain(trainer), *trainer.warnings)
         interrupted = train(trainer)
         layers.append((trainer.stop, trainer.splats()))
         file = out / layer_name(number, trainer.stop)
         runs[trainer.stop.name] = TrainedFile(file, trainer.elapsed, trainer.iteration)
         say(result_line(trainer, trainer.count), *trainer.exposures.warnings())
+        trainer.photos.close()
         if interrupted:
             break
     write_layer_list(layers, out)
     return Outcome(runs, interrupted)
 
 
-def train_separate(device, capture: "Capture", settings: "TrainSettings", out: Path) -> Outcome:
+def train_separate(
+    device,
+    capture: "Capture",
+    settings: "TrainSettings",
+    out: Path,
+    room: "PhotoRoom | None" = None,
+) -> Outcome:
     """An anchor model of every modality into the folder `out`: a package each."""
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
     from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name
@@ -159,12 +174,14 @@ def train_separate(device, capture: "Capture", settings: "TrainSettings", out: P
     runs, interrupted = {}, False
     for part in parts:
         with working(READING) as report:
-            trainer, name = Trainer(device, part, settings, report=report), part.stops[0].name
+            trainer = Trainer(device, part, settings, report=report, room=room)
+            name = part.stops[0].name
         say(describe(trainer), *trainer.warnings)
         interrupted = train(trainer)
         write_package(trainer.model(), files[name])
         runs[name] = TrainedFile(files[name], trainer.elapsed, trainer.iteration)
         say(result_line(trainer, trainer.anchors_count), *trainer.exposures.warnings())
+        trainer.photos.close()
         if interrupted:
             break
     return Outcome(runs, interrupted)

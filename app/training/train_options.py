@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from shapeshift.app.cluster.open_cluster import ClusterOptions
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.left_options import LEFT
@@ -34,7 +35,7 @@ class MachineOptions:
 
 
 @dataclass(frozen=True)
-class Options(MachineOptions):
+class Options(MachineOptions, ClusterOptions):
     """Train a shape-shifting scene.
 
     A first run needs only --out.
@@ -55,6 +56,10 @@ class Options(MachineOptions):
     coarse_iterations: int | None = None
     """With --blocks: steps of the run of the whole that comes first; each block then has
     --iterations.  Default: 2000."""
+    photo_mb: Annotated[float | None, EXPERT] = None
+    """MB of memory that photos may take.  What does not fit is kept in NAME.photos beside --out
+    until the training is done, and read from there as it is needed: the scene is the same to the
+    byte.  Default: half of --memory."""
     resume: bool = False
     """Continue from the checkpoint with its settings; --iterations or --seconds may be larger."""
     calibrate: Annotated[str | None, MODALITY] = None

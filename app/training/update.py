@@ -57,7 +57,7 @@ def run(options: Options) -> int:
         memory_for_training,
         save,
         save_checkpoint,
-        saved_when_memory_ends,
+        saved_when_it_fails,
     )
     from shapeshift.app.training.update_region import base_of, region_of
     from shapeshift.rasterizer.device import open_device
@@ -87,7 +87,7 @@ def run(options: Options) -> int:
     say(describe(trainer), *trainer.warnings)
     before = trainer.psnr_before()
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    with saved_when_memory_ends(trainer, options.out, checkpoint):
+    with saved_when_it_fails(trainer, options.out, checkpoint):
         interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
     save(trainer, options.out, checkpoint)
     say(*summary(trainer, options.out, before, interrupted))

@@ -63,11 +63,11 @@ typedef struct {
 #define GIVE_FINE(v)
 #endif
 
-// 2^x as in vector.cl, with a relative error of 2.6e-6: minimax of degree 4.
+// 2^x as in raster_blocks.cl, with a relative error of 2.6e-6: minimax of degree 4.
 inline float16 exp2_16(float16 x) {
   const float16 shifted = x + 12582912.0f;
   const float16 f = x - (shifted - 12582912.0f);
-  // Far below a step of 8 bits, with two terms less than for gradients.
+  // Far below a step of 8 bits, with a term less than for gradients.
   float16 p = 9.570096662e-3f;
   p = fma(p, f, (float16)(5.591785991e-2f));
   p = fma(p, f, (float16)(2.402474496e-1f));

@@ -21,7 +21,7 @@
 #define WEIGH(k)                                                                        \
   const float8 dx = block_x[k] - mx, dy = block_y[k] - my;                              \
   const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);                     \
-  float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);                           \
+  float8 alpha = fmin(s[OPACITY] * exp2p(power), MAX_ALPHA);                           \
   const float8 weight = select((float8)(0), alpha, power >= least) * T[k];              \
   T[k] -= weight;
 
@@ -69,7 +69,7 @@ __kernel void evidence(int width, int height, int tiles_x, __global const int* t
     whole = k == 0 || whole == same[k] ? same[k] : SEVERAL;
   }
   Batch batch;
-  uint open = 0xffffffffu;
+  uint open = ALL_BLOCKS;
   int p = tile_start[tile];
   const int end = tile_start[tile + 1];
   while (p < end && open) {

@@ -1,6 +1,6 @@
 // raster, CPU form, for training (draw_cpu.cl is for the screen): lists of intersections -> an
 // image, and the gradients of an image -> those of every intersection.
-// One work-item a tile of 16x16 pixels, kept in registers and the first cache, in blocks of eight
+// One work-item a tile of 16x16 pixels, kept in registers and the first cache, in blocks of PIXELS
 // pixels (common/raster_blocks.cl).  Blending front to back (3DGS, eq. 3; paper eq. 2):
 //   C = sum of c alpha T,  T the product of 1 - alpha of what lies before
 // Early stop: blocks whose transmittance is below STOP everywhere are dropped from the mask every
@@ -18,15 +18,15 @@
 #ifdef SURFACE
 // The fraction of surface.cl: depth under pixels (dx, dy) from the mean, before it is held.
 typedef struct {
-  float8 z, ahead, per;  // metres; 1 + l; 1 / (1 + 2 l + q)
-} Depth8;
+  floatp z, ahead, per;  // metres; 1 + l; 1 / (1 + 2 l + q)
+} Depths;
 
-inline Depth8 depth_under(const float8 f, float8 dx, float8 dy) {
-  Depth8 d;
-  const float8 l = fma(f.s1, dx, f.s2 * dy);
-  const float8 q = fma(dx, fma(f.s3, dx, 2 * f.s4 * dy), f.s5 * dy * dy);
+inline Depths depth_under(const float8 f, floatp dx, floatp dy) {
+  Depths d;
+  const floatp l = fma(f.s1, dx, f.s2 * dy);
+  const floatp q = fma(dx, fma(f.s3, dx, 2 * f.s4 * dy), f.s5 * dy * dy);
   d.ahead = 1.0f + l;
-  d.per = 1.0f / fmax(fma((float8)(2.0f), l, 1.0f + q), SURFACE_LEAST);
+  d.per = 1.0f / fmax(fma((floatp)(2.0f), l, 1.0f + q), SURFACE_LEAST);
   // Z (1 + l) / (1 + 2 l + q), with the terms that the gradients need kept.
   d.z = f.s0 * d.ahead * d.per;
   return d;
@@ -38,11 +38,11 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
 #ifdef SURFACE
-  float8 Z[BLOCKS];
+  floatp Z[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) Z[k] = 0;
 #endif
-  // Transmittance and colours of all 256 pixels: 32 blocks of eight.
-  float8 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
+  // Transmittance and colours of all 256 pixels.
+  floatp T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
     block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
@@ -50,7 +50,7 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
     R[k] = G[k] = B[k] = 0;
   }
   Batch batch;
-  uint open = 0xffffffffu;
+  uint open = ALL_BLOCKS;
   int p = tile_start[tile];
   const int end = tile_start[tile + 1];
   while (p < end && open) {
@@ -70,14 +70,14 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
       drawn_blocks[p + j] = drawn;
       for (uint left = drawn; left; left &= left - 1) {
         const int k = lowest(left);
-        const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
+        const floatp dx = block_x[k] - mx, dy = block_y[k] - my;
         // power here is log2 of exp(-power / 2): largest at the mean, `least` at the threshold.
-        const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
-        float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);
+        const floatp power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        floatp alpha = fmin(s[OPACITY] * exp2p(power), MAX_ALPHA);
         // Not drawn where the power is beyond its threshold (alpha below min alpha).
-        alpha = select((float8)(0), alpha, power >= least);
+        alpha = select((floatp)(0), alpha, power >= least);
         // The weight alpha T of the splat in this pixel.
-        const float8 w = alpha * T[k];
+        const floatp w = alpha * T[k];
         R[k] = fma(w, s[RED], R[k]);
         G[k] = fma(w, s[GREEN], G[k]);
         B[k] = fma(w, s[BLUE], B[k]);
@@ -96,18 +96,18 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
   // Planar output: three channels of (H, W), as the losses read them.
   const size_t plane = (size_t)width * height;
   for (int k = 0; k < BLOCKS; k++) {
-    const float8 t = T[k];
-    float r[LANES], g[LANES], b[LANES], a[LANES];
+    const floatp t = T[k];
+    float r[PIXELS], g[PIXELS], b[PIXELS], a[PIXELS];
     // What light is left comes from the background.
-    vstore8(fma(t, red, R[k]), 0, r);
-    vstore8(fma(t, green, G[k]), 0, g);
-    vstore8(fma(t, blue, B[k]), 0, b);
-    vstore8(t, 0, a);
+    STORE_PIXELS(fma(t, red, R[k]), 0, r);
+    STORE_PIXELS(fma(t, green, G[k]), 0, g);
+    STORE_PIXELS(fma(t, blue, B[k]), 0, b);
+    STORE_PIXELS(t, 0, a);
 #ifdef SURFACE
-    float z[LANES];
-    vstore8(Z[k], 0, z);
+    float z[PIXELS];
+    STORE_PIXELS(Z[k], 0, z);
 #endif
-    for (int lane = 0; lane < LANES; lane++) {
+    for (int lane = 0; lane < PIXELS; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
       const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
       if (x >= width || y >= height) continue;
@@ -138,25 +138,25 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
   const size_t plane = (size_t)width * height;
   // Of all 256 pixels: T, what is still to come from behind, and dL/dC.
-  float8 T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
-  float8 block_x[BLOCKS], block_y[BLOCKS];
+  floatp T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
+  floatp block_x[BLOCKS], block_y[BLOCKS];
 #ifdef SHARE
-  float8 pixel_error[BLOCKS];
+  floatp pixel_error[BLOCKS];
 #endif
 #ifdef SURFACE
-  float8 grad_z[BLOCKS];
+  floatp grad_z[BLOCKS];
 #endif
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
     block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
-    float r[LANES], g[LANES], b[LANES], d[LANES];
+    float r[PIXELS], g[PIXELS], b[PIXELS], d[PIXELS];
 #ifdef SHARE
-    float e[LANES];
+    float e[PIXELS];
 #endif
 #ifdef SURFACE
-    float z[LANES];
+    float z[PIXELS];
 #endif
-    for (int lane = 0; lane < LANES; lane++) {
+    for (int lane = 0; lane < PIXELS; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
       const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
       const size_t at = (size_t)y * width + x;
@@ -179,22 +179,32 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
 #endif
     }
     T[k] = inside(k, x0, y0, width, height);
-    grad_r[k] = vload8(0, r);
-    grad_g[k] = vload8(0, g);
-    grad_b[k] = vload8(0, b);
-    rest[k] = vload8(0, d);
+    grad_r[k] = LOAD_PIXELS(0, r);
+    grad_g[k] = LOAD_PIXELS(0, g);
+    grad_b[k] = LOAD_PIXELS(0, b);
+    rest[k] = LOAD_PIXELS(0, d);
 #ifdef SHARE
-    pixel_error[k] = vload8(0, e);
+    pixel_error[k] = LOAD_PIXELS(0, e);
 #endif
 #ifdef SURFACE
-    grad_z[k] = vload8(0, z);
+    grad_z[k] = LOAD_PIXELS(0, z);
 #endif
   }
+  // Only as far as the forward pass went: behind it nothing was drawn.
   float splats[BATCH * RECORD];
   const int end = tile_end[tile], last_intersection = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end; p += BATCH) {
     const int n = min(BATCH, end - p);
-    int slot[BATCH];  // ahead of use, as the records, so that these misses overlap
+    const int ahead = min(BATCH, end - p - n);
+    for (int j = 0; j < ahead; j++) {  // of the next batch: the work on this one hides the misses
+      // A record lies in one or two cache lines.
+      const int splat = intersections[p + n + j];
+      PREFETCH(record + (size_t)RECORD * splat);
+      PREFETCH(record + (size_t)RECORD * splat + RECORD - 1);
+      PREFETCH(tile_bounds + splat);
+      PREFETCH(first_slot + splat);
+    }
+    int slot[BATCH];  // ahead of use, as the records
     for (int j = 0; j < n; j++) {
       const int splat = intersections[p + j];
       copy_record(record, splat, splats + RECORD * j);
@@ -203,44 +213,45 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
     for (int j = 0; j < n; j++) {
       const float* s = splats + RECORD * j;
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
+      // As in the forward pass, to the bit: the same exponents, so the same decisions.
       const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
       const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[POWER_THRESHOLD];
       // Sums over the tile's pixels: of the colour, of the power and of its products with dx and
       // dy, from which the gradients of mean and conic follow at the end.
-      float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
-      float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, extra_x = 0, extra_y = 0, sum_w = 0;
+      floatp sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
+      floatp sum_xx = 0, sum_xy = 0, sum_yy = 0, extra_x = 0, extra_y = 0, sum_w = 0;
 #ifdef SURFACE
       const float8 f = vload8(intersections[p + j], surface);
-      float8 by_z = 0, by_l = 0, by_u = 0, by_v = 0, by_x = 0, by_y = 0;
-      float8 by_uu = 0, by_uv = 0, by_vv = 0, by_low = 0, by_high = 0;
+      floatp by_z = 0, by_l = 0, by_u = 0, by_v = 0, by_x = 0, by_y = 0;
+      floatp by_uu = 0, by_uv = 0, by_vv = 0, by_low = 0, by_high = 0;
 #endif
       // The same blocks in the same order as in the forward pass, so the same T.
       for (uint left = drawn_blocks[p + j]; left; left &= left - 1) {
         const int k = lowest(left);
-        const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
-        const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        const floatp dx = block_x[k] - mx, dy = block_y[k] - my;
+        const floatp power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
         // Before 0.99 holds it, for the gradient below.
-        const float8 raw = s[OPACITY] * exp2_8(power);
-        const float8 alpha = select((float8)(0), fmin(raw, MAX_ALPHA), power >= least);
+        const floatp raw = s[OPACITY] * exp2p(power);
+        const floatp alpha = select((floatp)(0), fmin(raw, MAX_ALPHA), power >= least);
         // T before this splat: dL/dalpha needs what light reached it.
-        const float8 before = T[k];
-        const float8 w = alpha * before;
+        const floatp before = T[k];
+        const floatp w = alpha * before;
 #ifdef SURFACE
-        const Depth8 d = depth_under(f, dx, dy);
-        const float8 z = fmin(fmax(d.z, f.s6), f.s7);
-        const float8 given = fma(grad_z[k], z, fma(grad_r[k], s[RED],
+        const Depths d = depth_under(f, dx, dy);
+        const floatp z = fmin(fmax(d.z, f.s6), f.s7);
+        const floatp given = fma(grad_z[k], z, fma(grad_r[k], s[RED],
                                  fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE])));
         // Where the depth is held at LOW or HIGH, the gradient goes to that bound instead.
-        const float8 all = w * grad_z[k], none = 0;
-        by_low += select(none, all, isless(d.z, (float8)(f.s6)));
-        by_high += select(none, all, isgreater(d.z, (float8)(f.s7)));
-        const int8 free = isgreaterequal(d.z, (float8)(f.s6)) & islessequal(d.z, (float8)(f.s7));
-        const float8 h = select(none, all, free);
+        const floatp all = w * grad_z[k], none = 0;
+        by_low += select(none, all, isless(d.z, (floatp)(f.s6)));
+        by_high += select(none, all, isgreater(d.z, (floatp)(f.s7)));
+        const intp free = isgreaterequal(d.z, (floatp)(f.s6)) & islessequal(d.z, (floatp)(f.s7));
+        const floatp h = select(none, all, free);
         by_z = fma(h, d.ahead * d.per, by_z);
         // The derivatives of Z (1 + l) / (1 + 2 l + q) by l and by q.
-        const float8 by_ahead = h * f.s0 * d.per * (1.0f - 2.0f * d.ahead * d.per);
-        const float8 by_q = -h * d.z * d.per, qu = by_q * dx, qv = by_q * dy;
+        const floatp by_ahead = h * f.s0 * d.per * (1.0f - 2.0f * d.ahead * d.per);
+        const floatp by_q = -h * d.z * d.per, qu = by_q * dx, qv = by_q * dy;
         by_l += by_ahead;
         by_u = fma(by_ahead, dx, by_u);
         by_v = fma(by_ahead, dy, by_v);
@@ -250,10 +261,10 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
         by_uv = fma(qu, dy, by_uv);
         by_vv = fma(qv, dy, by_vv);
 #else
-        const float8 given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
+        const floatp given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
 #endif
         // What is behind this splat gets the rest of the gradient.
-        const float8 behind = fma(-w, given, rest[k]);
+        const floatp behind = fma(-w, given, rest[k]);
         rest[k] = behind;
         T[k] = before - w;
         // dL/dc = alpha T dL/dC.
@@ -261,16 +272,16 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
         sum_g = fma(w, grad_g[k], sum_g);
         sum_b = fma(w, grad_b[k], sum_b);
         // More alpha shows more of c and hides more of what is behind.
-        const float8 grad_alpha = fma(before, given, -behind / (1.0f - alpha));
+        const floatp grad_alpha = fma(before, given, -behind / (1.0f - alpha));
         // d alpha / d power = alpha; none where the 0.99 holds it.
-        const float8 g = select(alpha * grad_alpha, (float8)(0), raw > MAX_ALPHA);
+        const floatp g = select(alpha * grad_alpha, (floatp)(0), raw > MAX_ALPHA);
         // d ln alpha / d mean = Q d with Q the conic, d ln alpha / d Q = -d d^T / 2: what is summed
         // is g d and g d d^T, and Q and the factors follow after the sum.
-        const float8 gx = g * dx, gy = g * dy;
+        const floatp gx = g * dx, gy = g * dy;  // first moments
         sum_p += g;
         sum_x += gx;
         sum_y += gy;
-        sum_xx = fma(gx, dx, sum_xx);
+        sum_xx = fma(gx, dx, sum_xx);  // second moments
         sum_xy = fma(gx, dy, sum_xy);
         sum_yy = fma(gy, dy, sum_yy);
 #ifdef ABSOLUTE
@@ -282,25 +293,28 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
         extra_x = fma(w, pixel_error[k], extra_x);
 #endif
 #ifdef WEIGHT
-        sum_w += w;
+        sum_w += w;  // in pixels
 #endif
       }
       // Nobody else writes to this slot, so the sums need no atomics.
       __global float* out = slots + (size_t)RECORD * slot[j];
-      // Eight sums over lanes as one tree; then the factors that all pixels share.
-      const float8 one = sums8(sum_x, sum_y, sum_xx, sum_xy, sum_yy, sum_p, sum_r, sum_g);
+      // Then the factors that all pixels share: the conic turns sums of g d into the gradient of
+      // the mean, and dalpha / dopacity = alpha / opacity.
+      const float16 one = sums12(sum_x, sum_y, sum_xx, sum_xy, sum_yy, sum_p, sum_r, sum_g, sum_b,
+                                 extra_x, extra_y, sum_w);
       vstore8((float8)(A * one.s0 + B * one.s1, B * one.s0 + C * one.s1, -0.5f * one.s2, -one.s3,
                        -0.5f * one.s4, one.s5 / s[OPACITY], one.s6, one.s7),
               0, out);
+      vstore4(one.s89ab, 0, out + 8);
 #ifdef SURFACE
       // The mean on the screen moves u and v the other way.
-      const float l = sum8(by_l), x = sum8(by_x), y = sum8(by_y);
-      out[MEAN_X] -= f.s1 * l + 2 * (f.s3 * x + f.s4 * y);
-      out[MEAN_Y] -= f.s2 * l + 2 * (f.s4 * x + f.s5 * y);
-      vstore8(sums8(by_z, by_u, by_v, by_uu, 2 * by_uv, by_vv, by_low, by_high), slot[j],
-              depth_slots);
+      // Sums of what d Z is by the eight numbers of the fraction, and by l, x and y of the mean.
+      const float16 by = sums12(by_z, by_u, by_v, by_uu, by_uv, by_vv, by_low, by_high, by_l, by_x,
+                                by_y, by_y);
+      out[MEAN_X] -= f.s1 * by.s8 + 2 * (f.s3 * by.s9 + f.s4 * by.sa);
+      out[MEAN_Y] -= f.s2 * by.s8 + 2 * (f.s4 * by.s9 + f.s5 * by.sa);
+      vstore8(by.lo * (float8)(1, 1, 1, 1, 2, 1, 1, 1), slot[j], depth_slots);
 #endif
-      vstore4((float4)(sum8(sum_b), sum8(extra_x), sum8(extra_y), sum8(sum_w)), 0, out + 8);
     }
   }
   // Slots are not cleared beforehand: every intersection writes its own.

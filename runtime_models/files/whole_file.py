@@ -109,12 +109,24 @@ def open_lines(path: Path) -> IO[str]:
 def open_locked(path: Path) -> IO[str] | None:
     """A short text file to read and write in place, ours alone while it is open and not removed.
 
-    None while somebody else has it; on Windows everybody gets it.  A link is not followed.
+    None while somebody else has it; on Windows, and where the file system knows no locks,
+    everybody gets it.  A link is not followed.
     """
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
     with naming(path):
         file = open(os.open(path, flags, 0o666), "r+", encoding="utf-8", newline="\n")
-    if not LOCKS or (lock(file.fileno()) and os.fstat(file.fileno()).st_nlink):
+    if not LOCKS:
+        return file
+    import fcntl
+
+    try:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        free = os.fstat(file.fileno()).st_nlink > 0  # else its last owner took it away meanwhile
+    except BlockingIOError:
+        free = False
+    except OSError:
+        free = True  # it knows no locks
+    if free:
         return file
     file.close()
     return None

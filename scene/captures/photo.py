@@ -100,6 +100,20 @@ def load_photo(photo: Photo, factor: int = 1, one_of_many: bool = False) -> Pixe
     return Pixels(np.asarray(image.convert("RGB")), mask, gone)
 
 
+def has_alpha_channel(photo: Photo) -> bool:
+    """Whether load_photo finds an alpha channel in the photo's file: its header says so."""
+    if photo.counts is not None:
+        return False
+    with open_image(photo.path) as image:
+        return is_see_through(image)
+
+
+def is_see_through(image: Image.Image) -> bool:
+    """Whether an image that is colours or grey shades of a byte comes with an alpha channel."""
+    grey = image.mode in (*GREY_16, FLOATS)
+    return not grey and (image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info)
+
+
 def over_black(image: Image.Image) -> Image.Image:
     """An image without an alpha channel; its colours times the one that it had."""
     if image.mode != "RGBA":
@@ -156,7 +170,7 @@ def decoded(
         if counts is not None or image.mode in (*GREY_16, FLOATS):
             grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
             return Image.fromarray(np.rint(255 * grey).astype(np.uint8)), size
-        if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+        if is_see_through(image):
             return image.convert("RGBA"), size
         return image.convert("L" if image.mode in ("L", "1") else "RGB"), size
 
@@ -194,7 +208,7 @@ def read_pixels(
         if counts is not None or image.mode in (*GREY_16, FLOATS):
             grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
             return np.repeat(grey[..., None], 3, axis=2), None
-        if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+        if is_see_through(image):
             rgba = floats(image, "RGBA")
             alpha = rgba[..., 3].copy()
             rgba[..., :3] *= rgba[..., 3:]

@@ -17,6 +17,7 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.poses.pose_report import PoseReport
+    from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.run import Progress
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
@@ -74,14 +75,13 @@ def train(
         model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
-    from shapeshift.app.training.saving import check_writable, memory_for_training
+    from shapeshift.app.training.saving import check_writable
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
-    from shapeshift.training.calibration.extrinsics import rig_json, with_extrinsics
+    from shapeshift.training.calibration.extrinsics import rig_json
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
-    from shapeshift.training.train import Trainer
 
     path = None if out is None else plain(str(out))
     if path is not None:
@@ -98,12 +98,25 @@ def train(
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
         offset = calibrate_cameras(on, found, wished, calibrate, report=lambda what, part: None)
         wished = replace(wished, rig=rig_json(calibrate, offset))
-    with memory_for_training():
-        trainer = Trainer(on, with_extrinsics(found, wished.rig), wished, before)
+    trainer = trainer_of(on, found, wished, before, path)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
     run(trainer, path, progress)
     return finished(trainer, path, pace)
+
+
+def trainer_of(
+    device, capture: "Capture", wished: "TrainSettings", before: tuple | None, path: Path | None
+) -> "Trainer":
+    """The run before its first step; photos that do not fit into memory lie beside `path`."""
+    from shapeshift.app.training.saving import memory_for_training, photos_path
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
+    from shapeshift.training.train import Trainer
+
+    room = PhotoRoom(folder=None if path is None else photos_path(path))
+    with memory_for_training():
+        return Trainer(device, with_extrinsics(capture, wished.rig), wished, before, room=room)
 
 
 def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
@@ -140,7 +153,7 @@ def run(
     from shapeshift.training.checkpoint import checkpoint_path
 
     saved = time.monotonic()
-    ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, *memory_errors())
+    ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, BadFile, *memory_errors())
     try:
         for now in trainer.steps():
             if progress is not None and progress(now) is False and trainer.settled:
@@ -151,6 +164,7 @@ def run(
     except ends:
         if path is not None and trainer.iteration:
             save(trainer, path, checkpoint_path(path))
+        trainer.photos.close(keep=path is not None)
         raise
 
 
@@ -169,7 +183,9 @@ def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
         model = replace(model, pace=measure_pace(model))
         if path is not None:
             write_package(model, path)
-    return TrainedScene(model, path, trainer)
+    scene = TrainedScene(model, path, trainer)
+    trainer.photos.close()
+    return scene
 
 
 def update(

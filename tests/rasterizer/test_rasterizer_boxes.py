@@ -8,7 +8,7 @@ import pytest
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Projected, project
 from shapeshift.rasterizer.raster import FORMS as RASTER_FORMS
-from shapeshift.rasterizer.raster import rasterize, rasterize_backward
+from shapeshift.rasterizer.raster import defines_of, rasterize, rasterize_backward
 from tests.support.renderer.rasterizer_scenes import (
     device,
     off_centre_camera,
@@ -136,21 +136,24 @@ def test_gradients_are_those_of_full_boxes(form):
 @pytest.mark.parametrize("longest", [1.0, 4.0, 15.0, 100.0, 900.0, 1e5])
 @pytest.mark.parametrize("shape", [1.0, 0.3, 0.05, 1e-3, 1e-6])
 @pytest.mark.parametrize("opacity", [0.004, 0.1, 0.9])
-def test_blocks_that_are_left_out_change_no_bit(longest, shape, opacity):
+@pytest.mark.parametrize("lanes", [8, 16])
+def test_blocks_that_are_left_out_change_no_bit(lanes, longest, shape, opacity):
     """Within a tile, too: picture and gradients beside those of a pass over every block."""
     rng, size, count = np.random.default_rng(int(longest)), (120, 90), 150
     sigmas = np.tile([[longest, max(longest * shape, 0.55)]], (count, 1))
     centres = rng.uniform((-20, -20), (140, 110), (count, 2))
     turns = np.r_[0, np.pi / 2, np.pi / 4, 1e-4, rng.uniform(0, np.pi, count - 4)]
     projected = ellipses(centres, sigmas, turns, opacity)
-    every = replace(device(), programs={})
+    usual = replace(device(), lanes=lanes)
+    every = replace(usual, programs={})
     path = RASTER_FORMS["cpu"][0]
-    for defines in ({}, {"ABSOLUTE": 1}):
+    for more in ({}, {"ABSOLUTE": 1}):
+        defines = defines_of(usual, "cpu") | more
         key = (str(path), tuple(sorted(defines.items())))
         every.programs[key] = device().program(path, **defines, EVERY_BLOCK=1)
     grad = device().upload(rng.normal(size=(3, size[1], size[0])).astype(np.float32))
     found = []
-    for where in (device(), every):
+    for where in (usual, every):
         tiles = bin_tiles(where, projected, size, "cpu")
         frame = rasterize(where, projected, tiles, size, form="cpu")
         backward = rasterize_backward(where, projected, tiles, frame, grad, form="cpu")

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera, project, project_backward
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
 from shapeshift.rasterizer.reference import finite_differences, render_reference
+from shapeshift.rasterizer.surface import rasterize_depth, rasterize_depth_backward, surface
 from tests.support.renderer.rasterizer_scenes import (
     GROUPS,
     as_double,
@@ -151,6 +153,41 @@ def test_both_forms_agree_record_by_record():
     for slot in range(11):
         error = np.linalg.norm(one[:, slot] - other[:, slot]) / np.linalg.norm(one[:, slot])
         assert error <= 1e-5, slot
+
+
+@pytest.mark.parametrize("with_depth", [False, True])
+@pytest.mark.parametrize("size", [(90, 70), (16, 16), (17, 1), (3, 33)])
+@pytest.mark.parametrize(("thinner", "bound"), [(0.1, 1e-5), (1.0, 1e-4)])
+def test_blocks_of_eight_and_sixteen_pixels_give_the_same(size, with_depth, thinner, bound):
+    """Another order of sums where nothing stops early (thinner).  Else wider blocks go on for
+    their neighbours' sake where less light is left than STOP, 1e-5, of a colour or a depth."""
+    splats, camera = random_splats(2000, seed=8, scale=0.05), off_centre_camera(size)
+    splats[3][:] *= thinner
+    images, records = [], []
+    for lanes in (8, 16):
+        d = replace(device(), lanes=lanes)
+        arrays = upload(splats)
+        projected = project(d, *arrays, camera)
+        tiles = bin_tiles(d, projected, size)
+        upstream = [d.upload(g) for g in random_gradients(size)]
+        if with_depth:
+            surfaces = surface(d, *arrays[:3], camera, projected)
+            drawn = rasterize_depth(d, projected, tiles, surfaces, size, BACKGROUND)
+            back = rasterize_depth_backward(d, projected, tiles, drawn, *upstream, upstream[1])
+            images.append([drawn.frame.image, drawn.frame.transmittance, drawn.metres])
+            records.append([*back])
+        else:
+            frame = rasterize(d, projected, tiles, size, BACKGROUND)
+            back = rasterize_backward(d, projected, tiles, frame, *upstream, weight=True)
+            images.append([frame.image, frame.transmittance])
+            records.append([back])
+    depth = projected.depth.get()
+    most = (1.0, 1.0, depth[depth < 1e30].max())  # of what one splat can give to a pixel
+    for one, other, at_most in zip(*images, most, strict=False):
+        np.testing.assert_allclose(one.get(), other.get(), rtol=1e-6, atol=1e-5 * at_most)
+    for one, other in zip(*records, strict=True):
+        error = np.linalg.norm(one.get() - other.get(), axis=0)
+        assert np.all(error <= bound * np.linalg.norm(one.get(), axis=0))
 
 
 def test_absolute_sums_bound_the_gradients_of_the_mean():

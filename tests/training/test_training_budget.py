@@ -8,6 +8,7 @@ import pytest
 from shapeshift.app import cli, progress
 from shapeshift.app.training.fit import without_times
 from shapeshift.app.training.train import train
+from shapeshift.training.photo_store.open_photos import TrainingPhotos
 from shapeshift.training.run import LENGTH_STEPS, Progress, Run
 from shapeshift.training.schedule import Budget
 from shapeshift.training.synthetic.balls import make_balls
@@ -23,7 +24,8 @@ class Steps(Run):
         self.device, self.step = SimpleNamespace(kind=kind), step
         self.settings = SimpleNamespace(seconds=seconds, rates=lambda length: length)
         self.budget = Budget(None if seconds else 5, seconds)
-        self.adam = {"anchors": [0]}
+        self.adam, self.schedule = {"anchors": [0]}, SimpleNamespace(photo=None)
+        self.photos = TrainingPhotos([], [])
         self.iteration, self.elapsed, self.run_length = 0, 0.0, None
 
     splat_count = 1
@@ -62,6 +64,23 @@ def test_a_processor_s_seconds_are_those_that_it_computed():
     worked = Steps("cpu", lambda: burn(0.02))
     told = [now.elapsed for now in worked.steps()]
     assert 0.1 <= worked.elapsed < 0.15 and told == sorted(told) and told[-1] == worked.elapsed
+
+
+def test_reading_photos_costs_none_of_the_budget():
+    """Be it a step that reads or a thread beside it, which processor time counts with the step."""
+    store = SimpleNamespace(read_s=0.0, waited_s=0.0, ahead=0, trouble="")
+    steps = Steps("cpu", lambda: read(store))
+    steps.photos = TrainingPhotos([], [], store)
+    for _ in steps.steps():
+        pass
+    assert 0.05 <= steps.elapsed < 0.08
+
+
+def read(store) -> None:
+    """A step of 10 ms in which a photo is read in 20."""
+    burn(0.02)
+    store.read_s += 0.02
+    burn(0.01)
 
 
 def test_other_devices_are_timed_by_the_clock():

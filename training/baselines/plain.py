@@ -31,7 +31,8 @@ from shapeshift.training.first_anchors.initial import (
     voxel_centres,
 )
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
+from shapeshift.training.photo_store.open_photos import PhotoRoom, open_photos
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale
 from shapeshift.training.run import SETTLE, Run
 from shapeshift.training.schedule import Budget, Schedule
 from shapeshift.training.supervision.backgrounds import choose_background, has_one_exposure
@@ -68,21 +69,22 @@ class PlainTrainer(Run):
     settings: PlainSettings
 
     def __init__(
-        self, device, capture: Capture, settings: PlainSettings, report: Report | None = None
-    ) -> None:
-        """report: called with words while the first points take long."""
+        self, device, capture: Capture, settings: PlainSettings, report: Report | None = None,
+        room: PhotoRoom | None = None,
+    ) -> None:  # fmt: skip
+        """report: called with words while the first points take long; room: for the photos."""
         self.device, self.capture, self.settings = device, capture, settings
         (self.stop,) = capture.stops
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
-        photos = load_photos(capture, "train", self.factor, settings.masks)
-        self.held_out = load_photos(capture, "test", self.factor, settings.masks)
+        self.photos = open_photos(capture, self.factor, settings.masks, room)
+        photos, self.held_out = self.photos.train, self.photos.test
         background = choose_background(settings.background, capture.background, photos)
         if settings.background == "auto":
             self.capture = replace(capture, background=background)  # hulls are carved out of it
         self.schedule = Schedule({self.stop.name: photos}, settings.seed, background)
         self.extent = extent_of([p.view for p in photos])
-        self.targets = Targets(device)
+        self.targets = Targets(device, self.photos.most)
         self.exposures = Exposures(device, self.schedule.photos, has_one_exposure(photos))
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, 1.0
@@ -99,7 +101,7 @@ class PlainTrainer(Run):
         rng = np.random.default_rng([settings.seed, 0])
         first = initial_points(self.capture, photos, rng, settings.points, report)
         points, self.origin = np.concatenate([first.points, first.guesses]), first.origin
-        self.warnings = list(first.doubts)
+        self.warnings = [*self.photos.warnings(), *first.doubts]
         most = min(settings.splats, settings.max_splats)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
         means = voxel_centres(points, self.voxel)
@@ -135,7 +137,7 @@ class PlainTrainer(Run):
         before = self.adam.state()
         background = self.schedule.background or BLACK
         photos = self.schedule.photos[self.stop.name]
-        for photo in {(p.view.size, p.depth is None): p for p in photos}.values():
+        for photo in {(p.view.size, p.has_depth): p for p in photos}.values():
             self.adam.step(self.photo_gradients(photo, background), 0.0)
             loss, visible = self.empty_loss(photo, background), self.visible()
             self.guard.observe(self.stop.name, loss, visible, 1.0)

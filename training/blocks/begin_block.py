@@ -7,12 +7,13 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blocks.block_start import ADVICE, BlockStart
 from shapeshift.training.blocks.block_trainer import BlockTrainer
 from shapeshift.training.calibration.extrinsics import with_extrinsics
+from shapeshift.training.photo_store.open_photos import PhotoRoom
 from shapeshift.training.settings import TrainSettings
 
 
 def begin_block(
     device, start: BlockStart, capture: Capture, settings: TrainSettings,
-    resume: tuple | None = None,
+    resume: tuple | None = None, room: PhotoRoom | None = None,
 ) -> BlockTrainer:  # fmt: skip
     """The trainer, before its first step.  Raises BadFile."""
     if resume is not None and resume[1].get("of_block") != start.notes["of_block"]:
@@ -27,4 +28,5 @@ def begin_block(
             settings = replace(settings, background="random")
         else:
             capture = replace(capture, background=tuple(color))
-    return BlockTrainer(device, start, with_extrinsics(capture, settings.rig), settings, resume)
+    given = with_extrinsics(capture, settings.rig)
+    return BlockTrainer(device, start, given, settings, resume, room)

@@ -9,6 +9,7 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blocks.block_start import BlockStart
 from shapeshift.training.density.densify import NewAnchors
+from shapeshift.training.photo_store.open_photos import PhotoRoom
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
 
@@ -21,7 +22,7 @@ class BlockTrainer(Trainer):
 
     def __init__(
         self, device, start: BlockStart, capture: Capture, settings: TrainSettings,
-        resume: tuple | None = None,
+        resume: tuple | None = None, room: PhotoRoom | None = None,
     ) -> None:  # fmt: skip
         """settings: with the downscale and the background of the coarse run; resume: of a
         checkpoint of this very block."""
@@ -29,7 +30,7 @@ class BlockTrainer(Trainer):
         if resume is None:
             length = {"run_length": settings.iterations}
             resume = start.state, start.notes | length
-        super().__init__(device, start.capture_of(capture), settings, resume)
+        super().__init__(device, start.capture_of(capture), settings, resume, room=room)
 
     def lay_out(self) -> None:
         super().lay_out()

@@ -11,7 +11,7 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.first_anchors.point_sources import CLOUDS, cloud_points, depth_points
 from shapeshift.training.first_anchors.triangulation import triangulated_points
 from shapeshift.training.first_anchors.views import common_box, pixel_of
-from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.photos import LoadedPhoto, sampled
 from shapeshift.training.supervision.backgrounds import NOISE
 
 SOURCES = ("auto", "capture", "depth", "hull", "triangulated", "random")  # or a file: see CLOUDS
@@ -123,7 +123,7 @@ def visual_hulls(photos: list[LoadedPhoto], background: tuple | None) -> list[np
     Empty where no photo tells object from background.
     """
     centre, half = common_box([p.view for p in photos])
-    found = []
+    photos, found = sampled(photos), []
     for modality in dict.fromkeys(p.modality for p in photos):
         shapes = [(p.view, silhouette(p, background)) for p in photos if p.modality == modality]
         shapes = [(view, shape) for view, shape in shapes if shape is not None]
@@ -216,7 +216,7 @@ def hull_points(capture: Capture, photos: list[LoadedPhoto]) -> InitialPoints | 
     hulls = visual_hulls(photos, capture.background)
     if shapes := tuple(hull for hull in hulls if len(hull)):
         return InitialPoints(np.concatenate(shapes), "hull", shapes)
-    if hulls and any(p.see_through for p in photos):
+    if hulls and any(p.see_through for p in sampled(photos)):
         raise BadFile(
             f"{capture.folder}: the masks have no volume in common; check that masks and poses "
             "belong together, or train with --masks ignore."
@@ -256,7 +256,7 @@ def with_guesses(
     rng: np.random.Generator,
 ) -> InitialPoints:  # fmt: skip
     """The points, with guesses added where the photos have no known background."""
-    if capture.background is not None or any(p.see_through for p in photos):
+    if capture.background is not None or any(p.see_through for p in sampled(photos)):
         return InitialPoints(points, origin, (points,))
     guesses = filler_points(points, photos, rng)
     return InitialPoints(points, f"{origin} and guesses", (points,), guesses)

@@ -9,7 +9,7 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.capture_rules import upright_rotation
 from shapeshift.scene.captures.read_las import read_las
 from shapeshift.scene.captures.read_points import read_points
-from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.photos import LoadedPhoto, sampled
 
 MOST_POINTS = 100_000  # beyond it neither the first anchors nor their distance change
 LASER = (".las", ".laz")
@@ -42,10 +42,11 @@ def subsampled(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def depth_points(photos: list[LoadedPhoto], rng: np.random.Generator) -> np.ndarray:
     """(P, 3) metres where depth photos saw something, at most MOST_POINTS; (0, 3) without any."""
-    deep = [(p.view, p.depth) for p in photos if p.depth is not None]
-    known = sum(int(np.count_nonzero(depth > 0)) for _, depth in deep)
+    deep = [photo for photo in sampled(photos) if photo.has_depth]
+    known = sum(int(np.count_nonzero(known_depth(photo) > 0)) for photo in deep)
     share, found = min(1.0, MOST_POINTS / max(known, 1)), [np.zeros((0, 3))]
-    for view, depth in deep:
+    for photo in deep:
+        view, depth = photo.view, known_depth(photo)
         row, column = np.nonzero(depth > 0)
         kept = rng.random(len(row)) < share
         row, column = row[kept], column[kept]
@@ -55,3 +56,8 @@ def depth_points(photos: list[LoadedPhoto], rng: np.random.Generator) -> np.ndar
         in_camera = np.stack([x, y, z, np.ones_like(z)])
         found.append((np.linalg.inv(camera_from_world) @ in_camera)[:3].T)
     return np.concatenate(found)
+
+
+def known_depth(photo: LoadedPhoto) -> np.ndarray:
+    """(H, W) metres of a photo that has depth, 0 where it is not known."""
+    return np.zeros(photo.view.size[::-1]) if (depth := photo.depth) is None else depth

@@ -12,7 +12,7 @@ import numpy as np
 from shapeshift.scene.captures.colmap_child import Progress, run_child
 from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.views import common_box, pixel_of
-from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.photos import LoadedPhoto, sampled
 
 SCRIPT = Path(__file__).with_name("triangulate_run.py")
 FAILURE = (
@@ -82,7 +82,7 @@ def choose_pairs(views: list[View]) -> list[tuple[int, int]]:
     away = float(np.median(np.linalg.norm(eyes - centre, axis=1)))
     pairs: set[tuple[int, int]] = set()
     for i, view in enumerate(views):
-        points = sampled(view, away)
+        points = places_before(view, away)
         shared = np.array([shared_part(points, eyes[i], other) for other in views])
         shared[i] = -1
         for j in np.argsort(-shared, kind="stable")[:NEIGHBOURS].tolist():
@@ -91,7 +91,7 @@ def choose_pairs(views: list[View]) -> list[tuple[int, int]]:
     return sorted(pairs)
 
 
-def sampled(view: View, away: float) -> np.ndarray:
+def places_before(view: View, away: float) -> np.ndarray:
     """(P, 3) places in the world that pixels of a view may show, `away` metres before it or so."""
     left, right, down, up = view.tangents
     part = (np.arange(GRID) + 0.5) / GRID
@@ -160,7 +160,7 @@ def counting(photo: LoadedPhoto) -> np.ndarray | None:
 def on_object(points: np.ndarray, photos: list[LoadedPhoto]) -> np.ndarray:
     """(P,) bool: not on what masks of photos say to be background."""
     inside, outside = np.zeros((2, len(points)), int)
-    for photo in photos:
+    for photo in sampled(photos):
         if photo.see_through:
             pixel, seen = pixel_of(photo.view, points)
             column, row = pixel[seen].astype(int).T

@@ -16,7 +16,8 @@ from shapeshift.runtime_models.package.write_package import package_files, zip_f
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.fit.ablation import COMPONENTS, DROPPED, Ablation, Component, Trial, decide
 from shapeshift.training.fit.view_metrics import largest_contribution, outline_ious, view_psnr
-from shapeshift.training.photos import BLACK, choose_downscale, load_photos
+from shapeshift.training.photo_store.open_photos import open_photos
+from shapeshift.training.photos import BLACK, choose_downscale
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.train import Trainer
@@ -72,8 +73,8 @@ class Fit:
         self.tolerance_db, self.seeds = tolerance_db, seeds
         self.decisions: list[Ablation] = []
         self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
-        self.held_out = load_photos(capture, "test", factor, settings.masks)
-        self.photos = load_photos(capture, "train", factor, settings.masks)
+        self.loaded = open_photos(capture, factor, settings.masks)
+        self.held_out, self.photos = self.loaded.test, self.loaded.train
         behind = choose_background(settings.background, capture.background, self.photos)
         self.background = behind or BLACK
         self.counts = {s.name: sum(p.modality == s.name for p in self.held_out) for s in self.stops}
@@ -121,7 +122,7 @@ class Fit:
             what = name if self.seeds == 1 else f"{name}, seed {seed + 1} of {self.seeds}"
             trainer = Trainer(
                 self.device, self.capture, replace(settings, seed=settings.seed + seed),
-                loaded={"train": self.photos, "test": self.held_out},
+                loaded=self.loaded,
             )  # fmt: skip
             for now in trainer.steps():
                 self.report(what, min(now.fraction, 1.0))

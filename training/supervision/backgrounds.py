@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.photos import LoadedPhoto, sampled
 
 NAMED = {"black": (0.0, 0.0, 0.0), "white": (1.0, 1.0, 1.0), "gray": (0.5, 0.5, 0.5)}
 NOISE = 0.03  # display sRGB: a photo that differs more from a known background shows the object
@@ -36,8 +36,9 @@ def shared_color(photos: list[LoadedPhoto] | tuple) -> Background | None:
     """The one colour that all photos show about their subject; None where there is no such one.
 
     It assumes a subject before one even colour, in the middle of most photos.  Photos with alpha or
-    an object's mask say themselves what is background.
+    an object's mask say themselves what is background.  Of many photos a sample tells.
     """
+    photos = sampled(list(photos))
     if not photos or any(photo.see_through for photo in photos):
         return None
     rims: dict[str, list[np.ndarray]] = {}

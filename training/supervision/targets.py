@@ -13,13 +13,15 @@ CACHE = 0.25  # ... and beyond that part of the memory that files may take
 class Targets:
     """Makes loss targets of photos and keeps as many as fit."""
 
-    def __init__(self, device) -> None:
+    def __init__(self, device, most: int | None = None) -> None:
+        """most: bytes that finished targets may take, where photos have to do with little."""
         self.device = device
         self.losses: dict[tuple[int, int], ImageLoss] = {}
         self.kept: dict[tuple, Target] = {}
         self.kept_depths: dict[tuple, DepthTarget] = {}
         self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
-        self.bytes, self.most = 0, min(CACHE_BYTES, int(CACHE * Memory().most))
+        most = CACHE_BYTES if most is None else min(CACHE_BYTES, most)
+        self.bytes, self.most = 0, min(most, int(CACHE * Memory().most))
 
     def loss(self, photo: LoadedPhoto) -> ImageLoss:
         """The image loss of the photo's size."""
@@ -57,13 +59,13 @@ class Targets:
 
     def depth_term(self, photo: LoadedPhoto, share: float) -> DepthTerm | None:
         """What is to be learned from the photo's depth; None where it has none or share is 0."""
-        if photo.depth is None or not share > 0:
+        if not (share > 0 and photo.has_depth) or (depth := photo.depth) is None:
             return None
         size, key = photo.view.size, (photo.modality, photo.name, photo.view.size)
         if size not in self.depth_losses:
             self.depth_losses[size] = DepthLoss(self.device, size)
         loss = self.depth_losses[size]
-        target = self.kept_depths.get(key) or loss.target(photo.depth)
+        target = self.kept_depths.get(key) or loss.target(depth)
         if key not in self.kept_depths and self.bytes + target.bytes <= self.most:
             self.kept_depths[key] = target
             self.bytes += target.bytes

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+from shapeshift.runtime_models.files.memory import amount
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Stop
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.first_anchors.initial import Report
-from shapeshift.training.photos import choose_downscale, load_photos
+from shapeshift.training.photo_store.open_photos import open_photos
+from shapeshift.training.photos import LoadedPhoto, choose_downscale, memory_for_photos
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.update.regions import cut_photos, refuse_unseen
 from shapeshift.training.update.trainable import layout_of
@@ -60,6 +62,16 @@ def counts_of(
     return (counts[0] + a_value * (now[0] - was[0]), counts[0] + a_value * (now[1] - was[0]))
 
 
+def refuse_large(photos: dict[str, list[LoadedPhoto]], factor: int) -> None:
+    """BadFile where what photos show of the region does not fit into memory."""
+    needed, may = sum(p.bytes for each in photos.values() for p in each), memory_for_photos()
+    if not needed <= may:
+        raise BadFile(
+            f"what the photos show of the region takes {amount(needed)} of memory, photos may take "
+            f"{amount(may)}; name a smaller box, or give --downscale {factor + 1} or more --memory."
+        )
+
+
 def begin_update(
     device, base: UpdateBase, capture: Capture, settings: TrainSettings,
     resume: tuple | None = None, report: Report | None = None,
@@ -73,10 +85,10 @@ def begin_update(
     fitting, said = capture_for(base.model, capture)
     factor = settings.downscale or choose_downscale(fitting.photos)
     settings = replace(settings, downscale=factor)
-    photos = {
-        split: load_photos(fitting, split, factor, settings.masks) for split in ("train", "test")
-    }
-    cut = cut_photos(photos, base.region)
+    photos = open_photos(fitting, factor, settings.masks)
+    cut = cut_photos({"train": photos.train, "test": photos.test}, base.region)
+    photos.close()
+    refuse_large(cut, factor)
     refuse_unseen(cut, tuple(stop.name for stop in base.model.stops), str(capture.folder))
     trainer = UpdateTrainer(device, base, fitting, settings, cut, resume, report)
     trainer.warnings = [*said, *trainer.warnings]

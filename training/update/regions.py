@@ -96,7 +96,7 @@ def cut_photo(photo: LoadedPhoto, region: UpdateRegion) -> LoadedPhoto | None:
     rows, columns = slice(top, top + height), slice(left, left + width)
     weight = seen if photo.weight is None else seen * photo.weight
     return replace(
-        photo,
+        photo.in_memory(),
         view=photo.view.part(left, top, (width, height)),
         rgba=np.ascontiguousarray(photo.rgba[rows, columns]),
         weight=np.ascontiguousarray(weight[rows, columns], np.float32),

@@ -53,9 +53,10 @@ def run_block(options: Options) -> int:
     from shapeshift.app.training.saving import (
         check_writable,
         memory_for_training,
+        room_of,
         save,
         save_checkpoint,
-        saved_when_memory_ends,
+        saved_when_it_fails,
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
@@ -73,10 +74,11 @@ def run_block(options: Options) -> int:
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     with memory_for_training(), working(READING):
-        trainer = begin_block(device, start, capture, settings, resume)
+        room = room_of(options.out, options.photo_mb)
+        trainer = begin_block(device, start, capture, settings, resume, room)
     say(describe(trainer))
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    with saved_when_memory_ends(trainer, options.out, checkpoint):
+    with saved_when_it_fails(trainer, options.out, checkpoint):
         interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
     save(trainer, options.out, checkpoint)
     state = "interrupted, --resume goes on" if interrupted else "done"
@@ -87,6 +89,7 @@ def run_block(options: Options) -> int:
         f"{full(options.out)}: {state} after {trainer.iteration} steps, {inside:,} anchors of "
         f"{trainer.anchors_count:,} are the block's{where}"
     )
+    trainer.photos.close(keep=interrupted)
     return INTERRUPTED if interrupted else 0
 
 

@@ -3,6 +3,7 @@
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ COARSE, CUT = "coarse.shift", "cut"  # in the folder of the work
 def run_blocks(options: Options) -> int:
     """Raises UsageError, BadFile; a second start goes on where the first was ended."""
     from shapeshift.app.cluster.open_cluster import open_cluster
-    from shapeshift.app.training.saving import check_writable
+    from shapeshift.app.training.saving import check_writable, room_of
     from shapeshift.runtime_models.blocks.write_blocks import refuse_foreign_folder
     from shapeshift.training.blocks.starts import read_cut
 
@@ -41,7 +42,8 @@ def run_blocks(options: Options) -> int:
         refuse_one(options, capture)
     work = work_folder(options.out)
     work.mkdir(parents=True, exist_ok=True)
-    with open_cluster() as cluster:
+    room_of(options.out, options.photo_mb)  # refused now, not after the run of the whole
+    with open_cluster(options.cluster, options.certificates, options.gpus) as cluster:
         cluster.run([coarse_task(options, work)])
         cluster.run([cut_task(options, work)])
         found = read_cut(work / CUT)
@@ -115,7 +117,9 @@ def words_of(asked: Asked) -> list[str]:
 
 def shared_words(options: Options) -> list[str]:
     device = ["--device", options.device] if options.device else []
-    return device + (["--memory", str(options.memory)] if options.memory else [])
+    numbers = {"--memory": options.memory, "--photo-mb": options.photo_mb}
+    given = [[name, str(value)] for name, value in numbers.items() if value is not None]
+    return [*device, *(word for pair in given for word in pair)]
 
 
 def capture_path(options: Options) -> str:
@@ -129,8 +133,13 @@ def task_of(name: str, argv: list[str], reads: list[str], writes: list[Path]) ->
     checkpoint = str(checkpoint_path(writes[0]))
     files = tuple(map(str, writes))
     return Task(
-        name, tuple(argv), tuple(reads), files, checkpoint=checkpoint, resume=("--resume",)
+        name, tuple(argv), tuple(reads), files, slots_of(argv), checkpoint, ("--resume",)
     )  # fmt: skip
+
+
+def slots_of(argv: Sequence[str]) -> dict[str, int]:
+    """What a task holds: the GPU of its worker, where one is asked for."""
+    return {"gpu": 1} if ("--device", "gpu") in pairwise(argv) else {}
 
 
 def coarse_task(options: Options, work: Path) -> Task:
@@ -160,7 +169,8 @@ def cut_task(options: Options, work: Path) -> Task:
     argv += ["--block-photos", str(options.block_photos)]
     argv += words_of({"max_anchors": most_anchors(options)})
     reads = [capture, coarse, str(checkpoint_path(work / COARSE))]
-    return Task("cut", (*argv, *shared_words(options)), tuple(reads), (str(out),))
+    words = [*argv, *shared_words(options)]
+    return Task("cut", tuple(words), tuple(reads), (str(out),), slots_of(words))
 
 
 def block_task(options: Options, work: Path, number: int, row: "CutBlock") -> Task:

@@ -1,25 +1,104 @@
 // raster_blocks: the blocks of pixels that raster_cpu.cl keeps a tile in, and the batches of
-// intersections that it takes.  A block is eight pixels, BLOCK_W x BLOCK_H, one vector.  Blocks are
-// numbered down their column first, then to the right, so that a column's blocks are neighbouring
-// bits of a mask.
-// Reads:   STOP (common/raster.cl), RECORD (common/record.cl); EVERY_BLOCK, for a test.
-// Defines: BLOCK_W, BLOCK_H, BLOCKS, BATCH; copy_record(); Batch and fetch(); inside(), lowest(),
+// intersections that it takes.  A block is one vector of PIXELS pixels.  Blocks are numbered down
+// their column first, then to the right, so that a column's blocks are neighbouring bits of a mask.
+// Reads:   STOP (common/raster.cl), RECORD (common/record.cl); PIXELS; EVERY_BLOCK, for a test.
+// Defines: floatp, intp, their loads, stores and largest(); BLOCK_W, BLOCK_H, BLOCKS, ALL_BLOCKS,
+//          BATCH; exp2p(), sums12(); copy_record(); Batch and fetch(); inside(), lowest(),
 //          still_open().
-// Units:   pixels, row 0 on top.
+// Units:   pixels, row 0 on top; exponents are of 2.
 #include "common/vector.cl"
 #include "common/raster.cl"
-#define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
-#define BLOCK_H 2
-#define DOWN (TILE / BLOCK_H)   // blocks in a column
+#ifndef PIXELS  // of a block: the lanes of the processor's widest vectors, 8 or 16
+#define PIXELS 8
+#endif
+#define BLOCK_W 4  // 8 x 1 touches a sixth more blocks than 4 x 2
+#define BLOCK_H (PIXELS / BLOCK_W)
+#define DOWN (TILE / BLOCK_H)    // blocks in a column
 #define ACROSS (TILE / BLOCK_W)  // columns
-#define BLOCKS (DOWN * ACROSS)   // 32: one bit each
+#define BLOCKS (DOWN * ACROSS)   // 32 or 16: one bit each
 #define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
-#define SHIFT_H 1                // log2 of BLOCK_H
+#define ALL_BLOCKS (0xffffffffu >> (32 - BLOCKS))
 #define BATCH 32
 
-// Pixel centres of a block, from its corner.
+// One number of each pixel of a block.  LANE_X and LANE_Y: pixel centres, from its corner.
+#if PIXELS == 16
+// Four rows of four: where vectors have sixteen lanes, a splat touches half as many blocks.
+#define SHIFT_H 2  // log2 of BLOCK_H
+typedef float16 floatp;
+typedef int16 intp;
+#define AS_FLOATP as_float16
+#define AS_INTP as_int16
+#define LOAD_PIXELS vload16
+#define STORE_PIXELS vstore16
+#define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
+                         0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
+#define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
+                         2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
+inline float largest(floatp a) { return max8(fmax(a.lo, a.hi)); }
+#else
+// Two rows of four.  As halves of wider vectors, sixteen would take all registers twice.
+#define SHIFT_H 1
+typedef float8 floatp;
+typedef int8 intp;
+#define AS_FLOATP as_float8
+#define AS_INTP as_int8
+#define LOAD_PIXELS vload8
+#define STORE_PIXELS vstore8
 #define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
+inline float largest(floatp a) { return max8(a); }
+#endif
+
+// 2^x for the exponents that a splat's falloff has, [-126, 0.1]; relative error 2e-7.
+// Outside that range the bits are garbage but never a trap: mask them.
+// Splitting into an integer and a fraction in -0.5 .. 0.5 leaves a polynomial for 2^f, and the
+// integer goes straight to the exponent bits: exp() of a CPU's library takes several times as long.
+inline floatp exp2p(floatp x) {
+  // Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low bits.
+  const floatp shifted = x + 12582912.0f;
+  const floatp f = x - (shifted - 12582912.0f);
+  // Horner, minimax of degree 5, but for exactly 1 at 0: its own error is 1e-7.
+  floatp p = 1.327647152e-3f;
+  p = fma(p, f, (floatp)(9.675541331e-3f));
+  p = fma(p, f, (floatp)(5.550713275e-2f));
+  p = fma(p, f, (floatp)(2.402211972e-1f));
+  p = fma(p, f, (floatp)(6.931469671e-1f));
+  p = fma(p, f, (floatp)(1.0f));
+  // Bit 23 is the exponent's lowest, so this multiplies by 2^integer.
+  return AS_FLOATP(AS_INTP(p) + (AS_INTP(shifted) << 23));
+}
+
+// Sums over the pixels of twelve numbers, (a, b, ..., l) and four more that mean nothing, as one
+// tree: each step adds the halves, quarters ... of several of them at a time.
+#if PIXELS == 16
+// (a, b) with eight lanes each that are left of sixteen.
+inline float16 add_halves(float16 a, float16 b) {
+  return (float16)(a.lo, b.lo) + (float16)(a.hi, b.hi);
+}
+
+// (a, b, c, d) with four lanes each.
+inline float16 sums_of_four(float16 a, float16 b, float16 c, float16 d) {
+  const float16 ab = add_halves(a, b), cd = add_halves(c, d);
+  return (float16)(ab.s0123, ab.s89ab, cd.s0123, cd.s89ab) +
+         (float16)(ab.s4567, ab.scdef, cd.s4567, cd.scdef);
+}
+
+inline float16 sums12(float16 a, float16 b, float16 c, float16 d, float16 e, float16 f, float16 g,
+                      float16 h, float16 i, float16 j, float16 k, float16 l) {
+  const float16 one = sums_of_four(a, b, c, d), two = sums_of_four(e, f, g, h);
+  const float16 three = sums_of_four(i, j, k, l);
+  // Neighbours twice: two lanes each, then the sums.
+  const float16 first = (float16)(one.even, two.even) + (float16)(one.odd, two.odd);
+  const float8 last = three.even + three.odd;
+  return (float16)(first.even + first.odd, last.even + last.odd, (float4)(0));
+}
+#else
+// The first eight as one tree (vector.cl), four by themselves.
+inline float16 sums12(float8 a, float8 b, float8 c, float8 d, float8 e, float8 f, float8 g,
+                      float8 h, float8 i, float8 j, float8 k, float8 l) {
+  return (float16)(sums8(a, b, c, d, e, f, g, h), sum8(i), sum8(j), sum8(k), sum8(l), (float4)(0));
+}
+#endif
 
 // A batch of intersections of one tile; the records as they are.
 typedef struct {
@@ -103,26 +182,27 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* intersectio
   }
   for (int g = 0; g * LANES < n; g++)
 #ifdef EVERY_BLOCK  // what a test compares with
-    vstore8((uint8)(0xffffffffu), g, batch->blocks);
+    vstore8((uint8)(ALL_BLOCKS), g, batch->blocks);
 #else
     vstore8(blocks_of_eight(&e, g, x0, y0), g, batch->blocks);
 #endif
   return n;
 }
 
+// The transmittance at the start.
 // 1 on the pixels of block k that lie in the image: those outside need nothing and stop nothing.
-inline float8 inside(int k, int x0, int y0, int width, int height) {
-  const float8 x = LANE_X + (float)(x0 + k / DOWN * BLOCK_W);
-  const float8 y = LANE_Y + (float)(y0 + k % DOWN * BLOCK_H);
-  return select((float8)(0), (float8)(1), isless(x, (float8)(width)) & isless(y, (float8)(height)));
+inline floatp inside(int k, int x0, int y0, int width, int height) {
+  const floatp x = LANE_X + (float)(x0 + k / DOWN * BLOCK_W);
+  const floatp y = LANE_Y + (float)(y0 + k % DOWN * BLOCK_H);
+  return select((floatp)(0), (floatp)(1), isless(x, (floatp)(width)) & isless(y, (floatp)(height)));
 }
 
 inline int lowest(uint bits) { return popcount(~bits & (bits - 1)); }  // number of the lowest bit
 
 // 3DGS stops a pixel; here a block stops when all of its pixels do.  A positive test: what is not a
 // number stops it, too.
-inline uint still_open(uint open, const float8* T) {
+inline uint still_open(uint open, const floatp* T) {
   for (int k = 0; k < BLOCKS; k++)
-    if (!(max8(T[k]) >= STOP)) open &= ~(1u << k);
+    if (!(largest(T[k]) >= STOP)) open &= ~(1u << k);
   return open;
 }

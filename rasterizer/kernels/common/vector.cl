@@ -1,6 +1,6 @@
 // vector: eight floats of a CPU's vector register at once.
 // Reads:   nothing.
-// Defines: LANES, PREFETCH, exp2_8, max8, sum8, sums8, max_int8.
+// Defines: LANES, PREFETCH, HALF_LOG2E, max8, sum8, sums8, max_int8.
 // Units:   none; exponents are of 2, since exp(-power / 2) = 2^(-power log2(e) / 2).
 #define LANES 8
 #define HALF_LOG2E 0.72134752044f  // log2(e) / 2: exponents of 2 out of halves of squares
@@ -9,27 +9,6 @@
 #else
 #define PREFETCH(address)
 #endif
-
-// 2^x for the exponents that a splat's falloff has, [-126, 0.1]; relative error 1e-7.
-// Outside that range the bits are garbage but never a trap: mask them.
-// Splitting into an integer and a fraction in -0.5 .. 0.5 leaves a polynomial of degree 6 for 2^f,
-// and the integer goes straight to the exponent bits: exp() of a CPU's library takes several times
-// as long.
-inline float8 exp2_8(float8 x) {
-  // Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low bits.
-  const float8 shifted = x + 12582912.0f;
-  const float8 f = x - (shifted - 12582912.0f);
-  // Horner, with the Taylor coefficients ln(2)^k / k! from k = 6 down.
-  float8 p = 1.5403530e-4f;
-  p = fma(p, f, (float8)(1.3333558e-3f));
-  p = fma(p, f, (float8)(9.6181291e-3f));
-  p = fma(p, f, (float8)(5.5504109e-2f));
-  p = fma(p, f, (float8)(2.4022651e-1f));
-  p = fma(p, f, (float8)(6.9314718e-1f));
-  p = fma(p, f, (float8)(1.0f));
-  // Bit 23 is the exponent's lowest, so this multiplies by 2^integer.
-  return as_float8(as_int8(p) + (as_int8(shifted) << 23));
-}
 
 // Trees of halves: three steps instead of the seven of a running sum, and the same order always.
 inline float max8(float8 a) {

@@ -53,7 +53,7 @@ inline floatn within(floatn z, float low, float high) {
 }
 
 // 2^t, relative error 2e-7; beyond +-most, at most 126, it stays at what it is there.
-// exp2_8 of vector.cl with a polynomial a degree shorter (least largest error, not Taylor's).
+// The polynomial is that of exp2p in common/raster_blocks.cl.
 inline floatn exp2n(floatn t, float most) {
   t = within(t, -most, most);
   // Adding 1.5 * 2^23 rounds to the nearest integer and leaves it in the low bits.

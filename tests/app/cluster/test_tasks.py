@@ -17,49 +17,18 @@ from shapeshift.app.cluster.open_cluster import open_cluster
 from shapeshift.app.cluster.run_task import TaskFailed, TaskStopped, progress_words, run_task
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.errors import UsageError
+from tests.support.cluster.counting import COUNT, STAND_IN, counting_task, lives, pids
 
 ROOT = Path(__file__).resolve().parents[3]
-# A stand-in for the program, under the same watch: the first word is a script.
-STAND_IN = (
-    "import sys, threading; sys.path[:0] = {paths!r}; "
-    "from shapeshift.app.cluster.child import end_with_parent; "
-    "threading.Thread(target=end_with_parent, daemon=True).start(); "
-    "exec(open(sys.argv[1]).read())"
-)
-COUNT = """
-import os, sys, time
-out, resume = sys.argv[2], "--resume" in sys.argv
-part = out + ".part"
-n = int(open(part).read()) if resume else 0
-print(f"from {n}", file=sys.stderr, flush=True)
-open(out + ".pid", "w").write(str(os.getpid()))
-try:
-    while n < int(sys.argv[3]):
-        n += 1
-        open(part + "x", "w").write(str(n))
-        os.replace(part + "x", part)
-        time.sleep(0.01)
-except KeyboardInterrupt:
-    print("kept", file=sys.stderr)
-    sys.exit(130)
-open(out, "w").write("x" * n)
-"""
 
 
 @pytest.fixture
 def counting(tmp_path, monkeypatch):
     """A task that writes N letters, with a checkpoint after each."""
     monkeypatch.setattr(running, "START", STAND_IN)
-    script = tmp_path / "count.py"
-    script.write_text(COUNT)
 
-    def task(name: str = "count", letters: int = 3, **more) -> Task:
-        out = str(tmp_path / f"{name}.txt")
-        argv = (str(script), out, str(letters))
-        return Task(
-            name, argv, (str(script),), (out,), checkpoint=out + ".part", resume=("--resume",),
-            **more,
-        )  # fmt: skip
+    def task(name: str = "count", letters: int = 3) -> Task:
+        return counting_task(tmp_path, name, letters)
 
     return task
 
@@ -68,14 +37,6 @@ def run_heard(task: Task, **more) -> list[str]:
     heard: list[str] = []
     run_task(task, task.key(), heard.append, **more)
     return heard
-
-
-def lives(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-        return Path(f"/proc/{pid}/stat").read_text().split(") ")[1][0] != "Z"
-    except (OSError, IndexError):
-        return False
 
 
 def test_what_is_done_is_not_done_again(counting):
@@ -162,7 +123,7 @@ def test_one_that_is_not_wanted_any_more_ends_and_goes_on_later(counting):
     with pytest.raises(TaskStopped):
         run_task(task, task.key(), hear, lambda: not began.is_set())
     assert heard == ["from 0", "kept"] and not Path(task.writes[0]).exists()
-    assert not lives(int(Path(task.writes[0] + ".pid").read_text()))
+    assert not lives(pids(task)[0])
     there = int(Path(task.checkpoint).read_text())
     assert run_heard(task) == [f"from {there}"] and there > 0
     assert Path(task.writes[0]).read_text() == "x" * 100
@@ -206,7 +167,7 @@ def test_nothing_lives_on_when_who_started_it_is_ended(counting, how):
     assert parent.wait(60) in (-how, 130)
     # While the old attempt saves, the next one waits for it.
     heard = run_heard(task)
-    assert not lives(int(Path(task.writes[0] + ".pid").read_text()))
+    assert not lives(pids(task)[0])
     (again,) = [line for line in heard if line.startswith("from ")]
     assert 0 < int(again.removeprefix("from ")) < 400
     assert Path(task.writes[0]).read_text() == "x" * 400

@@ -12,18 +12,17 @@ from PIL import Image
 from shapeshift.app import cli
 from shapeshift.app.opening import open_capture
 from shapeshift.runtime_models.files import memory
-from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.evaluation.evaluate import evaluate_model
+from shapeshift.training.photo_store.open_photos import PhotoRoom, open_photos
 from shapeshift.training.photos import (
     PHOTOS,
     bytes_a_pixel,
     choose_downscale,
     load_photos,
-    memory_excess,
     memory_of,
-    memory_warnings,
 )
 from shapeshift.training.supervision.targets import CACHE_BYTES, Targets
 from shapeshift.training.synthetic.balls import make_balls
@@ -65,32 +64,20 @@ def test_photos_take_what_is_counted_for_them(tmp_path):
     assert bytes_a_pixel(replace(one, mask=one.path, depth=one.path)) == 12
 
 
-@pytest.mark.parametrize(("bytes_over", "factor"), [(0, 1), (-1, 2)])
-def test_photos_become_as_small_as_memory_needs_them(tmp_path, monkeypatch, bytes_over, factor):
-    """At the limit exactly they stay; a byte less, and they are halved, which is said."""
+@pytest.mark.parametrize("bytes_over", [0, -1])
+def test_photos_that_do_not_fit_are_kept_on_disk(tmp_path, monkeypatch, bytes_over):
+    """At the limit exactly all are in memory; a byte less, and they are read when needed."""
     capture = capture_of(tmp_path, 40)
     allow(monkeypatch, memory_of(capture.photos, 1) + bytes_over)
-    assert choose_downscale(capture.photos) == factor
-    said = memory_warnings(capture.photos, factor)
-    assert len(said) == factor - 1
+    assert choose_downscale(capture.photos) == 1  # they are not made smaller for it
+    photos = open_photos(capture, 1, "object", PhotoRoom(folder=tmp_path / "a.photos"))
+    said = photos.warnings()
+    assert (photos.store is None) == (bytes_over == 0) == (not said)
     if said:
-        assert said[0].startswith("40 photos of 64x48 pixels would take 1 MB of memory, photos may")
-        assert "made 2 times smaller; --memory GB allows more." in said[0]
-
-
-def test_a_size_that_was_asked_for_is_refused_before_anything_is_read(tmp_path, monkeypatch):
-    capture = capture_of(tmp_path, 40)
-    (tmp_path / "a.png").unlink()
-    allow(monkeypatch, memory_of(capture.photos, 3) + 1)
-    with pytest.raises(BadFile, match=r"would take .*; --downscale 3 fits, --memory GB"):
-        load_photos(capture, "train", 2, "object")
-    assert not memory_excess(capture.photos, 3)
-    assert load_photos(capture, "test", 2, "object") == []
-
-
-def test_no_memory_at_all_ends_at_single_pixels(tmp_path, monkeypatch):
-    allow(monkeypatch, 1)
-    assert choose_downscale(capture_of(tmp_path, 2).photos) == max(SIZE)
+        assert said[0].startswith("40 photos of 64x48 pixels take 1 MB, in memory they may take")
+        assert "--memory GB or --photo-mb MB allows more" in said[0]
+    photos.close()
+    assert not (tmp_path / "a.photos").exists()
 
 
 def test_what_losses_keep_fits_too(device, monkeypatch):
@@ -98,6 +85,7 @@ def test_what_losses_keep_fits_too(device, monkeypatch):
     assert Targets(device).most == 250_000_000
     monkeypatch.setenv(memory.VARIABLE, "1000")
     assert Targets(device).most == CACHE_BYTES
+    assert Targets(device, 1000).most == 1000
 
 
 def test_the_option_is_the_variable_for_what_is_read_from_then_on(tmp_path, capsys):

@@ -1,0 +1,103 @@
+"""The photos of a run: all of them in memory where they fit, else from a store on the disk."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapeshift.runtime_models.files.memory import amount
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.photo_store.photo_files import PhotoFiles
+from shapeshift.training.photo_store.photo_store import PhotoStore, StoredPhoto
+from shapeshift.training.photos import (
+    LoadedPhoto,
+    PhotoReader,
+    load_photos,
+    memory_for_photos,
+    memory_of,
+)
+
+
+@dataclass(frozen=True)
+class PhotoRoom:
+    """Where photos may lie."""
+
+    most: int | None = None  # bytes of memory; None: half of what files may take
+    folder: Path | None = None  # for what does not fit; None: one in the user's cache, for this run
+
+
+class TrainingPhotos:
+    """Photos to train on and photos that are held out, and how long it takes to read them."""
+
+    def __init__(
+        self, train: list[LoadedPhoto], test: list[LoadedPhoto], store: PhotoStore | None = None
+    ) -> None:
+        self.train, self.test, self.store = train, test, store
+        self.asked = 0  # the first iteration whose photo was not asked for
+
+    def read_ahead(self, photo_of: Callable[[int], LoadedPhoto], iteration: int) -> None:
+        """Have the photos of the next steps read.  photo_of: the schedule, by iteration."""
+        if self.store is None:
+            return
+        end = iteration + self.store.ahead + 1
+        if not iteration < self.asked <= end:  # another run's, or one that was turned back
+            self.asked = iteration + 1
+        for i in range(self.asked, end):
+            if isinstance(photo := photo_of(i), StoredPhoto):
+                self.store.fetch(photo.number)
+        self.asked = end
+
+    def seconds(self, processor: bool) -> float:
+        """That reading took since the run began: of processors, or waited for by the clock."""
+        if self.store is None:
+            return 0.0
+        return self.store.read_s if processor else self.store.waited_s
+
+    @property
+    def most(self) -> int | None:
+        """Bytes that photos, and what is made of them, may take in memory; None: as they need."""
+        return None if self.store is None else self.store.most
+
+    @property
+    def trouble(self) -> str:
+        """What a person should know of the disk by now, in words."""
+        return "" if self.store is None else self.store.trouble
+
+    def warnings(self) -> list[str]:
+        """What a person should know of where the photos are, a sentence each."""
+        if self.store is None:
+            return []
+        store, folder = self.store, self.store.files.folder
+        width, height = (*self.train, *self.test)[0].view.size
+        return [
+            f"{len(store.photos):,} photos of {width}x{height} pixels take "
+            f"{amount(store.files.size)}, in memory they may take {amount(store.most)}: they are "
+            f"read as they are needed and kept in {folder} until the run is done; --memory GB or "
+            "--photo-mb MB allows more."
+        ]
+
+    def close(self, keep: bool = False) -> None:
+        """keep: what is on disk stays where a run that goes on finds it."""
+        if self.store is not None:
+            self.store.close(keep)
+
+
+def open_photos(
+    capture: Capture, factor: int, masks: str, room: PhotoRoom | None = None
+) -> TrainingPhotos:
+    """The photos of a capture with their sides divided by `factor`.
+
+    Raises BadFile where one cannot be read, or where they fit neither into memory nor on the disk.
+    Photos of a store are read later, and refused then.
+    """
+    room = room or PhotoRoom()
+    most = memory_for_photos() if room.most is None else room.most
+    if memory_of(capture.photos, factor) <= most:
+        train, test = (load_photos(capture, split, factor, masks) for split in ("train", "test"))
+        return TrainingPhotos(train, test)
+    reader = PhotoReader.of(capture.photos, factor, masks)
+    files = PhotoFiles(capture.photos, reader, room.folder)
+    store = PhotoStore(capture.photos, reader, files, most)
+    split: dict[str, list[LoadedPhoto]] = {"train": [], "test": []}
+    for number, photo in enumerate(capture.photos):
+        split[photo.split].append(StoredPhoto(store, number))
+    return TrainingPhotos(split["train"], split["test"], store)
