@@ -71,6 +71,14 @@ class Drawing(ABC):
         at_once: the heat becomes colours of its palettes here.  grade: of what is not heat.
         """
 
+    def seen_splats(
+        self, i: int, views: Sequence[View], settings: RenderSettings
+    ) -> np.ndarray | None:
+        """(n,) bool: which splats of object i these views may see, never False where one does;
+        None: nobody knows, or it would not pay.
+        """
+        return None
+
     @abstractmethod
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """mean_opacity (n, 4) and covariance (n, 8) of object i, in its frame; copies."""
