@@ -25,7 +25,7 @@ ADVICE = "train again with --blocks"
 
 
 @dataclass(frozen=True)
-class Place:
+class BlockPlace:
     """Where a block's anchors belong: a box in a turned frame, and the cube outside of which all is
     far and no block's."""
 
@@ -56,7 +56,7 @@ class BlockPhoto:
 
 @dataclass(frozen=True)
 class BlockStart:
-    place: Place
+    place: BlockPlace
     photos: tuple[BlockPhoto, ...]
     state: dict[str, np.ndarray]  # as of Trainer.checkpoint
     notes: dict[str, Any]  # likewise
@@ -82,7 +82,7 @@ class BlockStart:
             mine = Fields(notes.pop("block"), str(path), ADVICE)
             low, high = (endless(mine.value(key), side) for key, side in (("low", -1), ("high", 1)))
             half = endless([mine.value("half")] * 3, 1)[0]
-            place = Place(
+            place = BlockPlace(
                 BlockBox(low, high), mine.number("turn_degrees"),
                 mine.numbers("middle", 3), half,  # type: ignore[arg-type]  # three of them
             )  # fmt: skip

@@ -19,8 +19,8 @@ from shapeshift.runtime_models.package.write_package import EXACT, write_package
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blocks.block_start import (
     ADVICE,
+    BlockPlace,
     BlockStart,
-    Place,
     begun_anew,
     endless,
     finite,
@@ -128,12 +128,12 @@ def make_starts(
     return found
 
 
-def place_of(box: BlockBox, degrees: float, eyes: np.ndarray) -> Place:
+def place_of(box: BlockBox, degrees: float, eyes: np.ndarray) -> BlockPlace:
     """The same cube as far_away's."""
     low, high = eyes.min(axis=0), eyes.max(axis=0)
     x, y, z = ((low + high) / 2).tolist()
     half = FAR / 2 * float((high - low).max())
-    return Place(box, degrees, (x, y, z), half if half > 0 else math.inf)
+    return BlockPlace(box, degrees, (x, y, z), half if half > 0 else math.inf)
 
 
 def look_at_photos(
@@ -151,7 +151,7 @@ def look_at_photos(
 
 
 def write_one(
-    folder: Path, name: str, own: np.ndarray, place: Place, cover: Cover,
+    folder: Path, name: str, own: np.ndarray, place: BlockPlace, cover: Cover,
     known: tuple[Capture, Coarse, CutRules],
 ) -> CutBlock:  # fmt: skip
     """The start of a block, or its package where it stays as it is."""

@@ -1,6 +1,6 @@
 """The plant hall in blocks beside one model of the same steps a worker: dB, seams, memory.
 
-    python3 tools/training/blocks.py WORK --out docs/bench/blocks.csv
+    python3 tools/inspection/blocks.py WORK --out docs/bench/blocks.csv
 
 WORK gets a ray-traced capture of the hall; what is there already is used as it is.  A run of the
 whole comes first; from it one model goes on, and so does each block, all of them for --steps.  The
@@ -186,7 +186,7 @@ def main() -> None:
         rows.append(["run", name, *[""] * 6, facts["anchors"], facts["photos"], "",
                      f"{facts['core_s']:.0f}", f"{facts['memory_mb']:.0f}"])  # fmt: skip
     head = (
-        f"# python3 tools/training/blocks.py WORK --size {asked.size} --poses {asked.poses} "
+        f"# python3 tools/inspection/blocks.py WORK --size {asked.size} --poses {asked.poses} "
         f"--coarse {asked.coarse} --steps {asked.steps} --max-anchors {most} --blocks "
         f"{asked.blocks} --out docs/bench/blocks.csv\n"
     )
