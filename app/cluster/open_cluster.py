@@ -38,6 +38,19 @@ class Cluster(Protocol):
         ...
 
 
+def check_cluster(options: ClusterOptions) -> None:
+    """Before long work: what --cluster says, and whether what it needs is installed.
+
+    Raises UsageError.
+    """
+    from shapeshift.app.cluster.place import read_place
+
+    if read_place(options.cluster).kind != NONE:
+        from shapeshift.app.cluster.certificates import require_dask
+
+        require_dask()
+
+
 @contextmanager
 def open_cluster(
     where: str = NONE, certificates: Path | None = None, gpus: int = 0
