@@ -65,15 +65,9 @@ from shapeshift.runtime_models.splats.sog.sog_files import META
 
 PHOTOS = (".jpg", ".jpeg")  # a scene's own pictures are .png and .webp
 KNOWN = (
-<<<<<<< HEAD
-    "a package (folder or .shift), a folder of blocks, a file of splats (.ply, .splat, .ksplat, "
-    ".spz, .sog, .glb, .gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of "
-    "a 3DGS or Scaffold-GS run"
-=======
-    "a package (folder, .shift or .lod), a file of splats (.ply, .splat, .ksplat, .spz, .sog, "
-    ".glb, .gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of a 3DGS or "
-    "Scaffold-GS run"
->>>>>>> main
+    "a package (folder, .shift or .lod), a folder of blocks, a file of splats (.ply, .splat, "
+    ".ksplat, .spz, .sog, .glb, .gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the "
+    "folder of a 3DGS or Scaffold-GS run"
 )
 
 
@@ -118,7 +112,7 @@ def read_whole(path: Path, reading: Reading) -> Model:
         if (path / MANIFEST).exists():
             return read_upright(path, reading)
         if has_block_list(path):
-            return read_upright(path, reading)
+            return read_upright(path, reading, read_blocks)
         if has_layer_list(path):
             return read_layer_list(path, reading)
         if is_sog(b"", path):
@@ -155,28 +149,17 @@ def nothing_to_show(folder: Path) -> str:
     return f"{folder} holds nothing to show; wanted is {KNOWN}."
 
 
-<<<<<<< HEAD
-def read_upright(path: Path, reading: Reading) -> AnchorModel:
-    """A package or a folder of them, whose up is +Y and nothing else.  Raises BadFile."""
-=======
 def read_upright(
     path: Path, reading: Reading, read: Callable[[Path, Reading], AnchorModel] = read_package
 ) -> AnchorModel:
     """A package, whose up is +Y and nothing else, however it is read.  Raises BadFile."""
->>>>>>> main
     if reading.flip or reading.up not in ("", "+Y"):
         raise BadFile(
             f"{path.name} is a package, and +Y is up in all of them; leave out --up and --flip."
         )
-<<<<<<< HEAD
-    model = read_blocks(path, reading) if has_block_list(path) else read_package(path, reading)
-    if not reading.allow_huge:
-        refuse_filling(model, path.name)
-=======
     model = read(path, reading)
     for level in model.levels if not reading.allow_huge else ():
         refuse_filling(level, path.name)
->>>>>>> main
     return replace(model, findings=(*model.findings, *encoding_findings(model, path.name)))
 
 
@@ -222,18 +205,14 @@ def describe(model: Model, path: str | Path) -> dict:
         | networks
         | {"encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing}}
         | {"between_stops": model.between_stops, "paced_pairs": len(model.pace)}
-<<<<<<< HEAD
         | describe_blocks(model)
-=======
         | describe_levels(model)
->>>>>>> main
         | describe_light(model)
         | describe_labels(model)
         | describe_findings(model)
     )
 
 
-<<<<<<< HEAD
 def describe_blocks(model: AnchorModel) -> dict:
     """Of a scene in blocks, how many there are and their anchors."""
     if not isinstance(model, BlockModel):
@@ -242,7 +221,8 @@ def describe_blocks(model: AnchorModel) -> dict:
     return {
         "format": BLOCKS_FORMAT, "blocks": len(counts), "anchors_of_blocks": counts.tolist()
     }  # fmt: skip
-=======
+
+
 def describe_levels(model: AnchorModel) -> dict:
     """Levels of detail of a package, where it has such."""
     if not model.coarser:
@@ -253,7 +233,6 @@ def describe_levels(model: AnchorModel) -> dict:
         for one in model.coarser
     ]  # fmt: skip
     return {"coarser_levels": coarser}
->>>>>>> main
 
 
 def describe_light(model: AnchorModel) -> dict:
@@ -304,15 +283,11 @@ def describe_head(mlp: Mlp) -> dict:
 
 def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
-<<<<<<< HEAD
+    if is_levels(path):
+        return files_of_levels(path)
     in_folder = (
         path.name in (MANIFEST, META, TREE, LIST, BLOCK_LIST) or is_lcc(path) or is_lcc2(path)
     )
-=======
-    if is_levels(path):
-        return files_of_levels(path)
-    in_folder = path.name in (MANIFEST, META, TREE, LIST) or is_lcc(path) or is_lcc2(path)
->>>>>>> main
     if in_folder and not path.is_dir():
         path = path.parent
     if isinstance(model, ScaffoldModel) and not path.is_dir():
