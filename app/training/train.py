@@ -32,6 +32,13 @@ FEW_STEPS = USUAL_STEPS // 2  # scenes that are worth looking at need about so m
 
 
 def run(options: Options) -> int:
+    check_calibrate(options)
+    in_blocks = part_in_blocks(options)
+    return in_blocks(options) if in_blocks is not None else run_whole(options)
+
+
+def run_whole(options: Options) -> int:
+    """One run of all photos."""
     from shapeshift.app.pace import pace_package
     from shapeshift.app.progress import working
     from shapeshift.app.training.saving import (
@@ -53,9 +60,6 @@ def run(options: Options) -> int:
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.train import Trainer
 
-    check_calibrate(options)
-    if (in_blocks := part_in_blocks(options)) is not None:
-        return in_blocks(options)
     room = room_of(options.out, options.photo_mb)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
@@ -90,8 +94,7 @@ def run(options: Options) -> int:
         found := failed_modalities(trainer) or report(find_outlier_views(trainer))
     ):
         say(*found)
-    for line in what_next(options, trainer.iteration, step_s, interrupted):
-        say(line)
+    say(*what_next(options, trainer.iteration, step_s, interrupted))
     trainer.photos.close(keep=interrupted)
     return INTERRUPTED if interrupted else 0
 
