@@ -14,7 +14,7 @@ from shapeshift.runtime_models.blocks.read_blocks import (
     read_block_list,
 )
 from shapeshift.runtime_models.files.plain_text import json_text
-from shapeshift.runtime_models.files.whole_file import whole_folder
+from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.package.write_package import describe_stop, package_files, zip_files
 
@@ -29,8 +29,8 @@ def write_blocks(listed: BlockList, models: Mapping[str, AnchorModel], folder: P
     folder.parent.mkdir(parents=True, exist_ok=True)
     with whole_folder(folder) as part:
         for name in listed.files:
-            (part / name).write_bytes(zip_files(package_files(models[name], "exact")))
-        (part / LIST).write_text(json_text(describe_blocks(listed)) + "\n", encoding="utf-8")
+            write_whole(part / name, zip_files(package_files(models[name], "exact")))
+        write_whole(part / LIST, (json_text(describe_blocks(listed)) + "\n").encode())
         if read_block_list(part) != listed:
             raise BadFile(f"{folder / LIST} would not be read as it is; two bounds are one number.")
         return sum(file.stat().st_size for file in part.iterdir())

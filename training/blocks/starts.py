@@ -12,7 +12,7 @@ import numpy as np
 from shapeshift.runtime_models.blocks.block_box import BlockBox
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.files.plain_text import json_text
-from shapeshift.runtime_models.files.whole_file import whole_folder
+from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.runtime_models.package.write_package import EXACT, write_package
@@ -124,7 +124,7 @@ def make_starts(
         found = CutList(cut.turn_degrees, tuple(rows), "far.shift" if (block < 0).any() else "")
         if found.far:
             write_package(coarse.model.with_anchors(np.flatnonzero(block < 0)), part / found.far)
-        (part / LIST).write_text(json_text(describe(found)) + "\n", encoding="utf-8")
+        write_whole(part / LIST, (json_text(describe(found)) + "\n").encode())
     return found
 
 
