@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.number_photos import can_read_radiometric, is_radiometric
+from shapeshift.scene.captures.number_photos import cannot_read_radiometric, is_radiometric
 from shapeshift.scene.captures.photo import FLOATS, GREY_16, numbers_of, open_image
 
 LOOKED_AT = 24  # photos of a modality
@@ -29,10 +29,11 @@ def with_own_ranges(
     for stop in stops:
         mine = [photo for photo in photos if photo.modality == stop.name]
         kind = _kind(mine) if stop.kind == "thermal" else ""
-        if kind == "radiometric" and not can_read_radiometric():
+        missing = cannot_read_radiometric(mine[0].path) if kind == "radiometric" else ""
+        if missing:
             doubts.append(
                 f"The photos of {stop.name} hold temperatures, but only their colours are read; "
-                "for degrees: pip install flyr."
+                f"{missing}."
             )
             kind = ""
         if not kind or (kind == "counts" and stop.value_range is not None):

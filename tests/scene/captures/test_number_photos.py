@@ -106,7 +106,8 @@ def test_without_the_reader_a_sentence_says_so(tmp_path, monkeypatch):
     with pytest.raises(BadFile, match="pip install flyr"):
         radiometric_celsius(path, (16, 12))
     monkeypatch.setattr(
-        "shapeshift.scene.captures.value_ranges.can_read_radiometric", lambda: False
+        "shapeshift.scene.captures.value_ranges.cannot_read_radiometric",
+        lambda path: "for degrees: pip install flyr",
     )
     capture = capture_of(tmp_path, ".jpg")  # their colours, as before
     assert capture.stops[-1].value_range is None
