@@ -67,9 +67,7 @@ def program(tmp_path, monkeypatch):
     file.write_text(STAND_IN.format(python=sys.executable))
     file.chmod(0o755)
     monkeypatch.setenv("PATH", str(folder))
-    dji_photo._converted.cache_clear()
-    yield folder
-    dji_photo._converted.cache_clear()
+    return folder
 
 
 def test_degrees_come_from_the_converter(program, tmp_path, monkeypatch):
@@ -122,7 +120,6 @@ def test_a_cut_file_is_none_and_hangs_nothing(tmp_path, cut):
 
 def test_without_the_program_one_sentence_says_which(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", "")
-    dji_photo._converted.cache_clear()
     photo = tmp_path / "a.jpg"
     write_dji(photo, 57)
     with pytest.raises(BadFile, match="pipx install dji-thermal-cli") as refused:
