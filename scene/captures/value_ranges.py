@@ -8,8 +8,11 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.number_photos import cannot_read_radiometric, is_radiometric
 from shapeshift.scene.captures.photo import FLOATS, GREY_16, numbers_of, open_image
+from shapeshift.scene.captures.radiometric.number_photos import (
+    cannot_read_radiometric,
+    is_radiometric,
+)
 
 LOOKED_AT = 24  # photos of a modality
 PERCENTILES = (0.1, 99.9)  # between which the range begins; a dead pixel is beyond

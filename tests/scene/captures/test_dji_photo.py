@@ -14,9 +14,9 @@ import pytest
 from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures import dji_photo
-from shapeshift.scene.captures.dji_photo import is_dji
-from shapeshift.scene.captures.number_photos import is_radiometric, radiometric_celsius
+from shapeshift.scene.captures.radiometric import dji_photo
+from shapeshift.scene.captures.radiometric.dji_photo import is_dji
+from shapeshift.scene.captures.radiometric.number_photos import is_radiometric, radiometric_celsius
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.inspection.camera_settings import camera_settings
 from tests.support.scene.captures import simple, write_transforms

@@ -8,12 +8,12 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.scene.captures.number_photos import (
+from shapeshift.scene.captures.photo import load_photo, open_image
+from shapeshift.scene.captures.radiometric.number_photos import (
     is_radiometric,
     open_grid,
     radiometric_celsius,
 )
-from shapeshift.scene.captures.photo import load_photo, open_image
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
 from tests.support.scene.captures import simple, write_transforms

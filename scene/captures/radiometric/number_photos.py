@@ -16,7 +16,7 @@ from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.dji_photo import ADVICE, converter, dji_celsius, is_dji
+from shapeshift.scene.captures.radiometric.dji_photo import ADVICE, converter, dji_celsius, is_dji
 
 GRIDS = (".npy", ".csv")
 JPEGS = (".jpg", ".jpeg", ".jfif")
