@@ -126,7 +126,7 @@ class TilesDrawing(Drawing):
         self._splats_moved()
         if heads is not None and not is_each(x):  # one control an anchor: onnxruntime's
             shapes = heads.shapes_follow or not slot.placed
-            heads.anchors.decode_shapes(heads.folded(x), slot.start, *arena, shapes)
+            heads.shapes_into(*arena, slot.start, x, shapes)
             slot.placed = True
             return
         splats = evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
