@@ -32,7 +32,7 @@ class Decoding:
 def decoding_of(device: Device, model: Model, mlps: str) -> Decoding:
     """mlps: "opencl", our kernel where it knows the model, or "onnxruntime"."""
     made = Decoding(Evaluator(model, keep=True))
-    if isinstance(model, SplatLayers):
+    if isinstance(model, SplatLayers) and model.leaves is None:
         made.sh = upload_sh(device, model.sh)
     elif isinstance(model, AnchorModel):
         if mlps == "opencl" and not (reason := uncovered(model)):

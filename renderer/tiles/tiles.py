@@ -26,7 +26,7 @@ from shapeshift.rasterizer.splat_edges import draw_edges
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
-from shapeshift.renderer.limits import check_tiles
+from shapeshift.renderer.limits import arena_rows, check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
@@ -83,11 +83,12 @@ class TilesDrawing(Drawing):
         self._heat_images: dict[int, np.ndarray] = {}
         self._depths: dict[int, np.ndarray] = {}
 
-    def allocate(self, models: list[Model]) -> None:
-        check_tiles(self.device, models)
-        counts = [model.splat_count for model in models]
+    def allocate(self, models: list[Model], more: int = 0) -> None:
+        """more: rows behind those of the objects."""
+        check_tiles(self.device, models, more)
+        counts = [arena_rows(model) for model in models]
         starts = np.concatenate([[0], np.cumsum(counts, dtype=int)])
-        self.splats = int(starts[-1])
+        self.splats = int(starts[-1]) + more
         self.allocations += 1
         device = self.device
         self._projected, self._rooms, self._orders = [], {}, []
@@ -98,9 +99,8 @@ class TilesDrawing(Drawing):
         self._color, self._set = self._colors[0], 0  # that decoding writes into
         self._heats: list = [None]  # of the same splats, (N, 4) once an object has any
         self._antialiased = tuple(map(is_antialiased, models))
-        self._object_index = device.upload(
-            np.repeat(np.arange(len(models), dtype=np.int32), counts)
-        )
+        index = np.repeat(np.arange(len(models), dtype=np.int32), counts)
+        self._object_index = device.upload(np.pad(index, (0, more)))
         made = {id(model): decoding_of(device, model, self._mlps) for model in models}
         self._slots = [
             Slot(int(start), n, made[id(model)])
