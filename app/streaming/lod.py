@@ -99,10 +99,12 @@ def write_package_levels(options: Options) -> int:
     with progress_after(PATIENCE_S) as progress:
         made = make_levels(model, options.distill, progress)
     size = write_made(made, options.scene, options.out)
-    for level, errors, steps in zip(made.model.coarser, made.errors, made.steps, strict=True):
+    for level in made.levels:
+        errors, steps = level.errors, level.steps
+        assert errors is not None, "levels that are good nowhere are left out"
         db = ", ".join(f"{value:.1f} dB {WHERE[at]}" for at, value in errors.db.items())
         say(
-            f"{len(level.anchors):,} anchors where the scene is up to {level.from_pixels:.0f} "
+            f"{len(level.anchors.anchors):,} anchors where the scene is up to {errors.pixels:.0f} "
             f"pixels across: {db}, a switch changes its pixels by {errors.change:.1f}/255 in the "
             f"mean ({steps:,} steps)."
         )

@@ -126,9 +126,8 @@ def test_views_show_the_bounds_as_large_as_asked_for(clumps):
     from shapeshift.scene.scene import SceneObject
 
     model = read_package(clumps)
-    meter = LevelMeter(model)
     obj = SceneObject("it", model)
-    for pixels in (12.0, 100.0, 250.0):
-        found = object_pixels(obj, (meter.centre, meter.radius), meter.views(pixels))
-        assert found == pytest.approx(pixels, rel=1e-6)
-    meter.close()
+    with LevelMeter(model) as meter:
+        for pixels in (12.0, 100.0, 250.0):
+            found = object_pixels(obj, (meter.centre, meter.radius), meter.views(pixels))
+            assert found == pytest.approx(pixels, rel=1e-6)
