@@ -35,6 +35,13 @@ class Drawing(ABC):
     def allocate(self, models: list[Model]) -> None:
         """Room for these objects; what was decoded before is gone."""
 
+    def exchange(self, models: list[Model]) -> list[bool]:
+        """Room for other models of the same objects; of which what is decoded is kept.  Raises
+        ValueError as `allocate` does.
+        """
+        self.allocate(models)
+        return [False] * len(models)
+
     @abstractmethod
     def decode_geometry(
         self,

@@ -145,6 +145,12 @@ def refuse_other(model: Model, path: Path) -> AnchorModel:
     return model
 
 
+def refuse_foreign_folder(out: Path) -> None:
+    """UsageError where a folder that is not of levels, and not empty, would be lost."""
+    if out.is_dir() and not is_levels(out) and any(out.iterdir()):
+        raise UsageError(f"--out {out} is no folder of levels; choose another name.")
+
+
 def package_bytes(path: Path) -> bytes:
     """The package as one file: as it is, or a folder's files zipped.  Raises BadFile."""
     if path.is_file() and path.name != MANIFEST:

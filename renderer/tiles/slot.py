@@ -59,6 +59,10 @@ class Slot:
         self._kept = ColorMemory(self.decoding.heads or self.decoding.evaluator)
 
     @property
+    def model(self) -> Model:
+        return self.decoding.evaluator.model
+
+    @property
     def rows(self) -> slice:
         return slice(self.start, self.start + self.count)
 
@@ -87,3 +91,22 @@ class Slot:
         """Drops the parts of a set that have a higher number: they are mixed in no more."""
         self._colors.forget_after(which, number)
         self._kept.forget_after(which, number)
+
+
+def slots_of(
+    device: Device, models: list[Model], mlps: str, known: dict[int, Decoding]
+) -> tuple[list[Slot], dict[int, Decoding]]:
+    """One after the other, and what decodes each model, by its id; `known` is gone on with."""
+    made = dict(known)
+    for model in models:
+        if id(model) not in made:
+            made[id(model)] = decoding_of(device, model, mlps)
+    starts = np.cumsum([0, *(model.splat_count for model in models)])
+    pairs = zip(starts, models, strict=False)
+    return [Slot(int(start), m.splat_count, made[id(m)]) for start, m in pairs], made
+
+
+def run_by(mlps: str, slots: list[Slot]) -> str:
+    """Who runs the networks, in words."""
+    others = dict.fromkeys(slot.decoding.instead for slot in slots if slot.decoding.instead)
+    return ", ".join([mlps, *others])

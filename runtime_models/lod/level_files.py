@@ -24,6 +24,7 @@ from shapeshift.runtime_models.package.read_package import (
 from shapeshift.runtime_models.splats.plain_splats import Reading
 
 LEVELS = "lod.json"
+ENDING = ".lod"  # of the folder
 FORMAT = "shapeshift-lod 1"
 PACKAGE = "scene.shift"  # what `write_levels` calls the package
 LARGEST_LIST = 1 << 20  # bytes

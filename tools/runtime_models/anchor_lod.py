@@ -6,18 +6,17 @@ Each level as `launch.py lod` makes it ("learned"), its anchors before they lear
 plain splats in as many bytes, baked at the stops and half-way between them, merged, and faded into
 each other ("baked").  Rows: PSNR against the package over four views of 640x360 at the stops, at
 half-way (where baked splats are exact but for merging) and at a quarter (where they fade), the mean
-change of the model's own pixels at the stops, of 255, at the size where the level begins and at about
-1, 2, 4 and 8 times the distance that shows all of it; then the processor time of a frame whose x has
-changed, networks included, over that of level 0, in turns in one run.
+change of the model's own pixels at the stops, of 255, at the size where the level begins and at
+about 1, 2, 4 and 8 times the distance that shows all of it; then the processor time of a frame
+whose x has changed, networks included, over that of level 0, in turns in one run.
 """
 
 import argparse
 import sys
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
-
-import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
@@ -50,7 +49,7 @@ HEAD = (
 def baked(model: AnchorModel, size: int) -> SplatLayers:
     """Splats of all stops and half-way between them in about so many bytes, colours as shown."""
     stops = sorted(stop.x for stop in model.stops)
-    xs = sorted([*stops, *((a + b) / 2 for a, b in zip(stops, stops[1:], strict=False))])
+    xs = sorted([*stops, *((a + b) / 2 for a, b in pairwise(stops))])
     parts = [bake_part(Part(SceneObject("it", model, x=x)), ExportLook(0)) for x in xs]
     names = tuple(Stop(f"at {x:g}", x) for x in xs)
     layers = join_layers(parts, names, "exclusive", [])
@@ -60,7 +59,7 @@ def baked(model: AnchorModel, size: int) -> SplatLayers:
 def at_quarters(meter: LevelMeter) -> None:
     """Lets the meter look at quarters of the way, too, at even pace."""
     stops = meter.xs["stops"]
-    pairs = list(zip(stops, stops[1:], strict=False))
+    pairs = list(pairwise(stops))
     meter.xs["quarter"] = [a + part * (b - a) for a, b in pairs for part in QUARTERS]
 
 
@@ -110,10 +109,8 @@ def rows_of(path: Path, seconds: float) -> list[str]:
                     ratio = frame_ratio(meter.model, other, meter, pixels)
                     values = ",".join(f"{value:.2f}" for value in db)
                     took = f"{seconds:g}" if form == "learned" else "0"
-                    rows.append(
-                        f"{path.name},{number + 1},{form},{count},{size},{size / package:.3f},{took},"
-                        f"{pixels:.0f},{values},{change:.2f},{ratio:.2f}"
-                    )
+                    what = f"{path.name},{number + 1},{form},{count},{size},{size / package:.3f}"
+                    rows.append(f"{what},{took},{pixels:.0f},{values},{change:.2f},{ratio:.2f}")
                     print(rows[-1], flush=True)  # noqa: T201
     return rows
 
