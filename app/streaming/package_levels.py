@@ -8,6 +8,7 @@ import numpy as np
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.streaming.level_errors import LevelErrors, LevelMeter
+from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.lod.average_anchors import average_anchors, cell_for
 from shapeshift.runtime_models.lod.level_files import (
     is_levels,
@@ -137,6 +138,11 @@ def refuse_other(model: Model, path: Path) -> AnchorModel:
     """The package that a scene is, without levels.  Raises UsageError."""
     if is_levels(path):
         raise UsageError(f"{path} has levels already; name the package that they were made of.")
+    if isinstance(model, BlockModel):
+        raise UsageError(
+            f"{path} is a scene in blocks, which has no levels; make one package of it with "
+            "`launch.py export`, and levels of that."
+        )
     if not isinstance(model, AnchorModel):
         raise UsageError(
             f"{path} is no package of anchors; leave the ending of --out away to write its levels "

@@ -25,7 +25,7 @@ from shapeshift.rasterizer.splat_edges import draw_edges
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
-from shapeshift.renderer.limits import check_tiles
+from shapeshift.renderer.limits import arena_rows, check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
@@ -71,6 +71,7 @@ class TilesDrawing(Drawing):
         self.allocations = 0  # how often the arena was made: once for each set of objects
         self._slots: list[Slot] = []
         self._decodings: dict[int, Decoding] = {}
+        self._known: dict[int, Decoding] = {}  # of models that were drawn before and may be again
         self._images: dict[int, np.ndarray] = {}
         self._projected: list[Projected] = []
         self._rooms: dict[int, list[Projected]] = {}  # arrays of projection, kept between frames
@@ -85,23 +86,23 @@ class TilesDrawing(Drawing):
         self._depths: dict[int, np.ndarray] = {}
 
     def exchange(self, models: list[Model]) -> list[bool]:
-        arena, slots = self._tables(), self._slots
-        self.allocate(models, self._decodings)
+        arena, slots, self._known = self._tables(), self._slots, self._decodings
+        self.allocate(models)
+        self._known = {}
         self._colors = [self.device.zeros((self.splats, 4)) for _ in arena[1]]
-        self._heats = [None if h is None else self.device.zeros((self.splats, 4)) for h in arena[2]]
+        self._heats = [h if h is None else self.device.zeros((self.splats, 4)) for h in arena[2]]
         self._color = self._colors[0]
-        return keep_rows(
-            self.device, slots, self._slots, [*zip(arena, self._tables(), strict=True)]
-        )
+        tables = [*zip(arena, self._tables(), strict=True)]
+        return keep_rows(self.device, slots, self._slots, tables)
 
     def _tables(self) -> tuple[list, list, list]:
         return [self._mean_opacity, self._covariance], self._colors, self._heats
 
-    def allocate(self, models: list[Model], known: dict[int, Decoding] | None = None) -> None:
-        """known: what decodes models that were drawn before and may be again."""
-        check_tiles(self.device, models)
-        counts = [model.splat_count for model in models]
-        self.splats = sum(counts)
+    def allocate(self, models: list[Model], more: int = 0) -> None:
+        """more: rows behind those of the objects."""
+        check_tiles(self.device, models, more)
+        counts = [arena_rows(model) for model in models]
+        self.splats = sum(counts) + more
         self.allocations += 1
         device = self.device
         self._projected, self._rooms, self._orders = [], {}, []
@@ -112,10 +113,9 @@ class TilesDrawing(Drawing):
         self._color, self._set = self._colors[0], 0  # that decoding writes into
         self._heats: list = [None]  # of the same splats, (N, 4) once an object has any
         self._antialiased = tuple(map(is_antialiased, models))
-        self._object_index = device.upload(
-            np.repeat(np.arange(len(models), dtype=np.int32), counts)
-        )
-        self._slots, self._decodings = slots_of(device, models, self._mlps, known or {})
+        index = np.repeat(np.arange(len(models), dtype=np.int32), counts)
+        self._object_index = device.upload(np.pad(index, (0, more)))
+        self._slots, self._decodings = slots_of(device, models, self._mlps, self._known)
         self.backends["mlps"] = run_by(self._mlps, self._slots)
         compile_for_heat(device, models)
 
@@ -129,7 +129,7 @@ class TilesDrawing(Drawing):
         self._splats_moved()
         if heads is not None and not is_each(x):  # one control an anchor: onnxruntime's
             shapes = heads.shapes_follow or not slot.placed
-            heads.anchors.decode_shapes(heads.folded(x), slot.start, *arena, shapes)
+            heads.shapes_into(*arena, slot.start, x, shapes)
             slot.placed = True
             return
         splats = evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
