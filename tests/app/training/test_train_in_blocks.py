@@ -91,7 +91,7 @@ def launched(*words: str) -> subprocess.Popen:
 
 @pytest.mark.slow
 def test_the_whole_way_ended_and_begun_again_gives_the_same_bytes(capture, tmp_path):
-    """Ctrl-C within block 0, then the same command, on a cluster where there is one; a third start
+    """Killed, then Ctrl-C, then the same command, on a cluster where there is one; one start more
     does nothing any more.
     """
     length = ("--coarse-iterations", "30", "--iterations", "400")
@@ -101,14 +101,15 @@ def test_the_whole_way_ended_and_begun_again_gives_the_same_bytes(capture, tmp_p
     said = whole.communicate(timeout=300)[1]
     assert whole.returncode == 0, said
     assert "2 blocks" in said and "how good:" in said
-    ended, begun = launched(*words[1]), tmp_path / "b.blocks.work" / "0.shift.begun.json"
-    while ended.poll() is None and not begun.exists():
-        time.sleep(0.05)
-    time.sleep(4)  # the program has started and trains; its steps take some seconds
-    ended.send_signal(signal.SIGINT)
-    said = ended.communicate(timeout=120)[1]
-    assert ended.returncode == 130, said
-    assert not (tmp_path / "b.blocks").exists()
+    begun = tmp_path / "b.blocks.work" / "0.shift.begun.json"
+    for how, code in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)):
+        ended = launched(*words[1])
+        while ended.poll() is None and not begun.exists():
+            time.sleep(0.05)
+        time.sleep(4)  # the program has started and trains; its steps take some seconds
+        ended.send_signal(how)
+        said = ended.communicate(timeout=120)[1]
+        assert ended.returncode in (code, 0), said  # 0: a fast machine was through
     shared = ["--cluster", "local:2"] if importlib.util.find_spec("distributed") else []
     again = launched(*words[1], *shared)
     said = again.communicate(timeout=300)[1]
