@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.backends import choose_backends, open_drawing
-from shapeshift.renderer.colors.color_cache import ColorCache, centre_of, forget_colors
+from shapeshift.renderer.colors.color_cache import ColorCache, forget_colors
 from shapeshift.renderer.colors.decode_colors import decode_colors
 from shapeshift.renderer.colors.eye_colors import by_eye, drawn_together, eyes_among
 from shapeshift.renderer.colors.false_colors import (
@@ -39,9 +39,10 @@ from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import BESIDE_SET, DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
-from shapeshift.renderer.levels import LevelChoice
+from shapeshift.renderer.levels import LevelChoice, decoded_objects, exchange_levels
 from shapeshift.renderer.resample import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
+from shapeshift.renderer.streaming.follow import Streaming
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_control
@@ -64,20 +65,15 @@ class Renderer:
     """
 
     def __init__(
-        self,
-        ctx: moderngl.Context | None,
-        drawing: str = "auto",
-        mlps: str = "auto",
-        sort: str = "auto",
-        target: str | None = None,
-    ) -> None:
+        self, ctx: moderngl.Context | None, drawing: str = "auto", mlps: str = "auto",
+        sort: str = "auto", target: str | None = None,
+    ) -> None:  # fmt: skip
         drawing, mlps, sort = choose_backends(ctx, drawing, mlps, sort)
         if target not in (None, *TARGETS):
             raise ValueError(f"there is no target {target!r}; choose {', '.join(TARGETS)}.")
         self.settings = RenderSettings()
         self._target = target
-        self._ctx = ctx
-        self.gpu = Gpu(ctx) if ctx is not None else None
+        self._ctx, self.gpu = ctx, Gpu(ctx) if ctx is not None else None
         self._resolve = Resolve(self.gpu) if self.gpu is not None else None
         self.drawing = open_drawing(drawing, self.gpu, mlps, sort)
         self._timer = PassTimer(ctx)
@@ -86,6 +82,7 @@ class Renderer:
         self._decoded: list[DecodedObject] = []
         self._false_key: list | None = None  # what the next was chosen for
         self._false_colors = FalseColors()
+        self.streaming = Streaming(self.drawing)
         self.drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
         self._views: list[View] = []  # of the last frame, in the size that is shown
@@ -106,16 +103,23 @@ class Renderer:
         self._take_over(self.levels.shown(scene))
 
     def _look_from(self, views: list[View]) -> None:
-        """Objects with levels of detail at those that these views ask for."""
+        """Objects with levels of detail at those that these views ask for.  Raises BadFile."""
         if self.levels.choose(self._given, self._scaled(views)):
-            self._take_over(self.levels.shown(self._given))
+            scene = self.levels.shown(self._given)
+            if self.streaming.stream is None:  # else all is made anew
+                before, self._decoded, self._false_key = self._decoded, [], None
+                self._decoded = exchange_levels(self.drawing, before, scene)
+            self._take_over(scene)
+        self.streaming.follow(self._scene, self._decoded, views, self._timer)
 
     def _scaled(self, views: Sequence[View]) -> list[View]:
         return [scaled(view, self.settings.render_scale) for view in views]
 
     def _take_over(self, scene: Scene) -> None:
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
-            if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
+            models = [id(decoded.model) for decoded in self._decoded]
+            other = self.streaming.differs(self.settings.budget)
+            if other or models != [id(obj.model) for obj in scene.objects]:
                 self._rebuild(scene)
             for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
                 if not obj.seen:
@@ -145,8 +149,7 @@ class Renderer:
         state = [(d.version, o.seen, o.tint is None, o.appearance) for d, o in pairs]
         if state == self._false_key:
             return
-        self._false_key = state
-        before = self._false_colors.way
+        self._false_key, before = state, self._false_colors.way
         self._false_colors = false_colors(scene, [decoded.x for decoded in self._decoded])
         take_looks(self._decoded, scene, self._false_colors, before == self._false_colors.way)
 
@@ -154,18 +157,13 @@ class Renderer:
         """A new arena for another set of objects; an empty one if the set does not fit."""
         models = [o.model for o in scene.objects]
         self._scene, self._decoded, self._false_key = Scene(()), [], None
-        try:
-            self.drawing.allocate(models)
-        except ValueError:
-            self.drawing.allocate([])
-            raise
-        self._decoded = [DecodedObject(model, [ColorCache(centre_of(model))]) for model in models]
+        self.streaming.allocate(models, self.settings.budget)
+        self._decoded = decoded_objects(models)
 
     def draw(
-        self,
-        views: list[View],
+        self, views: list[View],
         target: moderngl.Framebuffer | list[moderngl.Framebuffer] | None = None,
-    ) -> FrameStats:
+    ) -> FrameStats:  # fmt: skip
         """Draws every view; with `target` (one framebuffer a view) presents them there as well.
 
         Colours are computed for each eye, or once for the middle of the eyes where that cannot be
@@ -261,6 +259,7 @@ class Renderer:
         stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
         stats.sorts, stats.order_age, stats.color_sets = sorts, self.drawing.order_age, color_sets
         stats.debug = self._debug[0][1] if self._debug else stats.debug
+        stats.streaming = self.streaming.stats
         return stats
 
     def _settings_of_frame(self) -> RenderSettings:
@@ -388,6 +387,7 @@ class Renderer:
 
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""
+        self.streaming.close()
         self.drawing.close()
         for part in (self._resolve, self.gpu):
             if part is not None:

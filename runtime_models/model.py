@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.light_harmonics import WIDTH as LIGHT_WIDTH
 from shapeshift.runtime_models.files.plain_text import one_line
+from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.shapes import check
 from shapeshift.runtime_models.splat_motion import SplatMotion
 from shapeshift.runtime_models.stop import ControlEncoding, Stop
@@ -256,6 +257,7 @@ class SplatLayers:
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) columns kept for export
     findings: tuple[Finding, ...] = ()
     motion: SplatMotion | None = None  # time as x: then all lie in layer 0 and mode is cumulative
+    leaves: LeafSource | None = None  # where finer levels of these come from, as they are seen
 
     def __post_init__(self) -> None:
         check(
@@ -288,6 +290,7 @@ class SplatLayers:
             labels=None if self.labels is None else np.ascontiguousarray(self.labels[rows]),
             extra={name: column[rows] for name, column in self.extra.items()},
             motion=None if self.motion is None else self.motion.with_rows(rows),
+            leaves=None,
         )
 
     def time(self, control: Controls) -> float | np.ndarray:

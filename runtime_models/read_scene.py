@@ -62,6 +62,7 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
     read_streamed,
 )
 from shapeshift.runtime_models.splats.sog.sog_files import META
+from shapeshift.runtime_models.splats.sog.streamed_leaves import open_leaves
 
 PHOTOS = (".jpg", ".jpeg")  # a scene's own pictures are .png and .webp
 KNOWN = (
@@ -99,7 +100,7 @@ def read_whole(path: Path, reading: Reading) -> Model:
     if path.name in (MANIFEST, LIST, BLOCK_LIST):
         path = path.parent
     if is_streamed(path):
-        return read_streamed(path, reading)
+        return open_leaves(path, reading) if reading.leaves else read_streamed(path, reading)
     if is_levels(path):
         return read_upright(path, reading, read_levels)
     if is_lcc(path):
@@ -191,6 +192,10 @@ def describe(model: Model, path: str | Path) -> dict:
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]
             drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))
+            if model.leaves is not None:  # the model's own splats are the coarsest of each leaf
+                facts["splats"] = int(model.leaves.levels.finest_counts.sum())
+            if "leaves" in model.provenance:
+                drawn["leaves"] = model.provenance["leaves"]
         return facts | {"mode": model.mode} | drawn | describe_labels(model)
     networks = {
         "splats_per_anchor": model.splats_per_anchor,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
 from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE, Opt
-from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.opening import DrawingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
@@ -24,7 +24,7 @@ MOST_SUPERSAMPLE = 8
 
 
 @dataclass(frozen=True)
-class Options(ClusterOptions, ReadingOptions):
+class Options(ClusterOptions, DrawingOptions):
     """Make a film of a scene: a flight at constant apparent speed past the cameras of its capture,
     around it, or along a path from the viewer, while the scene goes from stop to stop.
 
@@ -312,7 +312,7 @@ def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameF
         "depth_unit": form.depth_unit, "background": background_row(background_of(options, plan)),
         "drawing": options.drawing, "context": options.context,
     }  # fmt: skip
-    reading = {name: getattr(options, name) for name in ReadingOptions.__dataclass_fields__}
+    reading = {name: getattr(options, name) for name in DrawingOptions.__dataclass_fields__}
     key = film_key(plan, options.scene, drawing | {"reading": reading})
     rows = [frame_facts(plan, frame) for frame in range(len(plan.places))]
     facts = {"frames": len(rows), "fps": plan.clock.fps} | drawing | {"rows": rows}
