@@ -1,4 +1,4 @@
-"""Lengths over a picture: lines where the points are seen, and nothing of what is behind the eye."""
+"""Lengths over a picture: lines where points are seen, nothing of what is behind the eye."""
 
 import numpy as np
 
