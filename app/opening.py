@@ -2,14 +2,15 @@
 
 import math
 import os
+import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapeshift.app.command_line import EXPERT
+from shapeshift.app.command_line import EXPERT, Opt
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.model import Finding, Model
 from shapeshift.runtime_models.splats.plain_splats import Reading
@@ -17,6 +18,10 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture
 
+LEAST_CACHE = 64  # MB: a file of half a million splats takes 9 to 20
+MOST_CACHE = 1 << 20
+LEAST_BUDGET = 1000  # splats
+MOST_BUDGET = 1_000_000_000
 PATIENCE_S = 1.0  # what takes longer shows a progress bar
 
 
@@ -59,6 +64,54 @@ class ReadingOptions:
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class DrawingOptions(ReadingOptions):
+    """What a command that draws scenes takes besides."""
+
+    budget: Annotated[str, Opt(metavar="SPLATS")] = ""
+    """Of scenes in levels of detail (launch.py lod, streamed SOG) draw at most so many splats, such
+    as 2M, finer where more pixels show it; auto: what suits this machine.  Default: one level for
+    the whole scene."""
+    cache_mb: Annotated[int, EXPERT] = 2048
+    """MB of such a scene's files that are kept decoded, those used last."""
+
+    def reading(self) -> Reading:
+        """The same for readers.  Raises UsageError."""
+        from dataclasses import replace
+
+        from shapeshift.app.errors import UsageError
+        from shapeshift.runtime_models.files.part_cache import PartCache
+        from shapeshift.runtime_models.splats.plain_splats import LeafReading
+
+        reading = super().reading()
+        if not LEAST_CACHE <= self.cache_mb <= MOST_CACHE:
+            raise UsageError(
+                f"--cache-mb is {self.cache_mb}, expected {LEAST_CACHE} to {MOST_CACHE:,}."
+            )
+        if not self.budget:
+            return reading
+        if self.max_splats:
+            raise UsageError("--budget says how many splats are drawn; leave --max-splats out.")
+        budget = read_splat_budget(self.budget)
+        return replace(reading, leaves=LeafReading(budget, PartCache(self.cache_mb << 20)))
+
+
+def read_splat_budget(text: str, said: str = "--budget") -> int:
+    """Splats of a text like 2M, 500k or 2000000; 0 for auto.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+
+    if text.strip().lower() == "auto":
+        return 0
+    found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)([kKmM]?)", text.strip())
+    count = float(found[1]) * {"": 1, "k": 1e3, "m": 1e6}[found[2].lower()] if found else 0.0
+    if not LEAST_BUDGET <= count <= MOST_BUDGET:
+        raise UsageError(
+            f"{said} is '{text[:40]}', expected auto, or {LEAST_BUDGET:,} to {MOST_BUDGET:,} "
+            "splats, such as 2M or 500k."
+        )
+    return int(count)
+
+
 def refuse_memory(gigabytes: float) -> None:
     """Raises UsageError for what is no amount."""
     from shapeshift.app.errors import UsageError
@@ -88,7 +141,18 @@ def open_model(
         model = read_model(path, replace(options.reading(), progress=shown_progress))
     for finding in model.findings:
         say(sentence(finding))
+    say_levels([model], path, options)
     return model
+
+
+def say_levels(models: Iterable[Model], path: Path, options: ReadingOptions) -> None:
+    """A word where a budget was asked for and nothing has levels to choose from."""
+    asked = isinstance(options, DrawingOptions) and options.budget
+    if asked and all(getattr(model, "leaves", None) is None for model in models):
+        say(
+            f"{path.name} has no levels of detail, so --budget changes nothing; make them with "
+            "`launch.py lod`."
+        )
 
 
 def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":

@@ -3,7 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
+from shapeshift.app.opening import (
+    PATIENCE_S,
+    ReadingOptions,
+    progress_after,
+    say_levels,
+    sentence,
+)
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
@@ -36,6 +42,7 @@ def open_scene_file(
         file, models = read_models(file, replace(options.reading(), progress=progress))
     if show_findings:
         print_findings(models)
+        say_levels(models.values(), path, options)
     return file, models, scene_of(file, models)
 
 

@@ -194,8 +194,8 @@ def _scatter_tiles(
     grid, tiles, visible = scratch.grid, scratch.grid[0] * scratch.grid[1], order.shape[0]
     chunks = chunks_of(device, visible)
     chunk = -(-visible // chunks)
-    # The branch-free walk looks at a tile's right, lower and lower right neighbours, too.
-    bins = tiles + grid[0] + 1
+    # Counting writes up to four rows of tiles and a mask's width beyond a splat's first tile.
+    bins = tiles + 3 * grid[0] + 9
     table, starts = device.empty((chunks, bins), np.int32), device.empty(bins + 1, np.int32)
     intersections = device.empty(total + SPARE * chunks, np.int32)
     near_to_far = device.empty((visible, 2), np.uint32)  # tile bounds

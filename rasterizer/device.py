@@ -61,9 +61,17 @@ class Device:
     def zeros(self, shape, dtype=np.float32) -> "Array":
         """A device array of zeros."""
         array = self.empty(shape, dtype)
-        if array.size:
-            array.fill(0)
+        self.clear(array)
         return array
+
+    def clear(self, array: "Array") -> None:
+        """Enqueue zeros into an array; its own fill() is a kernel that a first use compiles."""
+        import pyopencl as cl
+
+        if array.size:
+            data: Any = array.base_data  # a buffer: the pool has no other memory
+            where = (array.offset, array.nbytes)
+            cl.enqueue_fill_buffer(self.queue, data, np.zeros(1, np.uint8), *where)
 
     def upload(self, host: np.ndarray) -> "Array":
         """A copy of a numpy array on the device, C order."""

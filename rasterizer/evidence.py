@@ -96,7 +96,7 @@ class Evidence:
 
     def _empty(self) -> None:
         self._sums = self.sums()
-        self._table.fill(0)
+        self._device.clear(self._table)
         self._most = 0
 
     def sums(self) -> np.ndarray:

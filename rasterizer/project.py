@@ -112,6 +112,7 @@ class Projected:
     low_pass: float = LOW_PASS  # px^2
     culled_counts: "Array | None" = None  # (chunks, 6) int32, CULL_REASONS
     scratch: TileScratch | None = None  # in the grid of the camera's image
+    unseen: "Array | None" = None  # (C,) int32: clusters left out, as find_unseen.cl has them
 
     @property
     def in_tiles(self) -> TileScratch:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, clusters_of, find_unseen
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import (
     CULL_REASONS,
@@ -22,7 +23,6 @@ from shapeshift.rasterizer.project import (
 
 KERNEL = Path(__file__).parent / "kernels" / "project_arena.cl"
 FARTHEST = 1e18  # metres, or pixels: its square is a finite float
-LANES = 8
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,7 @@ def project_arena(
     device: Device, mean_opacity, covariance, color, object_index, world_from_object,
     cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
     into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (), second_color=None,
+    clusters: Clusters | None = None,
 ) -> list[Projected]:  # fmt: skip
     """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
 
@@ -75,6 +76,8 @@ def project_arena(
     longer than projecting 10,000 splats).
     antialiased: one an object, or none where no object is: opacity falls as the low pass grows the
     ellipse, by sqrt(det / det with it) (Mip-Splatting's 2D filter, gsplat's "antialiased").
+    clusters: boxes of the same arena, by which it leaves out what no view sees: not with
+    keep_outside, and `into` must be the latest result that was made in its arrays.
     """
     limits = limits or Limits()
     sort = sort or SortFrames(tuple(camera.camera_from_world for camera in cameras))
@@ -82,10 +85,11 @@ def project_arena(
     if views not in (1, 2) or orders not in (0, 1, views):
         raise ValueError(f"project_arena takes 1 or 2 views and 0, 1 or as many sort frames, "
                          f"not {views} and {orders}.")  # fmt: skip
+    if clusters is not None and sort.keep_outside:
+        raise ValueError("an order of all splats cannot leave out those that nobody sees.")
     grids = [grid_of(camera.size) for camera in cameras]
     if into is None or not _fits(into, count, orders, grids):
         into = _room(device, count, orders, grids)
-    projected = [replace(p, low_pass=limits.low_pass) for p in into]
     poses = _poses(cameras, sort, world_from_object)
     variant = {"VIEWS": views, "ORDERS": orders}
     if second_color is not None and views == 2:
@@ -94,16 +98,36 @@ def project_arena(
         flags = np.array(antialiased, np.float32)
         poses = np.concatenate([poses.reshape(len(flags), -1), flags[:, None]], axis=1)
         variant["ANTIALIASED"] = 1
-    frame = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
+    packed = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
+    frame = device.constants(np.concatenate(packed))
+    unseen = None
+    if clusters is not None:
+        said = into[0].unseen  # of rows that say "culled" already
+        unseen = device.empty(clusters_of(count), np.int32) if said is None else said
+        find_unseen(device, clusters, views, poses[0].size, frame, unseen, said is not None)
+    projected = [replace(p, low_pass=limits.low_pass, unseen=unseen) for p in into]
     buffers = [_buffers(p) for p in projected]
     scratch = projected[0].in_tiles
     device.launch(
         device.program(KERNEL, **variant)["project_arena"], len(scratch.status), 1,
-        count, scratch.chunk, sort.by_distance, sort.keep_outside,
-        device.constants(np.concatenate(frame)), mean_opacity, covariance, color, second_color,
+        count, scratch.chunk, sort.by_distance, sort.keep_outside, unseen,
+        frame, mean_opacity, covariance, color, second_color,
         object_index, *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
     )  # fmt: skip
     return projected
+
+
+def clusters_unseen(
+    device: Device, clusters: Clusters, cameras: list[Camera], limits: Limits, world_from_object
+) -> np.ndarray:
+    """(C,) bool: what project_arena would leave out of a frame of all these cameras."""
+    poses = _poses(cameras, SortFrames(()), world_from_object)
+    packed = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
+    unseen = device.empty(clusters.bounds.shape[0], np.int32)
+    frame = device.constants(np.concatenate(packed))
+    find_unseen(device, clusters, len(cameras), poses[0].size, frame, unseen, False)
+    found: np.ndarray = device.view(unseen) != 0
+    return found
 
 
 def _fits(earlier: list[Projected], count: int, orders: int, grids: list) -> bool:
@@ -117,7 +141,7 @@ def _fits(earlier: list[Projected], count: int, orders: int, grids: list) -> boo
 def _room(device: Device, count: int, orders: int, grids: list) -> list[Projected]:
     """Arrays for `count` splats in as many views as there are grids."""
     chunks = chunks_of(device, count)
-    chunk = -(-count // (chunks * LANES)) * LANES  # whole vectors but for the last
+    chunk = -(-count // (chunks * CLUSTER)) * CLUSTER  # whole clusters but for the last
     keys: list = [
         (device.empty((count, 2), np.uint32), device.empty((chunks, 1 << LOW_BITS), np.int32))
         for _ in range(orders)

@@ -52,7 +52,7 @@ def shade_sh(
     if seen is not None and blocks:
         whole = np.zeros(blocks * LANES, bool)
         whole[:count] = seen
-        wanted = device.constants(np.asarray(whole.reshape(blocks, LANES).any(axis=1), np.uint8))
+        wanted = device.constants((whole.view(np.uint64) != 0).view(np.uint8))  # LANES bytes each
     kernel = device.program(KERNEL, COEFFICIENTS=width // 3)["shade_sh"]
     x, y, z = (float(v) for v in eye)
     device.launch(

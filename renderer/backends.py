@@ -47,9 +47,9 @@ def open_drawing(drawing: str, gpu: Gpu | None, mlps: str, sort: str) -> Drawing
     """The drawing that choose_backends has named; gpu None: tiles."""
     if drawing == "tiles" or gpu is None:
         # Needs OpenCL, which quads do without.
-        from shapeshift.renderer.tiles.tiles import TilesDrawing
+        from shapeshift.renderer.tiles.paged_tiles import PagedTiles
 
-        return TilesDrawing(mlps=mlps)
+        return PagedTiles(mlps=mlps)
     from shapeshift.renderer.gl.quads import QuadsDrawing
 
     return QuadsDrawing(gpu, mlps, sort)

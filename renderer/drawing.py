@@ -11,7 +11,8 @@ from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
-from shapeshift.runtime_models.model import Model
+from shapeshift.runtime_models.leaf_levels import LeafSplats
+from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import View
@@ -34,6 +35,28 @@ class Drawing(ABC):
     @abstractmethod
     def allocate(self, models: list[Model]) -> None:
         """Room for these objects; what was decoded before is gone."""
+
+    def allocate_pages(self, models: list[Model], pages: int, coefficients: int) -> None:
+        """The same, with pages of rasterizer/paging/pages.py for what a budget draws of models with
+        leaves (streaming/); coefficients: harmonics of each of their splats.
+        """
+        raise BadFile("only tiles draw by a budget; add --drawing tiles, or leave --budget out.")
+
+    def pages_of(self, i: int) -> np.ndarray:
+        """Pages that hold splats of object i, rising: the order of `read_splats`."""
+        raise TypeError("this drawing has no pages.")
+
+    def place_pages(self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats) -> None:
+        """Splats (n PAGE,), of opacity 0 where there are none, into pages (n,) of objects (n,)."""
+        raise TypeError("this drawing has no pages.")
+
+    def clear_pages(self, pages: np.ndarray) -> None:
+        """Nothing is in these pages any more."""
+        raise TypeError("this drawing has no pages.")
+
+    def shade_pages(self, pages: np.ndarray) -> None:
+        """Colours of pages whose splats look alike from everywhere, in all sets."""
+        raise TypeError("this drawing has no pages.")
 
     @abstractmethod
     def decode_geometry(
@@ -70,6 +93,14 @@ class Drawing(ABC):
         seen: (A,) bool, one an anchor (tiles: a splat of layers): the rest may keep what it has.
         at_once: the heat becomes colours of its palettes here.  grade: of what is not heat.
         """
+
+    def seen_splats(
+        self, i: int, views: Sequence[View], settings: RenderSettings
+    ) -> np.ndarray | None:
+        """(n,) bool: which splats of object i these views may see, never False where one does;
+        None: nobody knows, or it would not pay.
+        """
+        return None
 
     @abstractmethod
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:

@@ -22,9 +22,17 @@ def too_many(count: int, most: int, limit: str, instead: str) -> TooLarge:
     )
 
 
-def check_tiles(device: Device, models: list[Model]) -> None:
-    """Raises TooLarge where an array of these objects' splats is longer than the device allows."""
-    count = sum(model.splat_count for model in models)
+def arena_rows(model: Model) -> int:
+    """Rows that the model has in the arena for good: none where a budget says which are there."""
+    return 0 if isinstance(model, SplatLayers) and model.leaves is not None else model.splat_count
+
+
+def check_tiles(device: Device, models: list[Model], more: int = 0) -> None:
+    """Raises TooLarge where an array of these objects' splats is longer than the device allows.
+
+    more: rows for what a budget draws.
+    """
+    count = sum(map(arena_rows, models)) + more
     most = MOST_INDEX // RECORD
     if not count <= most:
         raise too_many(count, most, "the kernels count with 32 bits", "quads")

@@ -27,10 +27,10 @@ from shapeshift.renderer.colors.palette import (
 )
 from shapeshift.renderer.colors.two_looks import (
     Look,
-    grade_of,
     looks_of,
     prepare_two,
     same_shape,
+    take_looks,
     two_false_colors,
 )
 from shapeshift.renderer.colors.wanted import own_colors
@@ -39,8 +39,10 @@ from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import BESIDE_SET, DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
+from shapeshift.renderer.levels import LevelChoice
 from shapeshift.renderer.resample import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
+from shapeshift.renderer.streaming.follow import Streaming
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_control
@@ -75,15 +77,16 @@ class Renderer:
             raise ValueError(f"there is no target {target!r}; choose {', '.join(TARGETS)}.")
         self.settings = RenderSettings()
         self._target = target
-        self._ctx = ctx
-        self.gpu = Gpu(ctx) if ctx is not None else None
+        self._ctx, self.gpu = ctx, Gpu(ctx) if ctx is not None else None
         self._resolve = Resolve(self.gpu) if self.gpu is not None else None
         self.drawing = open_drawing(drawing, self.gpu, mlps, sort)
         self._timer = PassTimer(ctx)
-        self._scene = Scene(())
+        self._scene = self._given = Scene(())  # with the levels of detail in use, and as it came
+        self.levels = LevelChoice()
         self._decoded: list[DecodedObject] = []
         self._false_key: list | None = None  # what the next was chosen for
         self._false_colors = FalseColors()
+        self.streaming = Streaming(self.drawing)
         self.drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
         self._views: list[View] = []  # of the last frame, in the size that is shown
@@ -99,8 +102,24 @@ class Renderer:
 
     def update(self, scene: Scene) -> None:
         """Takes over poses and control values; decodes only what is new or has another x."""
+        self._given = scene
+        self.levels.begin(scene)
+        self._take_over(self.levels.shown(scene))
+
+    def _look_from(self, views: list[View]) -> None:
+        """Objects with levels of detail at those that these views ask for.  Raises BadFile."""
+        if self.levels.choose(self._given, self._scaled(views)):
+            self._take_over(self.levels.shown(self._given))
+        self.streaming.follow(self._scene, self._decoded, views, self._timer)
+
+    def _scaled(self, views: Sequence[View]) -> list[View]:
+        return [scaled(view, self.settings.render_scale) for view in views]
+
+    def _take_over(self, scene: Scene) -> None:
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
-            if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
+            models = [id(decoded.model) for decoded in self._decoded]
+            other = self.streaming.differs(self.settings.budget)
+            if other or models != [id(obj.model) for obj in scene.objects]:
                 self._rebuild(scene)
             for i, (obj, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
                 if not obj.seen:
@@ -130,35 +149,21 @@ class Renderer:
         state = [(d.version, o.seen, o.tint is None, o.appearance) for d, o in pairs]
         if state == self._false_key:
             return
-        self._false_key = state
-        before = self._false_colors.way
+        self._false_key, before = state, self._false_colors.way
         self._false_colors = false_colors(scene, [decoded.x for decoded in self._decoded])
-        same_way = before == self._false_colors.way
-        for decoded, shade in zip(self._decoded, self._false_colors.shades, strict=True):
-            if not (same_way and shade.same(decoded.shade)):
-                decoded.shade = shade
-                forget_colors(decoded.colored)
-        for decoded, obj in zip(self._decoded, scene.objects, strict=True):
-            if (grade := grade_of(obj, self._false_colors)) != decoded.grade:
-                decoded.grade = grade
-                forget_colors(decoded.colored)
+        take_looks(self._decoded, scene, self._false_colors, before == self._false_colors.way)
 
     def _rebuild(self, scene: Scene) -> None:
         """A new arena for another set of objects; an empty one if the set does not fit."""
         models = [o.model for o in scene.objects]
         self._scene, self._decoded, self._false_key = Scene(()), [], None
-        try:
-            self.drawing.allocate(models)
-        except ValueError:
-            self.drawing.allocate([])
-            raise
+        self.streaming.allocate(models, self.settings.budget)
         self._decoded = [DecodedObject(model, [ColorCache(centre_of(model))]) for model in models]
 
     def draw(
-        self,
-        views: list[View],
+        self, views: list[View],
         target: moderngl.Framebuffer | list[moderngl.Framebuffer] | None = None,
-    ) -> FrameStats:
+    ) -> FrameStats:  # fmt: skip
         """Draws every view; with `target` (one framebuffer a view) presents them there as well.
 
         Colours are computed for each eye, or once for the middle of the eyes where that cannot be
@@ -169,12 +174,13 @@ class Renderer:
         if not views or (targets is not None and len(targets) != len(views)):
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         settings = self._settings_of_frame()
+        self._look_from(views)
         self.drawing.draws_heat = self._false_colors.way == BESIDE and not settings.debug
         self._views = views
         # An eye that is not drawn keeps its picture, and how its colours came about.
         self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
-        full, views = views, [scaled(view, settings.render_scale) for view in views]
-        own, sorts = own_colors(self.settings, self._scene, self._decoded, full), 0
+        full, views, sorts = views, self._scaled(views), 0
+        own = own_colors(self.settings, self._scene, self._decoded, full)
         with self._framebuffer_kept():
             for group in drawn_together(self._scene, len(full), own):
                 sets = self._decode_colors(full[group], own)
@@ -199,6 +205,8 @@ class Renderer:
 
         ValueError where more differs (colors/two_looks.py, `same_shape`).  No debug pictures.
         """
+        self._look_from(list(views))
+        other = self.levels.shown(other)
         if not same_shape(self._scene, other):
             raise ValueError("draw_two wants two scenes that differ in their colours alone.")
         scenes, self._ways = (self._scene, other), two_false_colors(self._scene, other)
@@ -214,8 +222,7 @@ class Renderer:
                     at_once = self._ways[which].way == SPLATS
                     self._decode_set((which, 2), [views[which]], scene, looks[which], at_once)
                 self.drawing.wait_decoded()
-            small = [scaled(view, settings.render_scale) for view in views]
-            self.drawing.draw(small, settings, self._timer)
+            self.drawing.draw(self._scaled(views), settings, self._timer)
         return self._stats_of(self.drawing.sorts, 2)
 
     def draw_beside(self, views: Sequence[View], other: Scene, first: int) -> dict[str, float]:
@@ -225,13 +232,15 @@ class Renderer:
         With `keeps_beside`, or its colours are decoded each time.  Milliseconds of the passes.
         ValueError where more differs.  The counts become those of these views.
         """
+        other = self.levels.shown(other)
         if not same_shape(self._scene, other):
             raise ValueError("draw_beside wants a scene that differs in its colours alone.")
         colors = false_colors(other, [control_of(obj) for obj in other.objects])
-        looks, timer = looks_of(other, colors), self._beside_timer
+        looks, sets = looks_of(other, colors), (BESIDE_SET,) * len(views)
         for decoded, look in zip(self._decoded, looks, strict=True):
             decoded.look_beside(look)
-        settings = replace(self._settings_of_frame(), debug="", depth_scale=0.0)
+        settings, timer = self._settings_of_frame(), self._beside_timer
+        settings = replace(settings, debug="", depth_scale=0.0)
         self._views = [*self._views[:first], *views]
         self._ways = [*self._ways[:first], *([colors] * len(views))]
         with self._framebuffer_kept():
@@ -240,22 +249,17 @@ class Renderer:
                 self._decode_set((BESIDE_SET, BESIDE_SET + 1), list(views), other, looks, at_once)
                 self.drawing.wait_decoded()
             self.drawing.draws_heat = colors.way == BESIDE
-            small = [scaled(view, settings.render_scale) for view in views]
-            sets = (BESIDE_SET,) * len(small)
-            self.drawing.draw(small, settings, timer, first, sets, again=True)
+            self.drawing.draw(self._scaled(views), settings, timer, first, sets, again=True)
         return timer.collect()
 
     def _stats_of(self, sorts: int, color_sets: int) -> FrameStats:
         """The counters of the frame that was just drawn; they begin anew."""
-        culled = self.drawing.counts()
-        drawn = culled.pop("drawn")
-        runs = (self._geometry_runs, self._color_runs)
-        self._geometry_runs = self._color_runs = 0
+        drawn = (culled := self.drawing.counts()).pop("drawn")
+        runs, self._geometry_runs, self._color_runs = (self._geometry_runs, self._color_runs), 0, 0
         stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
-        stats.sorts, stats.order_age = sorts, self.drawing.order_age
-        stats.color_sets = color_sets
-        if self._debug:
-            stats.debug = self._debug[0][1]
+        stats.sorts, stats.order_age, stats.color_sets = sorts, self.drawing.order_age, color_sets
+        stats.debug = self._debug[0][1] if self._debug else stats.debug
+        stats.streaming = self.streaming.stats
         return stats
 
     def _settings_of_frame(self) -> RenderSettings:
@@ -275,9 +279,9 @@ class Renderer:
             fresh = (ColorCache(decoded.colored[0].centre) for _ in range(count))
             decoded.colored = [*decoded.colored, *fresh][:count]
         looks = [(decoded.shade, decoded.grade) for decoded in self._decoded]
+        at_once = self._false_colors.way == SPLATS
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
             for which, group in enumerate(groups):
-                at_once = self._false_colors.way == SPLATS
                 self._decode_set((which, count), group, self._scene, looks, at_once)
             self.drawing.wait_decoded()
         return tuple(eyes) if self.keeps_beside or len(groups) != len(views) else ()
@@ -301,11 +305,10 @@ class Renderer:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
         row 0 on top.  At a pure thermal stop it holds values, else colours.
         """
-        colors = self._ways[i]
+        image, palette = self.drawing.image(i), self._ways[i].palette
         if not self._has_heat(i):
-            return self.drawing.image(i)
-        ends = self.settings.heat_ends
-        return overlay_heat(self.drawing.image(i), self.drawing.heat(i), colors.palette, ends)
+            return image
+        return overlay_heat(image, self.drawing.heat(i), palette, self.settings.heat_ends)
 
     def resolved(self, i: int = 0, out: np.ndarray | None = None) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background,
@@ -326,8 +329,8 @@ class Renderer:
         """Fills a GL framebuffer with view i as resolved() shows it."""
         if self._resolve is None:
             raise ValueError("this renderer has no GL context to present with; use resolved().")
-        name = "" if self._debug else self._ways[i].palette
-        palette = palette_between(name, self.settings.heat_ends) if name else None
+        name, ends = "" if self._debug else self._ways[i].palette, self.settings.heat_ends
+        palette = palette_between(name, ends) if name else None
         image = opaque(self._debug[i][0]) if self._debug else self.drawing.presentable(i)
         heat = self.drawing.presentable_heat(i) if self._has_heat(i) else None
         background, view = self.settings.background, self._views[i]
@@ -350,6 +353,7 @@ class Renderer:
 
     def surface(self, view: View) -> Surface:
         """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""
+        self._look_from([view])
         self._decode_colors([view])
         with self._framebuffer_kept():
             return self.drawing.surface(view, self._settings_of_frame())
@@ -363,8 +367,7 @@ class Renderer:
         sets = self._decode_colors(views)
         self._ways = [self._false_colors] * len(views) + self._ways[len(views) :]
         settings = replace(self._settings_of_frame(), debug="")
-        views = [scaled(view, settings.render_scale) for view in views]
-        pictures = []
+        views, pictures = self._scaled(views), []
         for frames in (1, 0):  # sorted now, then the order that is kept
             once = replace(settings, resort_frames=frames, resort_degrees=0.0)
             with self._framebuffer_kept(), self.drawing.order_set_aside():
@@ -384,6 +387,7 @@ class Renderer:
 
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""
+        self.streaming.close()
         self.drawing.close()
         for part in (self._resolve, self.gpu):
             if part is not None:

@@ -12,6 +12,7 @@ STEREO_COLORS = ("auto", "each", "shared")
 FOVEATIONS = ("off", "low", "medium", "high")
 TARGETS = ("auto", "rgba8", "rgba16", "rgba16f", "rgba32f")
 EDGES = ("ellipses", "points", "rings")
+MOST_BUDGET = 1_000_000_000  # splats: no device holds as many
 DEBUG_VIEWS = ("", "culls", "birdseye", "overdraw", "depth", "object", *EDGES)
 # Why a splat is not drawn, in the order of the gates: the first that it fails counts it.
 CULL_REASONS = ("opacity", "distance", "frustum", "size", "footprint", "faded")
@@ -44,6 +45,10 @@ class RenderSettings:
     max_distance: float = math.inf  # tau_dist: metres from the eye
     min_pixels: float = 0.0  # footprint: half the quad's longer side, pixels, out to the cutoff
     fade: float = 0.0  # part of each of these three limits over which opacity goes to 0
+
+    # Splats at most, of a scene with models in levels of detail (renderer/streaming); 0: what they
+    # were opened with.
+    budget: int = 0
 
     # Order
     order: str = "depth"  # along the view (3DGS) or "distance" to the eye (KHR_gaussian_splatting)
@@ -83,10 +88,24 @@ class RenderSettings:
             ("min_transmittance", 1e-6, 0.1), ("depth_scale", 0.0, 1.0),
             ("max_pixels", 0.0, math.inf), ("max_distance", 0.0, math.inf),
             ("min_pixels", 0.0, math.inf), ("fade", 0.0, 1.0), ("resort_frames", 0, 1_000_000),
-            ("resort_degrees", 0.0, 180.0), ("recolor_degrees", 0.0, 180.0),
+            ("budget", 0, MOST_BUDGET), ("resort_degrees", 0.0, 180.0),
+            ("recolor_degrees", 0.0, 180.0),
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:
                 raise ValueError(f"{name} is {getattr(self, name)}, expected {least} to {most}.")
+
+
+@dataclass(frozen=True)
+class StreamStats:
+    """What of models in levels of detail is drawn in a frame, in splats."""
+
+    budget: int
+    shown: int  # in the arena
+    in_sight: int  # of the finest levels of the leaves in the picture
+    whole: int  # of the finest levels of all leaves
+    changed: int  # that were uploaded for this frame
+    pending: bool  # other levels are on their way
+    problem: str  # one sentence: what could not be read
 
 
 @dataclass
@@ -103,3 +122,4 @@ class FrameStats:
     sorts: int = 0  # how often this frame sorted: 0 with an order kept, 1, or 1 a view
     order_age: int = 0  # frames since the order in use was made
     debug: dict[str, float] = field(default_factory=dict)  # numbers of the debug picture's legend
+    streaming: StreamStats | None = None  # of a scene with models in levels of detail

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from shapeshift.runtime_models.blocks.block_model import BlockModel
+from shapeshift.runtime_models.blocks.evaluate_blocks import BlockEvaluator
 from shapeshift.runtime_models.colors.light_harmonics import light_along
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.model import (
@@ -109,8 +111,13 @@ class Evaluator:
         self._centres: np.ndarray | None = None  # (A, k * 3) the anchor of every splat
         self._frames: FrameColumns | None = None
         self._scaffold: ScaffoldEvaluator | None = None
+        self._blocks: BlockEvaluator | None = None
         if isinstance(model, ScaffoldModel):
             self._scaffold = ScaffoldEvaluator(model, keep)
+        elif isinstance(model, BlockModel):
+            self._blocks = BlockEvaluator(
+                model, lambda part: Evaluator(part, threads, fold, keep), keep
+            )
         elif isinstance(model, AnchorModel):
             if model.frames is not None:
                 self._frames = FrameColumns(model.frames, model.splats_per_anchor)
@@ -134,6 +141,8 @@ class Evaluator:
         model = self.model
         if self._scaffold is not None:
             return self._scaffold.geometry(eye, unit, seen)
+        if self._blocks is not None:
+            return self._blocks.geometry(x, unit)
         if isinstance(model, SplatLayers):
             weights = model.weights(x)  # (stops,) or (stops, N)
             there = weights[model.layer] if weights.ndim == 1 else _own(weights, model.layer)
@@ -165,6 +174,8 @@ class Evaluator:
         model = self.model
         if self._scaffold is not None:
             return self._scaffold.color(eye)
+        if self._blocks is not None:
+            return self._blocks.color(x, eye, seen, out)
         places = model.means if isinstance(model, SplatLayers) else model.anchors
         if seen is None or seen.all():
             return self._color(x, slice(None), directions(places, eye), out)
@@ -187,6 +198,8 @@ class Evaluator:
         if self._scaffold is not None:
             assert eye is not None, "a model that follows the eye is asked for one eye"
             return self._scaffold.color_along(eye, direction)
+        if self._blocks is not None:
+            return self._blocks.color_along(x, direction)
         return self._color(x, slice(None), direction)
 
     def _color(

@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.light_harmonics import WIDTH as LIGHT_WIDTH
 from shapeshift.runtime_models.files.plain_text import one_line
+from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.shapes import check
 from shapeshift.runtime_models.splat_motion import SplatMotion
 from shapeshift.runtime_models.stop import ControlEncoding, Stop
@@ -92,6 +93,20 @@ class AnchorFrames:
 
 
 @dataclass(frozen=True)
+class CoarserAnchors:
+    """A level of detail: fewer anchors, for the networks and stops of the model that has it."""
+
+    anchors: np.ndarray  # (A, 3), as of the model: these, frames, labels and light
+    features: np.ndarray  # (A, F)
+    frames: "AnchorFrames | None"
+    labels: np.ndarray | None
+    light: np.ndarray | None
+    cell_m: float  # metres: the edge of the cells whose anchors became one
+    from_pixels: float  # it is drawn where the model is seen no larger: diameter of its bounds
+    error_db: dict[str, float] = field(default_factory=dict)  # of pictures of that size, by where
+
+
+@dataclass(frozen=True)
 class AnchorModel:
     """A trained shape-shifting model: anchors, features and five networks (paper section 3.2)."""
 
@@ -111,9 +126,13 @@ class AnchorModel:
     objects: tuple[ObjectLabel, ...] = ()  # of every label above 0 that there is; maybe more
     light: np.ndarray | None = None  # (A, 8) by direction, as light_harmonics.py says: what it
     #                                  gives is the colour network's input "light"
+    coarser: tuple[CoarserAnchors, ...] = ()  # levels of detail, for ever smaller pictures ...
+    coarser_of: tuple = ()  # ... of a model with these numbers: changed ones have none
 
     def __post_init__(self) -> None:
         check(anchors=(self.anchors, "A 3"), features=(self.features, "A F"))
+        if self.coarser and not self._is_as_levelled():
+            object.__setattr__(self, "coarser", ())
         check_light(self)
         check_labels(self.labels, self.objects, len(self.anchors))
         if self.frames is not None:
@@ -122,6 +141,35 @@ class AnchorModel:
     @property
     def splat_count(self) -> int:
         return len(self.anchors) * self.splats_per_anchor
+
+    def with_coarser(self, coarser: tuple[CoarserAnchors, ...]) -> "AnchorModel":
+        """The same with levels of detail, the finest of them first.  They are kept by `replace` as
+        long as anchors and networks are.
+        """
+        return replace(self, coarser=coarser, coarser_of=self._numbers())
+
+    @cached_property
+    def levels(self) -> tuple["AnchorModel", ...]:
+        """This one, and each of its coarser levels as a model of its own."""
+        own = [
+            replace(
+                self, anchors=one.anchors, features=one.features, frames=one.frames,
+                labels=one.labels, light=one.light, findings=(), coarser=(), coarser_of=(),
+            )
+            for one in self.coarser
+        ]  # fmt: skip
+        return (self, *own)
+
+    def _numbers(self) -> tuple:
+        """All that its levels of detail were made from."""
+        return (
+            self.anchors, self.features, self.frames, self.labels, self.light, self.networks,
+            self.encoding, self.splats_per_anchor,
+        )  # fmt: skip
+
+    def _is_as_levelled(self) -> bool:
+        pairs = zip(self._numbers(), self.coarser_of, strict=False)
+        return len(self.coarser_of) == len(self._numbers()) and all(a is b for a, b in pairs)
 
     @property
     def input_widths(self) -> dict[str, int]:
@@ -209,6 +257,7 @@ class SplatLayers:
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) columns kept for export
     findings: tuple[Finding, ...] = ()
     motion: SplatMotion | None = None  # time as x: then all lie in layer 0 and mode is cumulative
+    leaves: LeafSource | None = None  # where finer levels of these come from, as they are seen
 
     def __post_init__(self) -> None:
         check(
@@ -241,6 +290,7 @@ class SplatLayers:
             labels=None if self.labels is None else np.ascontiguousarray(self.labels[rows]),
             extra={name: column[rows] for name, column in self.extra.items()},
             motion=None if self.motion is None else self.motion.with_rows(rows),
+            leaves=None,
         )
 
     def time(self, control: Controls) -> float | np.ndarray:

@@ -1,13 +1,23 @@
 """Opens whatever this program can show, recognised by content where the format allows."""
 
 import shlex
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.blocks.block_model import FORMAT as BLOCKS_FORMAT
+from shapeshift.runtime_models.blocks.block_model import BlockModel
+from shapeshift.runtime_models.blocks.read_blocks import LIST as BLOCK_LIST
+from shapeshift.runtime_models.blocks.read_blocks import has_block_list, read_blocks
 from shapeshift.runtime_models.files.memory import refuse_empty
 from shapeshift.runtime_models.files.zip_files import member_names
+from shapeshift.runtime_models.lod.level_files import (
+    files_of_levels,
+    is_levels,
+    read_levels,
+)
 from shapeshift.runtime_models.model import (
     AnchorModel,
     BadFile,
@@ -52,12 +62,13 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
     read_streamed,
 )
 from shapeshift.runtime_models.splats.sog.sog_files import META
+from shapeshift.runtime_models.splats.sog.streamed_leaves import open_leaves
 
 PHOTOS = (".jpg", ".jpeg")  # a scene's own pictures are .png and .webp
 KNOWN = (
-    "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
-    ".gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of a 3DGS or "
-    "Scaffold-GS run"
+    "a package (folder, .shift or .lod), a folder of blocks, a file of splats (.ply, .splat, "
+    ".ksplat, .spz, .sog, .glb, .gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the "
+    "folder of a 3DGS or Scaffold-GS run"
 )
 
 
@@ -86,10 +97,12 @@ def read_whole(path: Path, reading: Reading) -> Model:
         raise BadFile(f"{path} is neither a file nor a folder; wanted is {KNOWN}.")
     if path.is_file():
         refuse_empty(path)
-    if path.name in (MANIFEST, LIST):
+    if path.name in (MANIFEST, LIST, BLOCK_LIST):
         path = path.parent
     if is_streamed(path):
-        return read_streamed(path, reading)
+        return open_leaves(path, reading) if reading.leaves else read_streamed(path, reading)
+    if is_levels(path):
+        return read_upright(path, reading, read_levels)
     if is_lcc(path):
         return read_lcc(path, reading)
     if is_lcc2(path):
@@ -99,6 +112,8 @@ def read_whole(path: Path, reading: Reading) -> Model:
     if path.is_dir():
         if (path / MANIFEST).exists():
             return read_upright(path, reading)
+        if has_block_list(path):
+            return read_upright(path, reading, read_blocks)
         if has_layer_list(path):
             return read_layer_list(path, reading)
         if is_sog(b"", path):
@@ -135,15 +150,17 @@ def nothing_to_show(folder: Path) -> str:
     return f"{folder} holds nothing to show; wanted is {KNOWN}."
 
 
-def read_upright(path: Path, reading: Reading) -> AnchorModel:
-    """A package, whose up is +Y and nothing else.  Raises BadFile."""
+def read_upright(
+    path: Path, reading: Reading, read: Callable[[Path, Reading], AnchorModel] = read_package
+) -> AnchorModel:
+    """A package, whose up is +Y and nothing else, however it is read.  Raises BadFile."""
     if reading.flip or reading.up not in ("", "+Y"):
         raise BadFile(
             f"{path.name} is a package, and +Y is up in all of them; leave out --up and --flip."
         )
-    model = read_package(path, reading)
-    if not reading.allow_huge:
-        refuse_filling(model, path.name)
+    model = read(path, reading)
+    for level in model.levels if not reading.allow_huge else ():
+        refuse_filling(level, path.name)
     return replace(model, findings=(*model.findings, *encoding_findings(model, path.name)))
 
 
@@ -175,6 +192,10 @@ def describe(model: Model, path: str | Path) -> dict:
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]
             drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))
+            if model.leaves is not None:  # the model's own splats are the coarsest of each leaf
+                facts["splats"] = int(model.leaves.levels.finest_counts.sum())
+            if "leaves" in model.provenance:
+                drawn["leaves"] = model.provenance["leaves"]
         return facts | {"mode": model.mode} | drawn | describe_labels(model)
     networks = {
         "splats_per_anchor": model.splats_per_anchor,
@@ -189,10 +210,34 @@ def describe(model: Model, path: str | Path) -> dict:
         | networks
         | {"encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing}}
         | {"between_stops": model.between_stops, "paced_pairs": len(model.pace)}
+        | describe_blocks(model)
+        | describe_levels(model)
         | describe_light(model)
         | describe_labels(model)
         | describe_findings(model)
     )
+
+
+def describe_blocks(model: AnchorModel) -> dict:
+    """Of a scene in blocks, how many there are and their anchors."""
+    if not isinstance(model, BlockModel):
+        return {}
+    counts = np.bincount(model.block, minlength=len(model.networks_of_blocks))
+    return {
+        "format": BLOCKS_FORMAT, "blocks": len(counts), "anchors_of_blocks": counts.tolist()
+    }  # fmt: skip
+
+
+def describe_levels(model: AnchorModel) -> dict:
+    """Levels of detail of a package, where it has such."""
+    if not model.coarser:
+        return {}
+    coarser = [
+        {"anchors": len(one.anchors), "splats": len(one.anchors) * model.splats_per_anchor,
+         "from_pixels": one.from_pixels, "error_db": one.error_db}
+        for one in model.coarser
+    ]  # fmt: skip
+    return {"coarser_levels": coarser}
 
 
 def describe_light(model: AnchorModel) -> dict:
@@ -243,13 +288,17 @@ def describe_head(mlp: Mlp) -> dict:
 
 def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
-    in_folder = path.name in (MANIFEST, META, TREE, LIST) or is_lcc(path) or is_lcc2(path)
+    if is_levels(path):
+        return files_of_levels(path)
+    in_folder = (
+        path.name in (MANIFEST, META, TREE, LIST, BLOCK_LIST) or is_lcc(path) or is_lcc2(path)
+    )
     if in_folder and not path.is_dir():
         path = path.parent
     if isinstance(model, ScaffoldModel) and not path.is_dir():
         path = path.parent
     if not path.is_dir():
         return [path]
-    if isinstance(model, AnchorModel):
+    if isinstance(model, AnchorModel) and not isinstance(model, BlockModel):
         return [path / MANIFEST, path / ANCHORS, *path.glob("*.onnx")]
     return [path / name for name in model.provenance.get("files", ())]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.runtime_models.model import Model
+from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
 from shapeshift.scene.appearance import NEUTRAL, Appearance
 from shapeshift.scene.pose import UNIT_SLACK, Pose
@@ -76,4 +76,11 @@ class Scene:
 
     @property
     def splat_count(self) -> int:
-        return sum(o.model.splat_count for o in self.objects)
+        """Of what is drawn by a budget all that there are, at their finest level."""
+        return sum(count_splats(o.model) for o in self.objects)
+
+
+def count_splats(model: Model) -> int:
+    """All splats of a model, whose own may be the coarsest level of its leaves."""
+    leaves = model.leaves if isinstance(model, SplatLayers) else None
+    return model.splat_count if leaves is None else int(leaves.levels.finest_counts.sum())

@@ -13,7 +13,7 @@ from shapeshift.app.errors import UsageError
 NONE = "none"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ClusterOptions:
     """Options of commands whose work falls into tasks."""
 
@@ -36,6 +36,19 @@ class Cluster(Protocol):
         and the same call goes on.
         """
         ...
+
+
+def check_cluster(options: ClusterOptions) -> None:
+    """Before long work: what --cluster says, and whether what it needs is installed.
+
+    Raises UsageError.
+    """
+    from shapeshift.app.cluster.place import read_place
+
+    if read_place(options.cluster).kind != NONE:
+        from shapeshift.app.cluster.certificates import require_dask
+
+        require_dask()
 
 
 @contextmanager

@@ -46,7 +46,8 @@ def run_task(task: Task, key: str, hear: Hear, wanted: Callable[[], bool] = lamb
     """
     if task.is_done(key):
         return
-    os.makedirs(os.path.dirname(task.writes[0]), exist_ok=True)
+    for path in (task.writes[0], str(task.begun_note)):
+        os.makedirs(os.path.dirname(path), exist_ok=True)
     with alone(task, hear, wanted) as note:
         if task.is_done(key):
             return

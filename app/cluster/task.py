@@ -7,10 +7,11 @@ written, so a second start does nothing twice, whoever did it first.
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.files.json_fields import saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 
@@ -32,22 +33,28 @@ class Task:
     slots: Mapping[str, int] = field(default_factory=dict)  # what it holds, such as {"gpu": 1}
     checkpoint: str = ""  # a file that an attempt leaves that was ended early
     resume: tuple[str, ...] = ()  # words for `argv` that make it go on from that file
+    notes: str = ""  # a folder for its notes; "": beside the first file that it writes
 
     def __post_init__(self) -> None:
         if not (self.name and self.argv and self.writes):
             raise ValueError(f"task '{self.name}': a name, a command and what it writes are wanted")
-        for path in (*self.reads, *self.writes, *filter(None, [self.checkpoint])):
+        for path in (*self.reads, *self.writes, *filter(None, [self.checkpoint, self.notes])):
             if not os.path.isabs(path):
                 raise ValueError(f"task {self.name}: '{path}' is not absolute")
 
     @property
     def done_note(self) -> Path:
-        return Path(self.writes[0] + DONE)
+        return self._note(DONE)
 
     @property
     def begun_note(self) -> Path:
         """Locked as long as an attempt lives."""
-        return Path(self.writes[0] + BEGUN)
+        return self._note(BEGUN)
+
+    def _note(self, ending: str) -> Path:
+        if self.notes:
+            return Path(self.notes, file_name(self.name) + ending)
+        return Path(self.writes[0] + ending)
 
     def key(self) -> str:
         """A hash of the command and of what it reads; where the files lie is not in it."""
@@ -72,6 +79,14 @@ class Task:
         """The command of the next attempt; begun: the key of the one before, "" of none."""
         goes_on = begun and self.checkpoint and os.path.exists(self.checkpoint)
         return (*self.argv, *self.resume) if goes_on else self.argv
+
+
+def forget(tasks: Iterable[Task]) -> None:
+    """Takes the notes of tasks away, and their folders of notes where nothing else is in them."""
+    for task in tasks:
+        task.done_note.unlink(missing_ok=True)
+        if task.notes and os.path.isdir(task.notes) and not os.listdir(task.notes):
+            os.rmdir(task.notes)
 
 
 _digests: dict[tuple[str, int, int], str] = {}  # by path, bytes and time

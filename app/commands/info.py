@@ -49,6 +49,8 @@ def print_table(facts: dict) -> None:
                 f"{name}: {' → '.join(map(str, head['layers']))}, {head['activation']}"
                 for name, head in value.items()
             )
+        elif key == "coarser_levels":
+            value = "\n".join(map(level_line, value))
         elif key == "findings":
             value = "\n".join(value)
         elif key == "objects":
@@ -65,6 +67,14 @@ def print_table(facts: dict) -> None:
             value = f"{value:,}"
         table.add_row(key, Text("" if value is None else str(value)))  # names may hold brackets
     open_console(stderr=False).print(table)
+
+
+def level_line(level: dict) -> str:
+    """One coarser level of a package."""
+    where = {"stops": "at stops", "between": "between them"}
+    errors = ", ".join(f"{db:.1f} dB {where[name]}" for name, db in level["error_db"].items())
+    text = f"{level['anchors']:,} anchors, up to {level['from_pixels']:.0f} pixels"
+    return f"{text}: {errors}" if errors else text
 
 
 def object_line(item: dict) -> str:

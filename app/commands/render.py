@@ -16,7 +16,7 @@ from shapeshift.app.command_line import (
     Debug,
     Opt,
 )
-from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.opening import DrawingOptions, open_model
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
@@ -30,7 +30,7 @@ LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 
 
 @dataclass(frozen=True)
-class Options(ReadingOptions):
+class Options(DrawingOptions):
     """Draw a scene into PNG files."""
 
     scene: Annotated[Path, POSITIONAL]

@@ -14,7 +14,7 @@ from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
-from shapeshift.app.editor.window.levels import attach_refiner
+from shapeshift.app.editor.window.levels import attach_budget, attach_refiner
 from shapeshift.app.editor.window.shell import speak_first
 from shapeshift.app.editor.window.split import splitting
 from shapeshift.app.editor.window.viewer import Viewer
@@ -61,6 +61,7 @@ def run(options: Options) -> int:
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, state, options, settings, own_files)
             hooks, upload = viewer.hooks, viewer.shown.upload
+            attach_budget(renderer, state, hooks)
             attach_refiner(refiner, state, hooks, upload, viewer.dial.scene_changed)
             viewer.files.read = refiner.open
             viewer.files.started(found)

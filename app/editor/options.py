@@ -14,11 +14,11 @@ from shapeshift.app.command_line import (
     Debug,
     Opt,
 )
-from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.opening import DrawingOptions
 
 
 @dataclass(frozen=True)
-class Options(ReadingOptions):
+class Options(DrawingOptions):
     """Open a scene in a window."""
 
     scenes: Annotated[tuple[Path, ...], POSITIONAL] = ()

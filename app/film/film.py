@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
 from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE, Opt
-from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.opening import DrawingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
@@ -23,7 +24,7 @@ MOST_SUPERSAMPLE = 8
 
 
 @dataclass(frozen=True)
-class Options(ReadingOptions):
+class Options(ClusterOptions, DrawingOptions):
     """Make a film of a scene: a flight at constant apparent speed past the cameras of its capture,
     around it, or along a path from the viewer, while the scene goes from stop to stop.
 
@@ -93,10 +94,12 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.document import open_document
     from shapeshift.app.film.film_plan import read_style
     from shapeshift.app.film.frame_folder import FrameFolder
 
+    check_cluster(options)
     # What needs no scene comes before it: large ones take a while to open.
     path, cameras = named_path(options)
     clock = clock_of(options, path)
@@ -309,7 +312,7 @@ def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameF
         "depth_unit": form.depth_unit, "background": background_row(background_of(options, plan)),
         "drawing": options.drawing, "context": options.context,
     }  # fmt: skip
-    reading = {name: getattr(options, name) for name in ReadingOptions.__dataclass_fields__}
+    reading = {name: getattr(options, name) for name in DrawingOptions.__dataclass_fields__}
     key = film_key(plan, options.scene, drawing | {"reading": reading})
     rows = [frame_facts(plan, frame) for frame in range(len(plan.places))]
     facts = {"frames": len(rows), "fps": plan.clock.fps} | drawing | {"rows": rows}
@@ -333,6 +336,7 @@ def draw_lacking(
     """The frames that are not there."""
     from shapeshift.app.drawing import open_renderer
     from shapeshift.app.film.draw_film import draw_frames
+    from shapeshift.app.film.film_tasks import draw_by_cluster
     from shapeshift.app.progress import progress_bar
 
     lacking = folder.lacking(numbers)
@@ -340,6 +344,9 @@ def draw_lacking(
         return
     if len(lacking) < len(numbers):
         say(f"{len(numbers) - len(lacking)} of {len(numbers)} frames are there already.")
+    if options.cluster != NONE:
+        draw_by_cluster(options, plan, folder, numbers)
+        return
     with open_renderer(options.context, options.drawing) as (renderer, _):
         renderer.settings = replace(renderer.settings, background=background_of(options, plan))
         with progress_bar() as bar:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
-from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.opening import DrawingOptions
 from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
 
@@ -28,7 +28,7 @@ MOST_WAIT_S = 3600.0  # for a runtime that went away
 
 
 @dataclass(frozen=True)
-class Options(ReadingOptions):
+class Options(DrawingOptions):
     """Walk into a scene and touch it, see docs/vr.md."""
 
     scene: Annotated[Path | None, POSITIONAL] = None
@@ -210,6 +210,7 @@ def wear(options: Options) -> int:
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
+            renderer.streaming.converges = False  # a frame is late if it waits for its leaves
             rules = Rules(obstacles=options.obstacles)
             say_missing(link, options, worn)
             xr_app = XrApp(
@@ -347,5 +348,5 @@ def without_headset(reason: str, options: Options) -> int:
     from shapeshift.app.editor import desktop
 
     say("Opening the scene in a window instead.")
-    reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}
+    reading = {each.name: getattr(options, each.name) for each in fields(DrawingOptions)}
     return desktop.run(desktop.Options(scenes=(options.scene or DEMO,), x=options.x, **reading))

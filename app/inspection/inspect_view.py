@@ -12,6 +12,7 @@ import numpy as np
 from shapeshift.app.document import Document
 from shapeshift.app.inspection.draw_values import ThermalScene, draw_values
 from shapeshift.scene.inspection.emissivity import Emission
+from shapeshift.scene.inspection.length_marks import LengthMark
 from shapeshift.scene.inspection.marks import Isotherm, Mark, MarkReading, read_mark
 from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.inspection.value_picture import ValuePicture, value_text
@@ -44,6 +45,7 @@ class InspectedView:
     readings: tuple[MarkReading, ...]
     differences: tuple[tuple[str, str, float], ...]  # first, second, mean less mean
     isotherms: tuple[IsothermReading, ...]
+    lengths: tuple[tuple[LengthMark, str], ...] = ()  # and what they come to, in words
 
 
 def inspect_view(
@@ -75,16 +77,23 @@ def first_photo(document: Document, thermal: ThermalScene) -> str:
     return next(others, "")
 
 
-def with_readings(inspected: InspectedView, file: MarksFile) -> InspectedView:
-    """The view with what it reads of all marks, differences and isotherms of a file."""
+def with_readings(inspected: InspectedView, file: MarksFile, unit: str = "m") -> InspectedView:
+    """The view with what it reads of all marks, differences and isotherms of a file, and with its
+    lengths; unit: of these.
+    """
     values = inspected.values
     readings = {mark.name: read_mark(mark, values) for mark in file.marks}
     differences = tuple((a, b, readings[a].mean - readings[b].mean) for a, b in file.differences)
     isotherms = tuple(_isotherm(each, values) for each in file.isotherms)
     return InspectedView(
         values, inspected.photo, inspected.photo_name, tuple(readings.values()), differences,
-        isotherms,
+        isotherms, length_words(file, unit),
     )  # fmt: skip
+
+
+def length_words(file: MarksFile, unit: str) -> tuple[tuple[LengthMark, str], ...]:
+    """All lengths of a file with their values in a unit of lengths.UNITS."""
+    return tuple((each, each.measured(file.scale).words(unit)) for each in file.lengths)
 
 
 def _isotherm(each: Isotherm, values: ValuePicture) -> IsothermReading:

@@ -141,12 +141,11 @@ def known_scale(options: Options, picture: "ValuePicture", origin: "np.ndarray")
     from shapeshift.scene.inspection.marks_file import kept_scale, marks_path
 
     if options.known is None:
-        factor = kept_scale(options.scene)
-        if factor != 1:
-            say(
-                f"Lengths are multiplied by {factor:.6g}, as {marks_path(options.scene).name} says."
-            )
-        return Scale(factor)
+        scale = kept_scale(options.scene)
+        if scale.factor != 1:
+            name = marks_path(options.scene).name
+            say(f"Lengths are multiplied by {scale.factor:.6g}, as {name} says.")
+        return scale
     numbers = parse_numbers(options.known[2], "--known")
     if len(numbers) != 1:
         raise UsageError(f"--known ends with '{options.known[2]}', expected metres.")
@@ -174,7 +173,8 @@ def keep_scale(scene: Path, scale: "Scale") -> None:
     if not 1e-6 <= scale.factor <= 1e6:
         raise UsageError(f"the scale is {scale.factor:g}, expected 1e-6 to 1e6; check --known.")
     file = read_marks_file(path) if path.exists() else MarksFile()
-    write_marks_file(replace(file, metres_per_unit=scale.factor), path)
+    kept = replace(file, metres_per_unit=scale.factor, scale_error=min(scale.error, 1.0))
+    write_marks_file(kept, path)
     say(f"scale {scale.factor:.6g} kept in {full(path)}")
 
 

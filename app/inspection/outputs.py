@@ -13,6 +13,7 @@ from shapeshift.app.inspection.inspect_view import (
     profile_csv,
     reading_row,
 )
+from shapeshift.app.inspection.length_pictures import with_lengths
 from shapeshift.app.inspection.pictures import (
     ColorScale,
     alarm_picture,
@@ -102,7 +103,8 @@ def three_pictures(inspected: InspectedView, scale: ColorScale) -> list[tuple[st
     title = f"Thermal, level {scale.level:g}, span {scale.span:g} {unit}".rstrip()
     pictures = [(title, with_scale_bar(marked, scale, unit))]
     if inspected.photo is not None:
-        pictures.insert(0, (f"Photo ({inspected.photo_name})", np.clip(inspected.photo, 0, 1)))
+        photo = with_lengths(np.clip(inspected.photo, 0, 1), values.view, inspected.lengths)
+        pictures.insert(0, (f"Photo ({inspected.photo_name})", photo))
     if inspected.isotherms:
         below = heat if inspected.photo is None else inspected.photo
         alarms = alarm_picture(below, values, [each.isotherm for each in inspected.isotherms])

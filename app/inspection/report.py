@@ -6,13 +6,18 @@ import io
 import math
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
 
 import numpy as np
 
 from shapeshift.app.inspection.inspect_view import COLUMNS, InspectedView, reading_row
+from shapeshift.app.inspection.length_pictures import (
+    LENGTH_COLUMNS,
+    LENGTHS_WORDS,
+    length_rows,
+)
 from shapeshift.app.inspection.outputs import summary_lines, three_pictures
 from shapeshift.app.inspection.pictures import ColorScale, scale_ticks
 from shapeshift.app.program import is_installed
@@ -21,6 +26,7 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.cameras.camera_list import CameraList, moved
 from shapeshift.scene.cameras.write_own_cameras import own_rows
 from shapeshift.scene.inspection.marks_file import MarksFile
+from shapeshift.scene.pose import View
 
 CAMERAS_ENDING = ".camera.json"
 AS_PHOTOGRAPHED = "Values are apparent temperatures as the photos gave them"
@@ -30,6 +36,7 @@ VALUES_WORDS = (
     "of the range."
 )
 NO_ERROR = "The error of these values was not measured; --capture CAPTURE measures it."
+TEXT_COLUMNS = ("mark", "length", "kind", "note")  # of tables; the others are figures
 JUMP = 8.0  # times the usual step along a line: it goes from one surface to another
 PROFILE_SIZE, PROFILE_EDGES = (640, 170), (56, 10, 10, 28)  # px; left, right, top, bottom
 STYLE = """
@@ -88,8 +95,9 @@ class InspectionReport:
     settings: list[tuple[str, str]]
     error: str
     scene: str  # name of its file; a report goes to others, whose folders are their own
-    stop: str
+    stop: str  # or an x; "": as the scene opens
     cameras: str  # JSON, our own form, in the world of the scene's file
+    lengths: list[tuple[str, ...]] = field(default_factory=list)  # cells of LENGTH_COLUMNS
 
     @property
     def lines(self) -> list[str]:
@@ -103,7 +111,8 @@ class InspectionReport:
         """What opens the scene where the first view is, in the folder where both files lie."""
         program = "shapeshift" if is_installed() else "python3 launch.py"
         scene, stop, cameras = map(shlex.quote, (self.scene, self.stop, cameras_name))
-        return f"{program} view {scene} --x {stop} --camera {cameras}"
+        at = f" --x {stop}" if self.stop else ""
+        return f"{program} view {scene}{at} --camera {cameras}"
 
 
 def report_of(
@@ -138,11 +147,15 @@ def report_of(
         of = "photographed values" if corrected else "values"
         error = f"Error of the {of} {file.held_out.words(unit)}."
     error += f" {CORRECTED if corrected else AS_PHOTOGRAPHED}{VALUES_WORDS}"
-    seen = moved([each.values.view for each in shown], origin.tolist())
     names = tuple(view.title for view in views)
-    cameras = json_text(own_rows(CameraList(tuple(seen), names, "report"))) + "\n"
+    cameras = cameras_text([each.values.view for each in shown], names, origin)
     settings = settings_rows(stop, scale, shown, origin)
-    return InspectionReport(head, views, settings, error, scene.name, stop.name, cameras)
+    measured = shown[0].lengths if shown else ()
+    if measured:
+        error += f" {LENGTHS_WORDS}"
+    return InspectionReport(
+        head, views, settings, error, scene.name, stop.name, cameras, length_rows(measured)
+    )
 
 
 def settings_rows(
@@ -162,16 +175,24 @@ def settings_rows(
     if emission is not None:
         rows.append(("corrected for", emission.words(unit)))
     for number, each in enumerate(shown):
-        view = each.values.view
-        eye = ", ".join(
-            f"{c + 0.0:.3f}" for c in np.round(view.world_from_eye.position + origin, 3)
-        )
-        down, up = view.tangents[2:]
-        angle = math.degrees(math.atan(up) - math.atan(down))
-        width, height = view.size
         name = f"camera {number + 1}" if len(shown) > 1 else "camera"
-        rows.append((name, f"at {eye} m, {angle:.1f}° high, {width}x{height} pixels"))
+        rows.append((name, camera_words(each.values.view, origin)))
     return rows
+
+
+def camera_words(view: View, origin: np.ndarray) -> str:
+    """Where a picture was taken, in the world of the scene's file."""
+    eye = ", ".join(f"{c + 0.0:.3f}" for c in np.round(view.world_from_eye.position + origin, 3))
+    down, up = view.tangents[2:]
+    angle = math.degrees(math.atan(up) - math.atan(down))
+    width, height = view.size
+    return f"at {eye} m, {angle:.1f}° high, {width}x{height} pixels"
+
+
+def cameras_text(seen: Sequence[View], names: tuple[str, ...], origin: np.ndarray) -> str:
+    """Views as a file of cameras, in the world of the scene's file."""
+    there = moved(list(seen), origin.tolist())
+    return json_text(own_rows(CameraList(tuple(there), names, "report"))) + "\n"
 
 
 def html_of(report: InspectionReport, cameras_name: str) -> str:
@@ -189,6 +210,8 @@ def html_of(report: InspectionReport, cameras_name: str) -> str:
         parts.append(f"<p>{text_of(report.head.note)}</p>")
     for view in report.views:
         parts += html_of_view(view)
+    if report.lengths:
+        parts += html_table("Lengths", LENGTH_COLUMNS, report.lengths)
     parts.append("<h2>How right it is</h2>")
     parts.append(f"<p>{text_of(report.error)}</p>")
     parts.append("<h2>Settings</h2><table>")
@@ -216,19 +239,23 @@ def html_of_view(view: ReportView) -> list[str]:
         parts.append(f'<figure style="{flex}">{source}{caption}</figure>')
     parts.append("</div>")
     if view.rows:
-        head = "".join(f"<th>{column}</th>" for column in COLUMNS[:2])
-        head += "".join(f'<th class="number">{column}</th>' for column in COLUMNS[2:])
-        parts.append(f"<h2>Marks</h2><table><tr>{head}</tr>")
-        for row in view.rows:
-            cells = [f"<td>{text_of(cell)}</td>" for cell in row[:2]]
-            cells += [f'<td class="number">{text_of(cell)}</td>' for cell in row[2:]]
-            parts.append(f"<tr>{''.join(cells)}</tr>")
-        parts.append("</table>")
+        parts += html_table("Marks", COLUMNS, view.rows)
     parts += [f"<p>{text_of(note)}</p>" for note in view.notes]
     parts.append("<p>" + "<br>".join(map(text_of, view.lines)) + "</p>")
     for profile in view.profiles:
         parts.append(f"<h2>Profile of {text_of(profile.name)}</h2>{profile_svg(profile)}")
     return parts
+
+
+def html_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """A heading and a table; all but TEXT_COLUMNS are figures."""
+    kinds = ["" if column in TEXT_COLUMNS else ' class="number"' for column in columns]
+    head = "".join(f"<th{kind}>{name}</th>" for kind, name in zip(kinds, columns, strict=True))
+    parts = [f"<h2>{title}</h2><table><tr>{head}</tr>"]
+    for row in rows:
+        cells = (f"<td{k}>{text_of(cell)}</td>" for k, cell in zip(kinds, row, strict=True))
+        parts.append(f"<tr>{''.join(cells)}</tr>")
+    return [*parts, "</table>"]
 
 
 def text_of(text: str) -> str:

@@ -105,6 +105,7 @@ def write_pdf(report: InspectionReport, cameras_name: str, path: Path) -> None:
                 if not number:
                     write_head(report, pages)
                 write_view(view, pages)
+            write_lengths(report, pages)
             write_end(report, cameras_name, pages)
             pages.end()
 
@@ -169,6 +170,17 @@ def write_table(rows: Sequence[tuple[str, ...]], pages: ReportPages) -> None:
     for row in rows:
         name = row[0] if len(row[0]) <= SHORTEST else f"{row[0][: SHORTEST - 1]}…"
         write_row((name, *row[1:]), pages)
+    pages.gap()
+
+
+def write_lengths(report: InspectionReport, pages: ReportPages) -> None:
+    """The table of what was measured."""
+    if not report.lengths:
+        return
+    pages.room(LINE * min(len(report.lengths) + 3, 8))
+    pages.line("Lengths", 11, "bold")
+    for name, kind, value, note in report.lengths:
+        pages.line(f"{name} ({kind}): {value}{f'. {note}' if note else ''}")
     pages.gap()
 
 

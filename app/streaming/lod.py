@@ -17,19 +17,24 @@ if TYPE_CHECKING:
 LEAST_LEAF = 64  # splats: of smaller ones the tree would take more bytes than they
 MOST_LEAF = 1 << 19  # a leaf lies in one file
 BAKED = 0.2  # of the time
+WHERE = {"stops": "at stops", "between": "between them"}
+PACKAGE_LEVELS = ".lod"  # the ending of a folder with levels of a package
 
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    """Write levels of detail, each with half of the splats of the one before, made by merging
-    neighbours: a folder in PlayCanvas's streamed SOG, with the errors that its engine spends its
-    budget by.  This program reads the finest level that --max-splats allows.
+    """Write levels of detail.  Of splats, each with half of the splats of the one before, made by
+    merging neighbours: a folder in PlayCanvas's streamed SOG, with the errors that its engine
+    spends its budget by; this program reads the finest level that --max-splats allows.  Of a
+    package, with --out NAME.lod: coarser anchors for the same networks, which opens like the
+    package, follows x at every level, and draws less of it where it is small on screen.
     """
 
     scene: Annotated[Path, POSITIONAL]
     """A package, splats of any known format, a folder of layers or a scene file."""
     out: Path
-    """The folder to write, with lod-meta.json in it."""
+    """The folder to write: NAME.lod of a package, which stays one; without an ending streamed SOG,
+    with lod-meta.json in it."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
     stop, and in a scene file what it says for each object."""
@@ -37,6 +42,9 @@ class Options(ReadingOptions):
     """Degree of the colours' spherical harmonics, at most; 0: one colour from all sides."""
     leaf: Annotated[int, EXPERT] = 4096
     """Splats of a leaf at the finest level, at most; viewers choose a level for each leaf."""
+    distill: float = 30.0
+    """Processor seconds that the coarser levels of a package learn to look like it; 0: they are
+    averages of its anchors."""
     overwrite: bool = False
     """Replace an earlier folder; never what is read."""
 
@@ -49,8 +57,13 @@ def run(options: Options) -> int:
         raise UsageError(f"--leaf is {options.leaf}, expected {LEAST_LEAF} to {MOST_LEAF}.")
     if not 0 <= options.sh_degree <= 3:
         raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
+    if options.out.suffix.lower() == PACKAGE_LEVELS:
+        return write_package_levels(options)
     if options.out.suffix:
-        raise UsageError(f"--out {options.out} is no folder's name; leave its ending out.")
+        raise UsageError(
+            f"--out {options.out} is no folder's name; leave its ending out, or name one with "
+            f"{PACKAGE_LEVELS} for a package."
+        )
     check_output(options.out, [options.scene], options.overwrite)
     with progress_after(PATIENCE_S) as progress:
         splats = bake_scene(options, progress)
@@ -63,6 +76,40 @@ def run(options: Options) -> int:
         f"{full(options.out)}: {sizes.leaves:,} leaves, {len(sizes.levels)} levels of {counts} "
         f"splats, {size:,} bytes."
     )
+    return 0
+
+
+def write_package_levels(options: Options) -> int:
+    """The same package with coarser levels of anchors.  Raises BadFile and UsageError."""
+    import math
+    from time import process_time
+
+    from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.opening import open_model
+    from shapeshift.app.streaming.package_levels import make_levels, refuse_other, write_made
+
+    if not 0 <= options.distill < math.inf:
+        raise UsageError(f"--distill is {options.distill}, expected processor seconds, 0 or more.")
+    if options.x:
+        raise UsageError("--x is of streamed SOG; levels of a package follow x, leave it out.")
+    check_output(options.out, [options.scene], options.overwrite)
+    start = process_time()
+    model = refuse_other(open_model(options.scene, options), options.scene)
+    with progress_after(PATIENCE_S) as progress:
+        made = make_levels(model, options.distill, progress)
+    size = write_made(made, options.scene, options.out)
+    for level, errors, steps in zip(made.model.coarser, made.errors, made.steps, strict=True):
+        db = ", ".join(f"{value:.1f} dB {WHERE[at]}" for at, value in errors.db.items())
+        say(
+            f"{len(level.anchors):,} anchors where the scene is up to {level.from_pixels:.0f} "
+            f"pixels across: {db}, a switch changes its pixels by {errors.change:.1f}/255 in the "
+            f"mean ({steps:,} steps)."
+        )
+    for count in made.left_out:
+        say(f"{count:,} anchors are good enough at no size: that level is left out.")
+    seconds = process_time() - start
+    say(f"{full(options.out)}: {size:,} bytes, {seconds:.0f} s of processor time.")
     return 0
 
 

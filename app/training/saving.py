@@ -12,6 +12,7 @@ from shapeshift.app.terminal import say
 from shapeshift.runtime_models.model import BadFile
 
 if TYPE_CHECKING:
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
 LESS = "fewer --max-anchors, or a larger --downscale, need less"
@@ -46,6 +47,16 @@ def memory_for_training() -> Iterator[None]:
         yield
     except memory_errors():
         raise UsageError(f"there is not enough memory to begin; {LESS}.") from None
+
+
+def room_of(out: Path, megabytes: float | None) -> "PhotoRoom":
+    """Where the photos may lie; megabytes: --photo-mb.  Raises UsageError."""
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
+
+    if megabytes is not None and not 0 < megabytes < float("inf"):
+        raise UsageError(f"--photo-mb is {megabytes}, expected MB above 0.")
+    most = None if megabytes is None else int(megabytes * 1e6)
+    return PhotoRoom(most, photos_path(out))
 
 
 @contextmanager

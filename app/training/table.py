@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf
+from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf, Opt
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.progress import working
@@ -29,11 +30,13 @@ PLACES = {
 }  # in --out  # fmt: skip
 
 
+Method = Literal["joint", "separate", "splats", "spz"]
+METHODS: tuple[Method, ...] = ("joint", "separate", "splats", "spz")
 USUAL = ("max_anchors", "downscale", "masks", "background")  # as of train
 
 
 @dataclass(frozen=True)
-class Options(MachineOptions):
+class Options(ClusterOptions, MachineOptions):
     """Train a capture in three ways with the same budget and compare them on held-out photos.
 
     The form is that of the paper's Tables 1 and 2: method by modality.
@@ -51,9 +54,7 @@ class Options(MachineOptions):
     """Budget of every method; its models share it.  Default: none, give this or --iterations."""
     iterations: int | None = None
     """The same in steps, with the same bits on every run.  Default: none."""
-    methods: tuple[Literal["joint", "separate", "splats", "spz"], ...] = (
-        "joint", "separate", "splats", "spz",
-    )  # fmt: skip
+    methods: tuple[Method, ...] = METHODS
     """joint: one shape-shifting model.  separate: one anchor model a modality.  splats: plain 3DGS
     splats, one set a modality, as PLY.  spz: those splats packed, without training again."""
     vgg: Annotated[Path | None, EXPERT] = None
@@ -62,11 +63,18 @@ class Options(MachineOptions):
     calibrate: Annotated[str | None, MODALITY] = None
     """A modality whose cameras' offset is found first, for all methods alike, as of train.
     Default: none."""
+    only: Annotated[str, Opt(expert=True, metavar="PART")] = ""
+    """Train this model alone, such as joint or splats:RGB: the parts of a comparison may be trained
+    by several machines into one folder.  Default: all."""
+    resume: Annotated[bool, EXPERT] = False
+    """With --only: go on where an earlier attempt at it was interrupted."""
 
 
 def run(options: Options) -> int:
     from shapeshift.app.charts.chart_rows import RowsFile
+    from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.table_parts import train_by_cluster
     from shapeshift.rasterizer.device import open_device
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.evaluation.vgg_distance import VggDistance
@@ -79,23 +87,38 @@ def run(options: Options) -> int:
         raise UsageError("--methods spz packs the files of splats; add splats before it.")
     if options.out.exists() and not options.out.is_dir():
         raise UsageError(f"{options.out} is a file; --out is a folder.")
+    if options.resume and not options.only:
+        raise UsageError("--resume goes on with one model; add --only, or leave it out.")
+    check_cluster(options)
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     distance = None if options.vgg is None else VggDistance(options.vgg)
     check_capture(capture, options, distance)
     options.out.mkdir(parents=True, exist_ok=True)
+    if options.only:
+        return run_part(device, capture, options)
     head = [command_line(options), machine_line(device), capture_line(capture, options, distance)]
     table = RowsFile(options.out / "table.csv", VggRow if distance else TableRow, head)
     say(head[1])
     rig = offset_of(device, capture, options)
     capture = with_extrinsics(capture, rig)
-    for method in sorted(set(options.methods), key=list(PLACES).index):
-        if any(row.method == method and row.modality == MEAN for row in table.rows):
+    methods = sorted(set(options.methods), key=list(PLACES).index)
+    done = {row.method for row in table.rows if row.modality == MEAN}
+    by_cluster = {}
+    if options.cluster != NONE:
+        lacking = [method for method in methods if method not in done and method != "spz"]
+        by_cluster = train_by_cluster(capture, options, lacking)
+    for method in methods:
+        if method in done:
             say(f"{NAMES[method]}: already in {full(table.path)}")
             continue
-        say(f"{NAMES[method]}:")
-        if method == "spz":
-            runs: dict[str, TrainedFile] | None = pack_splats(capture, options.out, table.rows)
+        runs: dict[str, TrainedFile] | None
+        if method in by_cluster:
+            runs = by_cluster[method]
+        elif method == "spz":
+            say(f"{NAMES[method]}:")
+            runs = pack_splats(capture, options.out, table.rows)
         else:
+            say(f"{NAMES[method]}:")
             runs = train_method(method, device, capture, options, rig)
         if runs is None:
             say(f"{options.out}: interrupted; the same command goes on with this method.")
@@ -105,6 +128,21 @@ def run(options: Options) -> int:
     finish(table.rows, options.out, head)
     say(f"written to {full(options.out)}: table.csv, table.md and the models")
     return 0
+
+
+def run_part(device, capture: "Capture", options: Options) -> int:
+    """--only: the bytes that its model has in the whole comparison, without a row."""
+    from shapeshift.app.training.table_parts import chosen_part, train_part
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
+
+    part = chosen_part(capture, options)
+    rig = offset_of(device, capture, options)
+    asked, moved = train_options(part.method, options), with_extrinsics(capture, rig)
+    if train_part(part, device, moved, asked, rig, options.resume):
+        say(f"{full(part.file)}: done")
+        return 0
+    say(f"{full(part.file)}: interrupted, --resume goes on")
+    return INTERRUPTED
 
 
 def check_capture(capture: "Capture", options: Options, distance: "VggDistance | None") -> None:
@@ -252,7 +290,8 @@ def command_line(options: Options) -> str:
     """The command without folders: what else is asked for stands in it, methods aside."""
     words = ["python3 launch.py table", options.capture.resolve().name]
     named = {each.name: getattr(options, each.name) for each in fields(options)}
-    for unnamed in ("capture", "out", "methods", "asked", "splats"):
+    places = ("cluster", "certificates", "gpus", "only", "resume")
+    for unnamed in ("capture", "out", "methods", "asked", "splats", *places):
         del named[unnamed]
     for name, value in (named | options.asked | options.splats).items():
         if value is not None:

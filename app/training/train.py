@@ -2,11 +2,13 @@
 
 import shlex
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shapeshift.app.cluster.open_cluster import NONE
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
@@ -23,7 +25,6 @@ from shapeshift.app.training.run_loop import (
 from shapeshift.app.training.train_options import Options, settings_of
 
 if TYPE_CHECKING:
-    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
 USUAL_STEPS = 2000  # those of TrainSettings
@@ -31,11 +32,19 @@ FEW_STEPS = USUAL_STEPS // 2  # scenes that are worth looking at need about so m
 
 
 def run(options: Options) -> int:
+    check_calibrate(options)
+    in_blocks = part_in_blocks(options)
+    return in_blocks(options) if in_blocks is not None else run_whole(options)
+
+
+def run_whole(options: Options) -> int:
+    """One run of all photos."""
     from shapeshift.app.pace import pace_package
     from shapeshift.app.progress import working
     from shapeshift.app.training.saving import (
         check_writable,
         memory_for_training,
+        room_of,
         save,
         save_checkpoint,
         saved_when_it_fails,
@@ -51,8 +60,7 @@ def run(options: Options) -> int:
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.train import Trainer
 
-    check_calibrate(options)
-    room = room_of(options)
+    room = room_of(options.out, options.photo_mb)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
@@ -86,23 +94,30 @@ def run(options: Options) -> int:
         found := failed_modalities(trainer) or report(find_outlier_views(trainer))
     ):
         say(*found)
-    for line in what_next(options, trainer.iteration, step_s, interrupted):
-        say(line)
+    say(*what_next(options, trainer.iteration, step_s, interrupted))
     trainer.photos.close(keep=interrupted)
     return INTERRUPTED if interrupted else 0
 
 
-def room_of(options: Options) -> "PhotoRoom":
-    """Where the photos may lie.  Raises UsageError."""
+def part_in_blocks(options: Options) -> Callable[[Options], int] | None:
+    """What runs in the place of a run of the whole.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.training.saving import photos_path
-    from shapeshift.training.photo_store.open_photos import PhotoRoom
 
-    megabytes = options.photo_mb
-    if megabytes is not None and not 0 < megabytes < float("inf"):
-        raise UsageError(f"--photo-mb is {megabytes}, expected MB above 0.")
-    most = None if megabytes is None else int(megabytes * 1e6)
-    return PhotoRoom(most, photos_path(options.out))
+    if options.block is not None and options.cut is not None:
+        raise UsageError("--block and --cut are two parts of --blocks; give one of them.")
+    if options.block is not None or options.cut is not None:
+        from shapeshift.app.training.blocks.train_block import run_block, run_cut
+
+        return run_cut if options.cut is not None else run_block
+    if options.blocks.strip() != "1":
+        from shapeshift.app.training.blocks.train_in_blocks import run_blocks
+
+        return run_blocks
+    if options.coarse_iterations is not None:
+        raise UsageError("--coarse-iterations is of --blocks; add --blocks, or leave it out.")
+    if options.cluster != NONE:
+        raise UsageError("--cluster shares out blocks; add --blocks, or leave it out.")
+    return None
 
 
 def check_calibrate(options: Options) -> None:

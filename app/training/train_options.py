@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from shapeshift.app.cluster.open_cluster import ClusterOptions
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.left_options import LEFT
@@ -34,7 +35,7 @@ class MachineOptions:
 
 
 @dataclass(frozen=True)
-class Options(MachineOptions):
+class Options(MachineOptions, ClusterOptions):
     """Train a shape-shifting scene.
 
     A first run needs only --out.
@@ -48,6 +49,13 @@ class Options(MachineOptions):
         default_factory=dict
     )
     splats: Annotated[Asked, FieldsOf(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
+    blocks: str = "1"
+    """Train in so many blocks, for captures that one memory cannot hold (docs/training.md,
+    "Blocks"): auto, a number, or a grid such as 4x2; --out is a folder NAME.blocks.  1: as a
+    whole."""
+    coarse_iterations: int | None = None
+    """With --blocks: steps of the run of the whole that comes first; each block then has
+    --iterations.  Default: 2000."""
     photo_mb: Annotated[float | None, EXPERT] = None
     """MB of memory that photos may take.  What does not fit is kept in NAME.photos beside --out
     until the training is done, and read from there as it is needed: the scene is the same to the
@@ -60,6 +68,14 @@ class Options(MachineOptions):
     model: Annotated[Literal["anchors", "splats"], EXPERT] = "anchors"
     """splats: plain 3DGS splats, one set for each modality, to compare with; --out is a folder of
     PLY files, and the modalities share the budget."""
+    block_photos: Annotated[int, EXPERT] = 50
+    """With --blocks: a block that fewer training photos show stays as the run of the whole left
+    it."""
+    cut: Annotated[Path | None, EXPERT] = None
+    """One part of --blocks by hand: cut the run of the whole whose package this is; --out is a
+    folder with a start for each block."""
+    block: Annotated[Path | None, EXPERT] = None
+    """One part of --blocks by hand: train the block that begins with this file, N.start.npz."""
     separate: Annotated[bool, EXPERT] = False
     """Train one anchor model for each modality, to compare with; --out is a folder of packages, and
     the modalities share the budget."""

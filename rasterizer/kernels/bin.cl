@@ -9,6 +9,7 @@
 // Units:   pixels and tiles; depths in metres, sorted as the bits of floats above 0.
 #include "common/tile_bounds_of_eight.cl"
 #define AHEAD 24  // splats: the next tile bounds are fetched while these are counted
+#define SOON 8    // splats: the ends of lists are fetched while these are written
 #define SPARE 16  // ints of a cache line: chunks must not write to the same one
 
 // Per splat its tile bounds; per chunk the (splat, depth key) pairs of its visible splats, packed
@@ -92,7 +93,13 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   const int first = c * chunk;
   const int last = packed ? first + (int)status[c].x : min(count, first + chunk);
   for (int i = first; i < last; i++) {
-    const uint2 pair = pairs[i];
+    // Bins lie far apart: the place of a key that comes soon is asked for now.
+    const uint2 pair = pairs[i], soon = pairs[min(i + SOON, last - 1)];
+    const int its_place = next[(soon.y - origin) >> shift & mask_of(bins)];
+    if (final)
+      PREFETCH_TO_WRITE(sorted_splats + its_place);
+    else
+      PREFETCH_TO_WRITE(sorted_pairs + its_place);
     // The chunk's own row of the table says where the next key of this digit goes.
     const int to = next[(pair.y - origin) >> shift & mask_of(bins)]++;
     if (final)
@@ -101,31 +108,6 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
       sorted_pairs[to] = pair;
   }
 }
-
-// The tile walk: VISIT(tile, touched) for the tiles of a splat's bounds.  Branch free where they
-// lie within 2 x 2 tiles, as nearly all do; there `touched` is 0 or 1 and the tile may lie beyond
-// the last one.  Else bit by bit through the tile mask, or row by row through a box.
-#define FOR_EACH_TILE(bounds, tiles_x, splat)                                              \
-  const uint2 here = (bounds);                                                             \
-  const int tile = BOUNDS_ROW(here) * (tiles_x) + BOUNDS_COLUMN(here);                     \
-  if (here.x & MASKED && !(here.y & ~0x303u)) {                                            \
-    VISIT(tile, here.y & 1);                                                               \
-    VISIT(tile + 1, here.y >> 1 & 1);                                                      \
-    VISIT(tile + (tiles_x), here.y >> 8 & 1);                                              \
-    VISIT(tile + (tiles_x) + 1, here.y >> 9 & 1);                                          \
-  } else if (here.x & MASKED) {                                                            \
-    for (uint mask = here.y; mask; mask &= mask - 1) {                                     \
-      const int bit = popcount(~mask & (mask - 1)); /* number of the lowest */             \
-      VISIT(tile + (bit >> 3) * (tiles_x) + (bit & 7), 1);                                 \
-    }                                                                                      \
-  } else if (here.x & BOX) {                                                               \
-    const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * (splat), here);  \
-    for (int row = 0; row < (int)(here.y >> 16); row++) {                                  \
-      const int2 span = columns_of_row(&ellipse, row);                                     \
-      for (int column = span.x; column < span.y; column++)                                 \
-        VISIT(tile + row * (tiles_x) + column, 1);                                         \
-    }                                                                                      \
-  }
 
 // HIDDEN = 1: tiles whose `shown` (bins,) is 0 get empty lists, whatever touches them.
 #ifdef HIDDEN
@@ -136,7 +118,16 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
 #define IF_SHOWN(tile, touched) (touched)
 #endif
 
-// table (chunks, bins): how often each tile is touched; a row of tiles and more lies beyond them.
+// One row of a tile mask, at the row's first tile: ones where its tiles begin, taken back behind
+// them; an empty row does both at the same place.
+inline void count_row(__global int* mine, uint row) {
+  const int start = popcount(~(row | 0x100) & ((row | 0x100) - 1));
+  mine[start]++;
+  mine[start + popcount(row)]--;
+}
+
+// table (chunks, bins): how often each tile is touched; some rows of tiles lie beyond them.  Tiles
+// of a row follow each other, so that two additions count them: sums along the tiles make the rest.
 __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global const int* order,
                           __global const float* record, __global const uint2* tile_bounds,
                           __global uint2* sorted_bounds, __global int* table AND_SHOWN) {
@@ -149,11 +140,36 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
     PREFETCH(tile_bounds + order[min(i + AHEAD, last - 1)]);
     // Near to far.
     const int splat = order[i];
-    const uint2 bounds = tile_bounds[splat];
-    sorted_bounds[i] = bounds;  // side by side for the next pass
-#define VISIT(tile, touched) mine[tile] += IF_SHOWN(tile, touched)
-    FOR_EACH_TILE(bounds, tiles_x, splat)
-#undef VISIT
+    const uint2 here = tile_bounds[splat];
+    sorted_bounds[i] = here;  // side by side for the next pass
+    __global int* corner = mine + BOUNDS_ROW(here) * tiles_x + BOUNDS_COLUMN(here);
+    if (here.x & MASKED) {
+      // No loop over bits, whose end nobody foresees: two rows always, four where there are more.
+      count_row(corner, here.y & 0xff);
+      count_row(corner + tiles_x, here.y >> 8 & 0xff);
+      if (here.y >> 16) {
+        count_row(corner + 2 * tiles_x, here.y >> 16 & 0xff);
+        count_row(corner + 3 * tiles_x, here.y >> 24);
+      }
+    } else if (here.x & BOX) {
+      // Both walks of a box take the same operations, or a list would overflow.
+      const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * splat, here);
+      const int rows = here.y >> 16;
+      for (int first = 0; first < rows; first += LANES) {
+        int start[LANES], end[LANES];
+        columns_of_eight_rows(&ellipse, first, start, end);
+        for (int k = 0; k < min(LANES, rows - first); k++) {
+          corner[(first + k) * tiles_x + start[k]]++;
+          corner[(first + k) * tiles_x + end[k]]--;
+        }
+      }
+    }
+  }
+  // Sums along the tiles turn beginnings and ends into counts; rows end before the next begins.
+  int sum = 0;
+  for (int t = 0; t < bins; t++) {
+    sum += mine[t];
+    mine[t] = IF_SHOWN(t, sum);
   }
 }
 
@@ -176,7 +192,39 @@ __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int tot
     intersections[in ? to : spare] = splat;                  \
     next[tile] = to + in;                                    \
   }
-    FOR_EACH_TILE(sorted_bounds[i], tiles_x, splat)
+    const uint2 here = sorted_bounds[i];
+    const int tile = BOUNDS_ROW(here) * tiles_x + BOUNDS_COLUMN(here);
+    // Stores leave in order, and each list's end is a cache line of its own: those of a splat that
+    // comes soon are asked for now.
+    const uint2 soon = sorted_bounds[min(i + SOON, last - 1)];
+    const int its_tile = BOUNDS_ROW(soon) * tiles_x + BOUNDS_COLUMN(soon);
+    PREFETCH_TO_WRITE(intersections + next[its_tile]);
+    PREFETCH_TO_WRITE(intersections + next[its_tile + 1]);
+    PREFETCH_TO_WRITE(intersections + next[its_tile + tiles_x]);
+    PREFETCH_TO_WRITE(intersections + next[its_tile + tiles_x + 1]);
+    // Branch free where a splat lies within 2 x 2 tiles, as nearly all do; there a tile may lie
+    // beyond the last one.  Else bit by bit through the tile mask, or row by row through a box.
+    if (here.x & MASKED && !(here.y & ~0x303u)) {
+      VISIT(tile, here.y & 1);
+      VISIT(tile + 1, here.y >> 1 & 1);
+      VISIT(tile + tiles_x, here.y >> 8 & 1);
+      VISIT(tile + tiles_x + 1, here.y >> 9 & 1);
+    } else if (here.x & MASKED) {
+      for (uint mask = here.y; mask; mask &= mask - 1) {
+        const int bit = popcount(~mask & (mask - 1));  // number of the lowest
+        VISIT(tile + (bit >> 3) * tiles_x + (bit & 7), 1);
+      }
+    } else if (here.x & BOX) {
+      const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * splat, here);
+      const int rows = here.y >> 16;
+      for (int first = 0; first < rows; first += LANES) {
+        int start[LANES], end[LANES];
+        columns_of_eight_rows(&ellipse, first, start, end);
+        for (int k = 0; k < min(LANES, rows - first); k++)
+          for (int column = start[k]; column < end[k]; column++)
+            VISIT(tile + (first + k) * tiles_x + column, 1);
+      }
+    }
 #undef VISIT
   }
 }

@@ -99,7 +99,7 @@ inline ushort16 transpose_bits(ushort16 a) {
                     high.s9, low.sa, high.sb, low.sc, high.sd, low.se, high.sf);
 }
 
-// Columns of a batch's ellipses for vectors of eight; x and y of the mean from the centre of the
+// Columns of a batch's ellipses for vectors of sixteen; x and y of the mean from the centre of the
 // tile's first pixel.
 typedef struct {
   float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH],
@@ -107,43 +107,43 @@ typedef struct {
 } Columns;
 
 // The tile walk once more, for blocks in a tile: bit SIDE row + column of each block that the
-// ellipse reaches, for eight splats from 8 g on.  In every row of blocks the interval of x, with
+// ellipse reaches, for sixteen splats from 16 g on.  In every row of blocks the interval of x, with
 // the same slope, extremes and roots as in tiles.cl; here divided by A beforehand.
-inline ushort8 blocks_of_eight(const Columns* e, int g, float x0, float y0) {
+inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
   // Means and half axes, relative to the tile's first pixel centre.
-  const float8 x = vload8(g, e->x) - x0, y = vload8(g, e->y) - y0;
-  const float8 a = vload8(g, e->a), b = vload8(g, e->b),
-      power_threshold = vload8(g, e->power_threshold);
-  const float8 ey = vload8(g, e->half_y);
-  const float8 inv_a = 1.0f / a, slope = -b * inv_a;
-  const float8 y_extreme = -b / vload8(g, e->c) * vload8(g, e->half_x);
+  const float16 x = vload16(g, e->x) - x0, y = vload16(g, e->y) - y0;
+  const float16 a = vload16(g, e->a), b = vload16(g, e->b),
+      power_threshold = vload16(g, e->power_threshold);
+  const float16 ey = vload16(g, e->half_y);
+  const float16 inv_a = 1.0f / a, slope = -b * inv_a;
+  const float16 y_extreme = -b / vload16(g, e->c) * vload16(g, e->half_x);
   // 1.0001: float rounding must not lose a pixel.
-  const float8 threshold = 1.0001f * power_threshold * inv_a,
+  const float16 threshold = 1.0001f * power_threshold * inv_a,
       inv_yy = power_threshold / fmax(ey * ey, FLT_MIN) * inv_a;
   // From the mean to the first row of pixel centres in the strip.
-  float8 top = -y;
-  uint8 mask = 0;
+  float16 top = -y;
+  uint16 mask = 0;
   for (int row = 0; row < SIDE; row++) {
-    const float8 bottom = top + (SIDE - 1);
-    const float8 y_right = fmin(fmax(y_extreme, top), bottom),
+    const float16 bottom = top + (SIDE - 1);
+    const float16 y_right = fmin(fmax(y_extreme, top), bottom),
         y_left = fmin(fmax(-y_extreme, top), bottom);
-    const float8 right_x =
+    const float16 right_x =
         x + slope * y_right + sqrt(fmax(threshold - y_right * y_right * inv_yy, 0.0f));
-    const float8 left_x =
+    const float16 left_x =
         x + slope * y_left - sqrt(fmax(threshold - y_left * y_left * inv_yy, 0.0f));
     // Clamped before the conversion, since an ellipse may be as wide as any; >> 2 is / SIDE,
     // downwards.
-    const int8 right = convert_int8(floor(fmin(fmax(right_x, -1.0f), TILE - 1.0f))) >> 2;
-    const int8 left = convert_int8(ceil(fmin(fmax(left_x, 0.0f), (float)TILE))) >> 2;
+    const int16 right = convert_int16(floor(fmin(fmax(right_x, -1.0f), TILE - 1.0f))) >> 2;
+    const int16 left = convert_int16(ceil(fmin(fmax(left_x, 0.0f), (float)TILE))) >> 2;
     // Blocks up to `right`, less those before `left`.
-    const uint8 until = ((uint8)1 << as_uint8(right + 1)) - 1u;
-    const uint8 before = ((uint8)1 << as_uint8(left)) - 1u;
+    const uint16 until = ((uint16)1 << as_uint16(right + 1)) - 1u;
+    const uint16 before = ((uint16)1 << as_uint16(left)) - 1u;
     // A strip above or below the ellipse: its roots were held at 0 and mean nothing.
-    const int8 meets = (top <= ey) & (bottom >= -ey);
-    mask |= (until & ~before & as_uint8(meets)) << (uint8)(SIDE * row);
+    const int16 meets = (top <= ey) & (bottom >= -ey);
+    mask |= (until & ~before & as_uint16(meets)) << (uint16)(SIDE * row);
     top += SIDE;
   }
-  return convert_ushort8(mask);
+  return convert_ushort16(mask);
 }
 
 // Fills a batch from the list [p, end) and returns how many it got.
@@ -175,11 +175,10 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* intersectio
     vstore4(t * (float4)(1, 1, 1, h), 0, batch->splats + RECORD * j + 8);
   }
   // From "blocks of a splat" to "splats of a block": the bit matrix is transposed.
-  ushort blocks[BATCH];
-  for (int g = 0; g * LANES < n; g++)
-    vstore8(blocks_of_eight(&e, g, x0 + 0.5f, y0 + 0.5f), g, blocks);
-  uint16 block_splats = convert_uint16(transpose_bits(vload16(0, blocks)));
-  if (n > 16) block_splats |= convert_uint16(transpose_bits(vload16(1, blocks))) << (uint16)16;
+  const float x = x0 + 0.5f, y = y0 + 0.5f;
+  uint16 block_splats = convert_uint16(transpose_bits(blocks_of_sixteen(&e, 0, x, y)));
+  if (n > 16)
+    block_splats |= convert_uint16(transpose_bits(blocks_of_sixteen(&e, 1, x, y))) << (uint16)16;
   // Bits beyond the n splats of the last batch are cleared.
   vstore16(block_splats & (0xffffffffu >> (BATCH - n)), 0, batch->block_splats);
   return n;

@@ -8,7 +8,8 @@
 // ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
 // OWN_COLORS = 1: the second view has colours of its own.
 // Reads:   frame (limits, views, poses), mean_opacity (N, 4), covariance (N, 8), color (N, 4),
-//          object_index (N,).
+//          object_index (N,); unseen (clusters,) where there is one: CLUSTER splats each that no
+//          view sees (clusters.py), of which nothing is read.
 // Writes:  of each view record (N, 12), depth (N,), tile_bounds (N, 2), culled (chunks, 6), status;
 //          of each order pairs (N, 2) of splat and key, and histograms of the keys' low digits.
 // Units:   metres in the object and in the camera, pixels on the screen, display sRGB.
@@ -228,7 +229,8 @@ inline void leave_out(int i, int n, __global float* record, __global float* dept
 // to the sort frame's origin, else along its z.  keep_outside: also splats that no view sees get a
 // key.  status: pairs of the view's order, intersections, least and largest key.
 __kernel void project_arena(
-    int count, int chunk, int by_distance, int keep_outside, __global const float* frame,
+    int count, int chunk, int by_distance, int keep_outside, __global const int* unseen,
+    __global const float* frame,
     __global const float* mean_opacity, __global const float* covariance,
     __global const float* color, __global const float* second_color,
     __global const int* object_index,
@@ -266,6 +268,19 @@ __kernel void project_arena(
   float8 m[POSE];
   Eight s;
   for (int i = first; i < last; i += LANES) {
+    // Chunks begin where clusters do.
+    const int left = unseen && i % CLUSTER == 0 ? unseen[i / CLUSTER] : 0;
+    if (left) {
+      // They are counted as the gates would count them.
+      const int end = min(i + CLUSTER, last), bright = (left >> 1) - 1;
+      entered.s0 -= bright;
+      for (int v = 0; v < VIEWS; v++) {
+        passed[v][GATE_DISTANCE].s0 -= bright;
+        if (!(left & 1)) leave_out(i, end - i, record[v], depth[v], tile_bounds[v]);
+      }
+      i = end - LANES;
+      continue;
+    }
     const int n = min(LANES, last - i);
     const int8 valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
     LOAD_ROWS(LOAD_MEANS, s, mean_opacity, 4)

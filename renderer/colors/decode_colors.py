@@ -5,12 +5,13 @@ import numpy as np
 from shapeshift.renderer.colors.color_cache import color_key
 from shapeshift.renderer.colors.tint import tinted
 from shapeshift.renderer.colors.two_looks import Look
-from shapeshift.renderer.colors.wanted import wanted_anchors, wanted_of_follower
+from shapeshift.renderer.colors.wanted import wanted_anchors, wanted_of_follower, wanted_splats
 from shapeshift.renderer.cut import place_splats, restore_shapes
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
@@ -40,7 +41,13 @@ def decode_colors(
             if due:
                 colored.key, colored.anchors = key, wanted
         else:
-            wanted = wanted_anchors(drawing, settings, i, obj, decoded, colored, stale, views)
+            if isinstance(obj.model, SplatLayers):
+                looked = looks[i][0].heats or looks[i][1] or obj.tint or colored.tint
+                asked = not looked and (stale or colored.anchors is not None)
+                seen = drawing.seen_splats(i, views, settings) if asked else None
+                wanted = wanted_splats(colored, stale, seen)
+            else:
+                wanted = wanted_anchors(drawing, settings, i, obj, decoded, colored, stale, views)
             due = colored.mark_colored(key, wanted, stale)  # else all seen have their colours
         if not due and obj.tint is colored.tint:
             continue

@@ -76,3 +76,17 @@ def prepare_two(decoded: list[DecodedObject], looks: tuple[list[Look], list[Look
             if before is None or not before[0].same(now[0]) or before[1] != now[1]:
                 forget_colors([each.colored[which]])
         (each.shade, each.grade), each.second = looks[0][i], looks[1][i]
+
+
+def take_looks(
+    decoded: list[DecodedObject], scene: Scene, colors: FalseColors, same_way: bool
+) -> None:
+    """Which colours each object is decoded in; those that are for another look are forgotten.
+
+    same_way: whether heat came about as it does now.
+    """
+    for each, shade, obj in zip(decoded, colors.shades, scene.objects, strict=True):
+        grade = grade_of(obj, colors)
+        if not (same_way and shade.same(each.shade) and grade == each.grade):
+            each.shade, each.grade = shade, grade
+            forget_colors(each.colored)

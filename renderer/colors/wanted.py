@@ -14,7 +14,7 @@ from shapeshift.renderer.colors.eye_colors import EyeColors, shared_is_enough
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.model import ScaffoldModel, SplatLayers
+from shapeshift.runtime_models.model import ScaffoldModel
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
 
@@ -23,14 +23,9 @@ def wanted_anchors(
     drawing: Drawing, settings: RenderSettings, i: int, obj: SceneObject, decoded: DecodedObject,
     colored: ColorCache, stale: bool, views: list[View],
 ) -> np.ndarray | None:  # fmt: skip
-    """(A,) bool: the anchors that views see and whose colours are stale; None: all.
-
-    Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
-    """
-    if not settings.skip_unseen or isinstance(obj.model, SplatLayers):
-        if stale or colored.anchors is None:
-            return None
-        return ~colored.anchors  # left out before: now all are wanted
+    """(A,) bool: the anchors that views see and whose colours are stale; None: all."""
+    if not settings.skip_unseen:
+        return wanted_splats(colored, stale, None)
     if not stale and colored.anchors is None:
         return None
     reach_key = (decoded.version, settings.min_alpha)
@@ -47,6 +42,16 @@ def wanted_anchors(
     pose = obj.world_from_object.matrix()
     seen = visible_anchors(obj.model.anchors, colored.reach, pose, views, settings)
     return seen if stale or colored.anchors is None else seen & ~colored.anchors
+
+
+def wanted_splats(colored: ColorCache, stale: bool, seen: np.ndarray | None) -> np.ndarray | None:
+    """(n,) bool: which of those that are seen have stale colours, one a splat of layers or an
+    anchor; None: all.  seen None: nobody knows who is.
+    """
+    if stale or colored.anchors is None:
+        return seen if stale else None
+    left = ~colored.anchors  # left out before
+    return left if seen is None else left & seen
 
 
 def wanted_of_follower(

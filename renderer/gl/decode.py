@@ -9,7 +9,8 @@ from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for
 from shapeshift.renderer.gl.layers import Layers
-from shapeshift.renderer.gl.networks import GlNetworks
+from shapeshift.renderer.gl.networks import GlBlocks, GlNetworks
+from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator, only_fades
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
@@ -33,12 +34,14 @@ class Decoder:
         self._gpu, self._arena = gpu, arena
         # Its programs compile now, not in the first frame between a thermal stop and another.
         self._heater = Heater(gpu) if any(map(has_heat, models)) else None
-        made: dict[int, Layers | GlNetworks | Evaluator] = {}
+        made: dict[int, Layers | GlNetworks | GlBlocks | Evaluator] = {}
         for model in models:
             if id(model) in made:
                 continue
             if isinstance(model, SplatLayers) and only_fades(model):
                 made[id(model)] = Layers(gpu, model)
+            elif mlps == "gl" and isinstance(model, BlockModel):
+                made[id(model)] = GlBlocks(gpu, model)
             elif mlps == "gl" and isinstance(model, AnchorModel):
                 made[id(model)] = GlNetworks(gpu, model)
             else:

@@ -10,6 +10,8 @@ import numpy as np
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import PARTS, Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.runtime_models.blocks.block_model import BlockModel
+from shapeshift.runtime_models.blocks.evaluate_blocks import control_of
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
 from shapeshift.runtime_models.stop_weights import Control, Controls, is_each
 
@@ -217,6 +219,25 @@ class GlNetworks:
                 own.release()
         self._anchors.release()
         self._features.release()
+
+
+class GlBlocks:
+    """The same of a model in blocks: each run of anchors by networks of its own."""
+
+    def __init__(self, gpu: Gpu, model: BlockModel) -> None:
+        self._parts = [(run, GlNetworks(gpu, run.model)) for run in model.runs]
+
+    def geometry(self, arena: Arena, start: int, x: Controls) -> None:
+        for run, networks in self._parts:
+            networks.geometry(arena, start + run.splats.start, control_of(x, run))
+
+    def color(self, arena: Arena, start: int, x: Controls, eye: np.ndarray) -> None:
+        for run, networks in self._parts:
+            networks.color(arena, start + run.splats.start, control_of(x, run), eye)
+
+    def release(self) -> None:
+        for _, networks in self._parts:
+            networks.release()
 
 
 @dataclass

@@ -1,15 +1,37 @@
 """What blending of depth left on the OpenCL device, as pictures in memory; row 0 on top."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import Projected
-from shapeshift.rasterizer.surface import DepthFrame, resized_records
+from shapeshift.rasterizer.surface import (
+    DepthFrame,
+    rasterize_depth,
+    resized_records,
+    surface_arena,
+)
 from shapeshift.renderer.resample import scaled
 from shapeshift.renderer.surface import Surface
-from shapeshift.renderer.tiles.inputs import bin_view
+from shapeshift.renderer.tiles.inputs import bin_view, camera_of
 from shapeshift.scene.pose import View
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
+
+
+def blend_depth(
+    device: Device, arena: "tuple[Array, Array, Array]", world_from_objects: np.ndarray,
+    projected: Projected, tiles: Tiles, view: View,
+) -> DepthFrame:  # fmt: skip
+    """Depth, and normals in place of colours, which the records lose.
+
+    arena: mean_opacity, covariance, object_index.
+    """
+    surfaces = surface_arena(device, *arena, world_from_objects, camera_of(view), projected)
+    return rasterize_depth(device, projected, tiles, surfaces, view.size)
 
 
 def in_fewer_pixels(
@@ -23,6 +45,19 @@ def in_fewer_pixels(
         return projected, tiles, view
     projected = resized_records(device, projected, view.size, small.size)
     return projected, bin_view(device, projected, small, tiles.order), small
+
+
+def depth_pictures(
+    device: Device, arena: "tuple[Array, Array, Array]", world_from_objects: np.ndarray,
+    projected: list[Projected], tiles: list[Tiles], views: list[View], part: float,
+) -> list[np.ndarray]:  # fmt: skip
+    """(H, W, 4) of each view, in `part` of its width and height."""
+    pictures = []
+    for drawn in zip(projected, tiles, views, strict=True):
+        seen = in_fewer_pixels(device, *drawn, part)
+        blended = blend_depth(device, arena, world_from_objects, *seen)
+        pictures.append(depth_picture(device, blended))
+    return pictures
 
 
 def depth_picture(device: Device, blended: DepthFrame) -> np.ndarray:

@@ -13,6 +13,7 @@ from shapeshift.rasterizer.decode.decode_heads import (
     HeadWeights,
 )
 from shapeshift.rasterizer.device import Device
+from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.colors.light_harmonics import most_light
 from shapeshift.runtime_models.model import HEADS, AnchorModel, Mlp
 from shapeshift.runtime_models.stop_weights import Controls, is_each
@@ -27,8 +28,8 @@ def uncovered(model: AnchorModel) -> str:
     """Why the kernel cannot run a model's networks, so that onnxruntime has to; "": it can."""
     if model.splats_per_anchor > MOST_SPLATS:
         return f"{model.splats_per_anchor} splats an anchor, more than {MOST_SPLATS}"
-    for name in HEADS:
-        mlp = model.networks[name]
+    known = model.networks_of_blocks if isinstance(model, BlockModel) else (model.networks,)
+    for name, mlp in (pair for networks in known for pair in networks.items()):
         if len(mlp.weights) != LAYERS:
             return f"its {name} network has {len(mlp.weights)} layers instead of {LAYERS}"
         if len(mlp.weights[0]) > MOST_HIDDEN:
@@ -62,6 +63,15 @@ class ModelHeads:
             light=model.light,
         )  # fmt: skip
 
+    def shapes_into(
+        self, mean_opacity: "Array", covariance: "Array", start: int, x: Controls,
+        shapes: bool = True,
+    ) -> None:  # fmt: skip
+        """Rows start... of mean_opacity (N, 4) and covariance (N, 8) at one control, object frame;
+        where not `shapes`, of the opacities alone.
+        """
+        self.anchors.decode_shapes(self.folded(x), start, mean_opacity, covariance, shapes)
+
     def color_into(
         self, color: "Array", start: int, x: Controls, eye: np.ndarray,
         seen: np.ndarray | None = None,
@@ -84,6 +94,40 @@ class ModelHeads:
         """(units,) first biases with Psi(x) in them: the same for every anchor, so exact."""
         assert not is_each(x), "one control for all"
         return self._bias + self._control @ self.model.psi(x)[0].astype(np.float64)
+
+
+class BlockHeads:
+    """A model in blocks on a device: each run of its anchors by the heads of its block."""
+
+    def __init__(self, device: Device, model: BlockModel) -> None:
+        self.model, self._device = model, device
+        self._parts = [(run, ModelHeads(device, run.model)) for run in model.runs]
+        self.shapes_follow = any(heads.shapes_follow for _, heads in self._parts)
+
+    def shapes_into(
+        self, mean_opacity: "Array", covariance: "Array", start: int, x: Controls,
+        shapes: bool = True,
+    ) -> None:  # fmt: skip
+        for run, heads in self._parts:
+            at = start + run.splats.start
+            heads.shapes_into(mean_opacity, covariance, at, x, shapes)
+
+    def color_into(
+        self, color: "Array", start: int, x: Controls, eye: np.ndarray,
+        seen: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        for run, heads in self._parts:
+            mine = None if seen is None else seen[run.rows]
+            if mine is None or mine.any():
+                heads.color_into(color, start + run.splats.start, x, eye, mine)
+
+    def color(
+        self, x: Controls, eye: np.ndarray, seen: np.ndarray | None = None,
+        out: "Array | None" = None,
+    ) -> "Array":  # fmt: skip
+        out = self._device.zeros((self.model.splat_count, 4)) if out is None else out
+        self.color_into(out, 0, x, eye, seen)
+        return out
 
 
 class _Folded:

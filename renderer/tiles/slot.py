@@ -8,7 +8,8 @@ import numpy as np
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.pack import pack_color
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
-from shapeshift.renderer.tiles.heads import ModelHeads, uncovered
+from shapeshift.renderer.tiles.heads import BlockHeads, ModelHeads, uncovered
+from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
@@ -23,7 +24,7 @@ class Decoding:
     """What decodes one model; objects that show the same model share it."""
 
     evaluator: Evaluator  # its sessions open when they are first asked
-    heads: ModelHeads | None = None  # of a model that our kernel knows
+    heads: ModelHeads | BlockHeads | None = None  # of a model that our kernel knows
     sh: "Array | None" = None  # coefficients of layers
     instead: str = ""  # who runs the networks that the kernel does not, and why
 
@@ -31,11 +32,14 @@ class Decoding:
 def decoding_of(device: Device, model: Model, mlps: str) -> Decoding:
     """mlps: "opencl", our kernel where it knows the model, or "onnxruntime"."""
     made = Decoding(Evaluator(model, keep=True))
-    if isinstance(model, SplatLayers):
+    if isinstance(model, SplatLayers) and model.leaves is None:
         made.sh = upload_sh(device, model.sh)
     elif isinstance(model, AnchorModel):
         if mlps == "opencl" and not (reason := uncovered(model)):
-            made.heads = ModelHeads(device, model)
+            if isinstance(model, BlockModel):
+                made.heads = BlockHeads(device, model)
+            else:
+                made.heads = ModelHeads(device, model)
         elif mlps == "opencl":
             made.instead = f"onnxruntime for a model: {reason}"
     elif follows_eye(model) and mlps == "opencl":

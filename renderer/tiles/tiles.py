@@ -6,10 +6,12 @@ What its methods mean: renderer/drawing.py.  No GL here.
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles, bin_tiles, sort_order
+from shapeshift.rasterizer.clusters.clusters import Clusters
 from shapeshift.rasterizer.device import Device, open_device
 from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
@@ -21,16 +23,16 @@ from shapeshift.rasterizer.quantize_keys import quantize_keys
 from shapeshift.rasterizer.raster import compile_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.splat_edges import draw_edges
-from shapeshift.rasterizer.surface import DepthFrame, rasterize_depth, surface_arena
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
-from shapeshift.renderer.limits import check_tiles
+from shapeshift.renderer.limits import arena_rows, check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.tiles.blend import blend_views
-from shapeshift.renderer.tiles.depth import depth_picture, in_fewer_pixels, surface_picture
+from shapeshift.renderer.tiles.culling import Culling
+from shapeshift.renderer.tiles.depth import blend_depth, depth_pictures, surface_picture
 from shapeshift.renderer.tiles.inputs import (
     behind,
     bin_view,
@@ -46,6 +48,9 @@ from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls, is_each
 from shapeshift.scene.appearance import Appearance, Background
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
 
 
 class TilesDrawing(Drawing):
@@ -71,30 +76,31 @@ class TilesDrawing(Drawing):
         self._orders: list = []  # device arrays, splats near to far: one, or one a view
         self._sort_policy = SortPolicy()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
+        self.culling = Culling()
         self._world_from_objects = np.zeros((0, 4, 4))
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self.draws_heat = False  # in addition to the colours, from the next frame on
         self._heat_images: dict[int, np.ndarray] = {}
         self._depths: dict[int, np.ndarray] = {}
 
-    def allocate(self, models: list[Model]) -> None:
-        check_tiles(self.device, models)
-        counts = [model.splat_count for model in models]
+    def allocate(self, models: list[Model], more: int = 0) -> None:
+        """more: rows behind those of the objects."""
+        check_tiles(self.device, models, more)
+        counts = [arena_rows(model) for model in models]
         starts = np.concatenate([[0], np.cumsum(counts, dtype=int)])
-        self.splats = int(starts[-1])
+        self.splats = int(starts[-1]) + more
         self.allocations += 1
         device = self.device
         self._projected, self._rooms, self._orders = [], {}, []
-        self._changed = True
+        self._splats_moved()
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
         self._colors: list = [device.zeros((self.splats, 4))]  # for all views, or one a view
         self._color, self._set = self._colors[0], 0  # that decoding writes into
         self._heats: list = [None]  # of the same splats, (N, 4) once an object has any
         self._antialiased = tuple(map(is_antialiased, models))
-        self._object_index = device.upload(
-            np.repeat(np.arange(len(models), dtype=np.int32), counts)
-        )
+        index = np.repeat(np.arange(len(models), dtype=np.int32), counts)
+        self._object_index = device.upload(np.pad(index, (0, more)))
         made = {id(model): decoding_of(device, model, self._mlps) for model in models}
         self._slots = [
             Slot(int(start), n, made[id(model)])
@@ -117,10 +123,10 @@ class TilesDrawing(Drawing):
         slot = self._slots[i]
         heads, evaluator = slot.decoding.heads, slot.decoding.evaluator
         arena = (self._mean_opacity, self._covariance)
-        self._changed = True
+        self._splats_moved()
         if heads is not None and not is_each(x):  # one control an anchor: onnxruntime's
             shapes = heads.shapes_follow or not slot.placed
-            heads.anchors.decode_shapes(heads.folded(x), slot.start, *arena, shapes)
+            heads.shapes_into(*arena, slot.start, x, shapes)
             slot.placed = True
             return
         splats = evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
@@ -169,7 +175,13 @@ class TilesDrawing(Drawing):
         if shade.heats:
             blend_heat(self.device, rows, self._color, kept, at_once)
         elif kept is not None and slot.count:
-            kept[rows].fill(0)
+            self.device.clear(kept[rows])
+
+    def seen_splats(
+        self, i: int, views: Sequence[View], settings: RenderSettings
+    ) -> np.ndarray | None:
+        rows, poses = self._slots[i].rows, self._world_from_objects
+        return self.culling.seen_rows(self.device, views, settings, poses, rows)
 
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         arrays = (self._mean_opacity, self._covariance)
@@ -179,7 +191,11 @@ class TilesDrawing(Drawing):
     def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
         pairs = ((self._mean_opacity, mean_opacity), (self._covariance, covariance))
         write_rows(self._slots[i].rows, *pairs)
+        self._splats_moved()
+
+    def _splats_moved(self) -> None:
         self._changed = True
+        self.culling.forget()
 
     def wait_decoded(self) -> None:
         """Returns when what was decoded is there: once for all objects, not after each."""
@@ -204,6 +220,7 @@ class TilesDrawing(Drawing):
         with timer.time("project", on_gpu=False):
             self._project(views, settings, sets, again)
             self.device.queue.finish()
+            self.culling.note(self.device, self._projected[-1].unseen)
         with timer.time("bin", on_gpu=False):
             tiles = self._bin(views, settings.key_bits)
             self.device.queue.finish()
@@ -219,18 +236,14 @@ class TilesDrawing(Drawing):
                 self._heat_images.update(zip(numbers, heats, strict=False))
         if settings.depth_scale > 0:
             with timer.time("depth", on_gpu=False):
-                for i, view in enumerate(views):
-                    part = settings.depth_scale
-                    seen = in_fewer_pixels(self.device, self._projected[i], tiles[i], view, part)
-                    self._depths[first + i] = depth_picture(self.device, self._blend_depth(*seen))
+                scene = (self._arena, self._world_from_objects)
+                given = (self._projected, tiles, views, settings.depth_scale)
+                made = depth_pictures(self.device, *scene, *given)
+                self._depths.update(enumerate(made, first))
 
-    def _blend_depth(self, projected: Projected, tiles: Tiles, view: View) -> DepthFrame:
-        """Depth, and normals in place of colours, which the records lose."""
-        surfaces = surface_arena(
-            self.device, self._mean_opacity, self._covariance, self._object_index,
-            self._world_from_objects, camera_of(view), projected,
-        )  # fmt: skip
-        return rasterize_depth(self.device, projected, tiles, surfaces, view.size)
+    @property
+    def _arena(self) -> "tuple[Array, Array, Array]":
+        return self._mean_opacity, self._covariance, self._object_index
 
     def _heats_of(self, sets: Sequence[int]) -> list:
         """(N, 4) of each of these sets; made where there is none yet."""
@@ -250,14 +263,16 @@ class TilesDrawing(Drawing):
         shared = len(frames) <= 1 < len(views)
         # One order for more views than a launch has must hold what none of its two sees.
         keep_outside = plan.keep_outside or (shared and len(views) > 2)
+        self.culling.next_frame(self.device, self._arena, settings.min_alpha)
+        clusters = None if keep_outside else self.culling.in_use(settings.min_alpha)
         self._projected = []
         for first in range(0, len(views), 2):
             pair = views[first : first + 2]
             mine = frames[first : first + (1 if shared else 2)]
             sort = SortFrames(tuple(mine), settings.order == "distance", keep_outside)
             colors = [self._colors[which] for which in dict.fromkeys(sets[first : first + 2])]
-            projected = self._launch(pair, settings, sort, self._rooms.get(first), colors)
-            self._rooms[first] = projected
+            given = (sort, self._rooms.get(first), colors, clusters)
+            self._rooms[first] = projected = self._launch(pair, settings, *given)
             self._projected += projected
         self.sorts, self.order_age = plan.sorts, plan.age
 
@@ -268,12 +283,13 @@ class TilesDrawing(Drawing):
         sort: SortFrames,
         into: list[Projected] | None = None,
         colors: list | None = None,
+        clusters: Clusters | None = None,
     ) -> list[Projected]:
         first, *second = colors or self._colors
         return project_arena(
             self.device, self._mean_opacity, self._covariance, first, self._object_index,
             self._world_from_objects, [camera_of(view) for view in views], limits_of(settings),
-            sort, into, self._antialiased, second[0] if second else None,
+            sort, into, self._antialiased, second[0] if second else None, clusters,
         )  # fmt: skip
 
     def _bin(self, views: list[View], key_bits: int) -> list[Tiles]:
@@ -367,7 +383,8 @@ class TilesDrawing(Drawing):
         (projected,) = self._launch([view], settings, sort)
         order = sort_order(self.device, projected.in_tiles)
         tiles = bin_tiles(self.device, projected, view.size, order=order)
-        return surface_picture(self.device, self._blend_depth(projected, tiles, view))
+        drawn = (self._arena, self._world_from_objects, projected, tiles, view)
+        return surface_picture(self.device, blend_depth(self.device, *drawn))
 
     def image(self, i: int) -> np.ndarray:
         return self._images[i]

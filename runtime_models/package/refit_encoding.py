@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from shapeshift.runtime_models.blocks.block_model import one_network
 from shapeshift.runtime_models.model import (
     AnchorModel,
     BadFile,
@@ -73,6 +74,7 @@ def place_stops(model: AnchorModel, stops: tuple[Stop, ...], shown: list[str]) -
 
     Of the pace, what is between two stops that stay is kept.  Raises BadFile as refit_encoding.
     """
+    model = one_network(model)
     if model.between_stops != "blend":
         raise BadFile("the networks of this scene know what lies between its stops; leave them so.")
     encoding = encoding_for([stop.x for stop in stops])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.blocks.block_model import one_network
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.npy import write_arrays
 from shapeshift.runtime_models.files.plain_text import json_text
@@ -57,7 +58,8 @@ def write_package(model: AnchorModel, path: str | Path, features: str = "float16
 
 
 def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
-    """File name to content, the manifest first."""
+    """File name to content, the manifest first; blocks of a scene become one."""
+    model = one_network(model)
     arrays = io.BytesIO()
     exact = features == EXACT
     tables = encode_features(model.features, exact_kind(model.features) if exact else features)

@@ -8,12 +8,21 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import Account, Memory, unlimited
+from shapeshift.runtime_models.files.part_cache import PartCache
 from shapeshift.runtime_models.model import Finding
 from shapeshift.runtime_models.splat_motion import SplatMotion
 
 ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")  # of RawSplats and PlainSplats
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
 COLMAP_UP = "-Y"  # x right, y down, z forward: as 3DGS writes its files
+
+
+@dataclass(frozen=True)
+class LeafReading:
+    """That a scene in levels of detail is read leaf by leaf, as it is looked at."""
+
+    budget: int  # splats that are drawn at most; 0: as many as suit the machine
+    cache: PartCache  # of decoded files, of all scenes of one opening
 
 
 @dataclass(frozen=True)
@@ -28,6 +37,7 @@ class Reading:
     most_splats: int = 0  # no more than these, neighbours are merged; 0 = all
     progress: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
     memory_gb: float = 0.0  # that files may take while they are read; 0 = as memory.py has it
+    leaves: LeafReading | None = None  # None: one level of detail for all of a scene
     memory: Memory | Account | None = None  # what they have taken; None: nothing is open yet
 
     def begun(self) -> "Reading":

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from shapeshift.runtime_models.blocks.block_model import one_network
 from shapeshift.runtime_models.model import (
     AnchorModel,
     BadFile,
@@ -41,7 +42,7 @@ def describe_model(out: Container, model: Model, swell: float = 1.0) -> dict:
     check_counts(model)
     shared = {"swell": float(swell), **describe_stops(model)}
     if isinstance(model, AnchorModel):
-        return {**shared, **describe_anchors(out, model)}
+        return {**shared, **describe_anchors(out, one_network(model))}
     return {**shared, **describe_layers(out, model)}
 
 

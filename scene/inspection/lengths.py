@@ -1,11 +1,14 @@
 """Lengths, angles and areas between points, each with its uncertainty."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 STEP = 1e-6  # metres, of the differences that stand for derivatives
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}  # metres
+MOST_DIGITS = 6  # behind the point
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +31,17 @@ class Measurement:
     def __str__(self) -> str:
         digits = 1 if self.unit == "degrees" else 4
         return f"{self.value:.{digits}f} ± {self.uncertainty:.{digits}f} {self.unit}"
+
+    def words(self, unit: str) -> str:
+        """In one of UNITS or its square, with the two digits that are uncertain; degrees stay."""
+        power = {"m": 1, "m²": 2}.get(self.unit, 0)
+        factor = UNITS[unit] ** power
+        value, error = self.value / factor, self.uncertainty / factor
+        sure = error if error > 0 else abs(value) / 1000 or 1.0
+        digits = min(max(1 - math.floor(math.log10(sure)), 0), MOST_DIGITS)
+        name = {0: "°", 1: f" {unit}", 2: f" {unit}²"}[power]
+        shown = f"{value:.{digits}f}"
+        return f"{shown} ± {error:.{digits}f}{name}" if error > 0 else f"{shown}{name}"
 
 
 def length(points: np.ndarray) -> float:

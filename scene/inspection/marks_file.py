@@ -1,5 +1,6 @@
 """NAME.marks.json beside a scene: marks, differences and isotherms, strictly read."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
@@ -18,6 +19,13 @@ from shapeshift.scene.inspection.emissivity import (
     Emission,
     SurfaceRadiation,
 )
+from shapeshift.scene.inspection.length_marks import (
+    MOST_LENGTHS,
+    LengthMark,
+    length_row,
+    read_length,
+)
+from shapeshift.scene.inspection.lengths import Scale
 from shapeshift.scene.inspection.marks import (
     FARTHEST,
     KINDS,
@@ -67,6 +75,13 @@ class MarksFile:
     metres_per_unit: float = 1.0  # what a length of the scene is multiplied by
     held_out: HeldOutError | None = None  # as it was measured last
     emission: Emission | None = None  # by which values are corrected; None: as photographed
+    lengths: tuple[LengthMark, ...] = ()
+    scale_error: float = 0.0  # one standard deviation of the scale, as a part of it
+
+    @property
+    def scale(self) -> Scale:
+        """Of its lengths."""
+        return Scale(self.metres_per_unit, self.scale_error)
 
     def named(self, name: str) -> Mark:
         """The mark of that name.  KeyError: there is none."""
@@ -81,13 +96,13 @@ def marks_path(scene: Path) -> Path:
     return scene.with_name(f"{name or scene.name}{ENDING}")
 
 
-def kept_scale(scene: Path) -> float:
+def kept_scale(scene: Path) -> Scale:
     """What lengths of a scene are multiplied by, as the marks beside it say; 1: there are none.
 
     Raises BadFile, one sentence.
     """
     path = marks_path(scene)
-    return read_marks_file(path).metres_per_unit if path.exists() else 1.0
+    return read_marks_file(path).scale if path.exists() else Scale()
 
 
 def read_marks_file(path: Path) -> MarksFile:
@@ -95,11 +110,14 @@ def read_marks_file(path: Path) -> MarksFile:
     fields = Fields(read_json(path, most_bytes=MOST_BYTES, unique=True), path.name, ADVICE)
     fields.count(MARK, VERSION, VERSION)
     scale = fields.number("metres_per_unit", 1.0, "a number from 1e-6 to 1e6", 1e-6, 1e6)
+    scale_error = fields.number("scale_error", 0.0, "a number from 0 to 1", 0, 1)
     marks = tuple(_mark(row) for row in fields.rows("marks", MOST_MARKS, "mark"))
+    lengths = tuple(read_length(row) for row in fields.rows("lengths", MOST_LENGTHS, "length"))
     names = [mark.name for mark in marks]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise BadFile(f"{path.name}: two marks are called '{twice}'; rename one, {ADVICE}.")
+    for what, taken in (("marks", names), ("lengths", [each.name for each in lengths])):
+        twice = next((name for name, count in Counter(taken).items() if count > 1), None)
+        if twice is not None:
+            raise BadFile(f"{path.name}: two {what} are called '{twice}'; rename one, {ADVICE}.")
     pairs = tuple(_pair(row, names) for row in fields.rows("differences", MOST_MARKS, "difference"))
     isotherms = tuple(_isotherm(row) for row in fields.rows("isotherms", MOST_MARKS, "isotherm"))
     error = fields.optional_object("held_out")
@@ -107,7 +125,7 @@ def read_marks_file(path: Path) -> MarksFile:
     emission = fields.optional_object("emission")
     corrected = None if emission is None else _emission(emission)
     fields.refuse_unknown_keys()
-    return MarksFile(marks, pairs, isotherms, scale, held_out, corrected)
+    return MarksFile(marks, pairs, isotherms, scale, held_out, corrected, lengths, scale_error)
 
 
 def _mark(row: Fields) -> Mark:
@@ -210,7 +228,8 @@ def _surface(row: Fields) -> SurfaceRadiation:
 def moved_marks(file: MarksFile, by: np.ndarray) -> MarksFile:
     """The same with every mark moved by (3,) metres: into another world's zero."""
     marks = tuple(replace(mark, points=mark.points + by) for mark in file.marks)
-    return replace(file, marks=marks)
+    lengths = tuple(replace(each, points=each.points + by) for each in file.lengths)
+    return replace(file, marks=marks, lengths=lengths)
 
 
 def marks_rows(file: MarksFile) -> dict:
@@ -230,10 +249,14 @@ def marks_rows(file: MarksFile) -> dict:
     ]
     if file.metres_per_unit != 1:
         rows["metres_per_unit"] = float(file.metres_per_unit)
+    if file.scale_error > 0:
+        rows["scale_error"] = float(file.scale_error)
     if file.held_out is not None:
         rows["held_out"] = vars(file.held_out)
     if file.emission is not None:
         rows["emission"] = _emission_row(file.emission)
+    if file.lengths:
+        rows["lengths"] = [length_row(each) for each in file.lengths]
     return rows
 
 

@@ -166,7 +166,7 @@ class InspectedScene(OpenedScene):
         """
         picture = self._depths(camera, size)
         try:
-            scale = Scale(kept_scale(self.path) if self.path is not None else 1.0)
+            scale = kept_scale(self.path) if self.path is not None else Scale()
             if known is not None:
                 scale = Scale.of_known([_point(picture, p) for p in known[:2]], float(known[2]))
             return measured(kind, [_point(picture, place) for place in places], scale)

@@ -1,11 +1,12 @@
 """Files to scenes."""
 
+from dataclasses import replace
 from typing import Any, Literal
 
 from shapeshift.api.arguments import PathText, Progress
 from shapeshift.api.read import opened, read_document
 from shapeshift.api.scene import Scene
-from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.app.opening import DrawingOptions
 
 
 def load(
@@ -17,6 +18,8 @@ def load(
     strict: bool = False,
     allow_huge: bool = False,
     max_splats: int = 0,
+    budget: int | str = "",
+    cache_mb: int = 2048,
     memory_gb: float = 0.0,
     progress: Progress | None = None,
 ) -> Scene:
@@ -27,7 +30,9 @@ def load(
     say; flip: half a turn after that.  strict: refuse a file that needs repair.  allow_huge: open a
     file whose splats would lie thousands deep over every pixel.  max_splats: neighbours become one
     until there are no more than these; 0 is all.  memory_gb: what files may take while they are
-    read; 0 is 64 bytes for each byte of a file.  progress: called with (what, part 0..1) from this
+    read; 0 is 64 bytes for each byte of a file.  budget: of scenes in levels of detail draw at most
+    so many splats, 2_000_000, "2M" or "auto", finer where more pixels show it; cache_mb: of such
+    files that are kept decoded.  progress: called with (what, part 0..1) from this
     thread.
 
     Raises BadFile, one sentence: what was found, what is wanted, what to do.  What was repaired is
@@ -36,10 +41,11 @@ def load(
         scene = ss.load("workshop.shift")
         scan = ss.load("scan.ply", up="+Z")
     """
-    reading = Reading(
-        mode, up, flip, strict, allow_huge=allow_huge, most_splats=max_splats, progress=progress,
-        memory_gb=memory_gb,
+    asked = DrawingOptions(
+        up=up, flip=flip, mode=mode, strict=strict, allow_huge=allow_huge, max_splats=max_splats,
+        budget=str(budget), cache_mb=cache_mb, memory=memory_gb,
     )  # fmt: skip
+    reading = replace(asked.reading(), progress=progress)
     document, found = read_document(path, reading)
     return Scene(document, found, up=up, flip=flip)
 

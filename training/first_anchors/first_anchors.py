@@ -20,6 +20,7 @@ from shapeshift.training.photos import BLACK, LoadedPhoto
 NEIGHBOURS = 3  # whose distance is an anchor's size, as the first scale of 3DGS
 SURFACE = 9  # nearest points, an anchor's own place among them, that say how a surface lies
 FLATNESS = (0.3, 2.0)  # least and most of an axis, in the geometric mean of the three
+SAME_PLACE = 1.0  # of its neighbours' distance, to a place of another shape
 SIZES = 30.0  # times, from the median: what is nearer or farther than that is an outlier
 COLOR_PHOTOS = 24  # that the first colours are taken from
 DARKEST, BRIGHTEST = 0.02, 0.98  # of a base colour: beyond, its logit would not move any more
@@ -57,11 +58,34 @@ def first_anchors(
 
 def choose_positions(first: InitialPoints, most: int) -> np.ndarray:
     """(A, 3) at most so many places: of the points and of the guesses added to them."""
-    guesses = subsample(first.guesses, int(first.guess_share * most))
     points = np.unique(first.points, axis=0)  # scans have some of them twice
     if len(first.shapes) > 1:  # hulls lie over each other where stops have the same outlines
         points = voxel_centres(points, median_neighbour(points, np.random.default_rng(0)))
+    share = int(first.guess_share * most)
+    guesses = choose_guesses(first, share, most - min(len(points), most - share))
     return np.concatenate([subsample(points, most - len(guesses)), guesses])
+
+
+def choose_guesses(first: InitialPoints, share: int, most: int) -> np.ndarray:
+    """(G, 3) of the guesses: `share`, or of several shapes so many of each and `most` in all.
+
+    One stop's shape may lie within another's that has more points, and would get few anchors.
+    Where shapes lie over each other, the places of the denser one serve both.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(first.guess_shapes) < 2:
+        return subsample(first.guesses, share)
+    each = [subsample(shape, share) for shape in first.guess_shapes]
+    spaces = [neighbour_distance(places) for places in each]
+    chosen = np.zeros((0, 3))
+    for number in sorted(range(len(each)), key=lambda n: spaces[n].mean()):
+        places = each[number]
+        if len(chosen):
+            distance, _ = cKDTree(chosen).query(places)
+            places = places[distance > SAME_PLACE * spaces[number]]
+        chosen = np.concatenate([chosen, places])
+    return subsample(chosen, most)
 
 
 def subsample(points: np.ndarray, most: int) -> np.ndarray:

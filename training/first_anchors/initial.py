@@ -35,6 +35,7 @@ class InitialPoints(NamedTuple):
     shapes: tuple[np.ndarray, ...]  # the points of each shape that stands for itself
     guesses: np.ndarray = NO_POINTS  # (G, 3) metres, for what has no points
     guess_share: float = GUESSES  # of the anchors, at most
+    guess_shapes: tuple[np.ndarray, ...] = ()  # the guesses of each shape, where there are several
     doubts: tuple[str, ...] = ()  # what a person should know of it, a sentence each
 
 
@@ -227,7 +228,10 @@ def hull_points(capture: Capture, photos: list[LoadedPhoto]) -> InitialPoints | 
 def with_hull(found: InitialPoints, hull: InitialPoints) -> InitialPoints:
     """Measured points, and the hull for what has too little texture to have some."""
     return found._replace(
-        origin=f"{found.origin} and the hull", guesses=hull.points, guess_share=ON_HULL
+        origin=f"{found.origin} and the hull",
+        guesses=hull.points,
+        guess_share=ON_HULL,
+        guess_shapes=hull.shapes,
     )
 
 

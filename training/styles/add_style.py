@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapeshift.runtime_models.blocks.block_model import one_network
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
 from shapeshift.runtime_models.stops.insert_stop import insert_stop
 from shapeshift.scene.cameras.framing import default_background
@@ -56,7 +57,7 @@ def refuse_plain(model: Model) -> AnchorModel:
             "this scene is plain splats without networks, which cannot learn a stop; a package of "
             "`train` is wanted."
         )
-    return model
+    return one_network(model)
 
 
 def add_style(

@@ -14,8 +14,9 @@ from shapeshift.app.editor.texts.table import said
 Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.
 ORDER = (
-    "Scale", "Room", "Touch", "Stops", "Look", "Inspect", "Gallery", "Scenes", "Comfort", "Camera",
-    "Film", "Objects", "Parts", "Regions", "Sections", "Export", "Settings", "Performance",
+    "Scale", "Room", "Touch", "Stops", "Look", "Inspect", "Measure", "Gallery", "Scenes",
+    "Comfort", "Camera", "Film", "Objects", "Parts", "Regions", "Sections", "Export", "Settings",
+    "Performance",
 )  # fmt: skip
 
 

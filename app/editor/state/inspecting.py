@@ -111,7 +111,7 @@ class Inspecting:
         source = self.source
         self._path = None if source is None else marks_path(source)
         self._stamp = ()
-        if self._path is None or self.thermal is None:
+        if self._path is None:
             return
         if self._path.exists():
             try:
@@ -203,7 +203,7 @@ class Inspecting:
             made = (Isotherm(kind, **{"low" if kind == "above" else "high": float(value)}),)
         file = replace(self.file, isotherms=(*others, *made))
         before = self._before[-1] if self._before else None
-        if before is not None and before.marks is self.file.marks:
+        if before is not None and _lies_as(before, self.file):
             self.file = file  # the number is being dragged: one step
         else:
             self.edit(file)
@@ -216,7 +216,7 @@ class Inspecting:
         emission = replace(known, surface=surface, air=air or known.air) if surface else None
         file = replace(self.file, emission=emission)
         before, now = self._before[-1] if self._before else None, self.file
-        same = before and before.marks is now.marks and before.isotherms is now.isotherms
+        same = before and _lies_as(before, now) and before.isotherms is now.isotherms
         if same and surface and now.emission:
             self.file = file  # the number is being dragged: one step
             self.read()
@@ -332,6 +332,11 @@ class Inspecting:
             return True
         self._warned = self.file
         self._state.problem = said(
-            "The marks are not saved: save them in the section Inspect, or close once more."
+            "Marks or lengths are not saved: save them in the section Measure, or close once more."
         )
         return False
+
+
+def _lies_as(before: MarksFile, now: MarksFile) -> bool:
+    """Whether marks and lengths are the same: what differs is a number that is being dragged."""
+    return before.marks is now.marks and before.lengths is now.lengths and before.scale == now.scale

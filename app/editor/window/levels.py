@@ -4,10 +4,41 @@ from collections.abc import Callable
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.refine import Refiner, show_level
+from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.scene.scene import Scene
+
+
+def attach_budget(renderer: Renderer, state: EditorState, hooks: Hooks) -> None:
+    """Draws leaves as they come, and says how many of the splats in sight are there."""
+    renderer.streaming.converges = False
+    told: list[str] = []
+
+    def go_on() -> bool:
+        stats = renderer.streaming.stats
+        if stats is not None and stats.problem and stats.problem not in told:
+            told.append(stats.problem)
+            state.problem = stats.problem
+        return stats is not None and stats.pending
+
+    def words() -> str:
+        stats = renderer.streaming.stats
+        if stats is None or not stats.whole:
+            return ""
+        counts = {"shown": short_count(stats.shown), "all": short_count(stats.in_sight)}
+        text = said("{shown} of {all} in sight", **counts)
+        return f"{text} …" if stats.pending else text
+
+    hooks.each_frame.append(go_on)
+    hooks.status.append(words)
+
+
+def short_count(count: int) -> str:
+    """ "2.0 M": millions from a million on."""
+    return f"{count / 1e6:.1f} M" if count >= 999_950 else number(count)
 
 
 def attach_refiner(

@@ -56,7 +56,7 @@ class Shown:
         self._renderer.settings = settings
         if request.beside is not None:
             return self._draw_two(request, request.beside, wanted, screen, force)
-        fresh = force or not same_picture(self._drawn, wanted)
+        fresh = force or self._renderer.streaming.due or not same_picture(self._drawn, wanted)
         if fresh:
             self._renderer.update(request.scene)
             self._readings.stats = self._renderer.draw([request.view], screen)

@@ -38,6 +38,7 @@ from shapeshift.app.editor.window.gizmo import Gizmo
 from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.inspection.attach_inspection import attach_inspection
+from shapeshift.app.editor.window.inspection.attach_ruler import attach_ruler
 from shapeshift.app.editor.window.inspection.mouse_marks import Seen
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
@@ -105,6 +106,10 @@ class Viewer:
         self.inspecting = attach_inspection(
             window, state, self.viewpoint, self.hooks, self.parts, seen, options, folders.exports
         )
+        self.ruler = attach_ruler(
+            window, state, self.viewpoint, self.hooks, self.parts, seen, self.inspecting,
+            self.settings, self.shell.keep, folders.exports,
+        )  # fmt: skip
         drawn = (self.shell.draw_settings, self.dial, self.readings)
         self.hooks.sections += plain_sections(state, *drawn)
         kept = KeptPalette(state, self.settings, self.shell.keep)

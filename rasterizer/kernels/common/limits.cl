@@ -1,6 +1,6 @@
 // limits: what project_arena is given besides the splats, as rasterizer/project_arena.py packs it.
 // Reads:   nothing.
-// Defines: the places of a frame's limits, of a view, and the numbers of the gates.
+// Defines: the places of a frame's limits, of a view, and the numbers of the gates; CLUSTER.
 // Units:   pixels and metres; limits with _2 are squared, those with PER_ inverted, on the host.
 #define MIN_ALPHA 0      // a pixel below it is not drawn; PER_X: 1 over it
 #define PER_MIN_ALPHA 1
@@ -19,6 +19,7 @@
 #define FADES 12           // above 0: there is a band somewhere
 
 #define LIMITS 13
+#define CLUSTER 256  // splats side by side, which may be left out together
 #define MAX_COLOR 60000.0f  // what half floats hold with some room: larger is as good as infinite
 
 // Of each view: a camera (camera.cl, 20 floats), then

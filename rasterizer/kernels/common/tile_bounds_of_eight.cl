@@ -1,8 +1,8 @@
 // tile_bounds_of_eight: tile_bounds_of() of tiles.cl for eight splats at once as vectors, and their
 // entries in the packed lists of a chunk.
 // Reads:   ellipses of eight splats, as the record has them.
-// Defines: Ellipses, TileBounds8, Chunk; tile_bounds_of_eight(); open_chunk(), enter_eight(),
-//          close_chunk(); LOW_BINS, IN_PLACE.
+// Defines: Ellipses, TileBounds8, Chunk; tile_bounds_of_eight(), columns_of_eight_rows();
+//          open_chunk(), enter_eight(), close_chunk(); LOW_BINS, IN_PLACE.
 // Units:   pixels and tiles, row 0 on top; keys are the bits of a depth in metres.
 #include "common/tiles.cl"
 #include "common/vector.cl"
@@ -151,4 +151,32 @@ inline void enter_eight(Chunk* chunk, int i, int n, const TileBounds8* p, float8
     chunk->next += here;
     chunk->bins[keys[lane] & (LOW_BINS - 1)] += here;
   }
+}
+
+// columns_of_row() of tiles.cl for eight rows of a BOX from `first` on: the same operations.
+IN_PLACE void columns_of_eight_rows(const EllipseRows* s, int first, int* start, int* end) {
+  const float8 row = convert_float8((int8)(0, 1, 2, 3, 4, 5, 6, 7) + first);
+  const float8 top = s->top + row * (float)TILE, bottom = top + (TILE - 1);
+  const float8 y_right = fmin(fmax((float8)(s->y_extreme), top), bottom),
+      y_left = fmin(fmax((float8)(-s->y_extreme), top), bottom);
+  const float8 half_right = sqrt(
+      fmax(fma(-y_right * y_right, (float8)(s->inv_yy), (float8)(s->threshold)), 0.0f) * s->inv_a);
+  const float8 half_left = sqrt(
+      fmax(fma(-y_left * y_left, (float8)(s->inv_yy), (float8)(s->threshold)), 0.0f) * s->inv_a);
+  const float8 slope = s->slope;
+  const float8 right = fma(slope, y_right, half_right) - s->left + s->rounding;
+  const float8 left = fma(slope, y_left, -half_left) - s->left - s->rounding;
+  const float width = (float)(s->columns * TILE);
+  // What is not a number leaves nothing out.
+  const int8 in_box = right < width;
+  const float8 within = select((float8)(0), right, in_box & (right >= 0.0f));
+  int8 after = (convert_int8(within) >> 4) + 1;
+  after = select(after, (int8)(0), ~(right >= 0.0f));
+  after = select((int8)(s->columns), after, in_box);
+  const int8 beyond = left > (float)(TILE - 1), meets = left < width;
+  const int8 from = convert_int8(ceil(select((float8)(0), left, beyond & meets))) >> 4;
+  int8 before = select((int8)(s->columns), from, meets);
+  before = select((int8)(0), before, beyond);
+  vstore8(min(before, after), 0, start);
+  vstore8(after, 0, end);
 }

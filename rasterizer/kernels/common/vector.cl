@@ -1,13 +1,15 @@
 // vector: eight floats of a CPU's vector register at once.
 // Reads:   nothing.
-// Defines: LANES, PREFETCH, HALF_LOG2E, max8, sum8, sums8, max_int8.
+// Defines: LANES, PREFETCH, PREFETCH_TO_WRITE, HALF_LOG2E, max8, sum8, sums8, max_int8.
 // Units:   none; exponents are of 2, since exp(-power / 2) = 2^(-power log2(e) / 2).
 #define LANES 8
 #define HALF_LOG2E 0.72134752044f  // log2(e) / 2: exponents of 2 out of halves of squares
 #ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
 #define PREFETCH(address) __builtin_prefetch(address)
+#define PREFETCH_TO_WRITE(address) __builtin_prefetch(address, 1)
 #else
 #define PREFETCH(address)
+#define PREFETCH_TO_WRITE(address)
 #endif
 
 // Trees of halves: three steps instead of the seven of a running sum, and the same order always.

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from shapeshift.runtime_models.files.whole_file import write_whole
@@ -43,7 +43,12 @@ def write_layer_list(
     names = [layer_name(number, stop, ending) for number, (stop, _) in enumerate(layers)]
     for name, (_, splats) in zip(names, layers, strict=True):
         write(splats, folder / name)
-    rows = [describe_stop(s) | {"file": n} for n, (s, _) in zip(names, layers, strict=True)]
+    write_list([stop for stop, _ in layers], names, folder)
+    return sum((folder / name).stat().st_size for name in [*names, LIST])
+
+
+def write_list(stops: Sequence[Stop], names: Sequence[str], folder: Path) -> None:
+    """layers.json alone, of files that lie in the folder already: one a stop."""
+    rows = [describe_stop(s) | {"file": n} for s, n in zip(stops, names, strict=True)]
     text = json.dumps({"format": FORMAT, "mode": "exclusive", "stops": rows}, indent=1)
     write_whole(folder / LIST, text.encode())
-    return sum((folder / name).stat().st_size for name in [*names, LIST])

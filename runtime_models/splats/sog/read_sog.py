@@ -1,5 +1,6 @@
 """PlayCanvas's SOG, versions 1 and 2: splats as pixels of WebP pictures beside a meta.json."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -48,17 +49,23 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
     """
     memory = reading.within(path).account
     sog = open_sog(path, memory)
-    what = f"{sog.count:,} splats"
+    raw = raw_splats(sog, lambda part: reading.report(f"reading {path.name}", part))
+    memory.release(sog.files.held)
+    return raw
+
+
+def raw_splats(sog: "Sog", report: Callable[[float], None] = lambda part: None) -> RawSplats:
+    """All splats of a SOG that is open.  Raises BadFile."""
+    memory, what = sog.files.memory, f"{sog.count:,} splats"
     memory.charge(GEOMETRY * sog.count, what)
     with memory.lend(DECODING * sog.count, what):
-        reading.report(f"reading {path.name}", 0.0)
+        report(0.0)
         means = read_means(sog)
-        reading.report(f"reading {path.name}", 0.3)
+        report(0.3)
         scales = decode(sog, "scales", sog.pixels("scales")[:, :3])
         wxyz = read_quaternions(sog)
-        reading.report(f"reading {path.name}", 0.5)
+        report(0.5)
         sh, opacity = read_colors(sog)
-    memory.release(sog.files.held)
     return RawSplats(
         means=means,
         scales=scales,
@@ -116,6 +123,10 @@ class Sog:
         most = 4 * self.count + ROOM
         picture = self.files.image(self.names(part)[number], self.count, most)
         return picture.reshape(-1, 4)[: self.count]
+
+    def palette(self) -> np.ndarray:
+        """(P, M - 1, 3) sets of harmonics; of one colour from all sides (1, 0, 3)."""
+        return read_palette(self) if self.names("shN") else np.zeros((1, 0, 3), np.float32)
 
     def bad(self, what: str) -> BadFile:
         return BadFile(f"{self.files.name}: in its {META}, {what}; export it again.")
@@ -200,7 +211,7 @@ def read_quaternions(sog: Sog) -> np.ndarray:
 def read_colors(sog: Sog) -> tuple[np.ndarray, np.ndarray]:
     """(N, M, 3) harmonics and (N,) opacity: 0..1, of version 1 logits."""
     pixels = sog.pixels("sh0")
-    palette = read_palette(sog) if "shN" in sog.meta.data else np.zeros((1, 0, 3), np.float32)
+    palette = sog.palette()
     sog.files.memory.charge(12 * sog.count * (1 + palette.shape[1]), f"{sog.count:,} splats")
     sh = np.empty((sog.count, 1 + palette.shape[1], 3), np.float32)
     if sog.version == 1:

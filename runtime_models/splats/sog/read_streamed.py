@@ -1,6 +1,6 @@
 """PlayCanvas's streamed SOG: a tree whose nodes name runs of splats at several levels of detail."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from shapeshift.runtime_models.splats.sog.sog_files import (
 
 TREE = "lod-meta.json"
 MOST_LEVELS = 64
+LARGEST_FILE = 1 << 40  # splats: a number beyond is wrong
 LARGEST_TREE = 64 << 20  # bytes: 100,000 leaves of 7 levels, some 300 million splats
 GROWTH = 4  # while a scene is refined, the next level that is read has so many times the splats
 
@@ -43,11 +44,17 @@ class Streamed:
     files: tuple[Path, ...]  # meta.json of a folder or a .sog each
     levels: tuple[tuple[SplatRun, ...], ...]
     environment: Path | None  # splats that belong to every level
+    leaves: tuple[tuple[dict, dict[int, SplatRun]], ...] = ()  # nodes of the tree, their runs
 
     @property
     def counts(self) -> tuple[int, ...]:
         """Splats of each level, without the environment."""
         return tuple(sum(run.count for run in runs) for runs in self.levels)
+
+    @property
+    def filled(self) -> int:
+        """Leaves that have splats."""
+        return sum(any(run.count for run in runs.values()) for _, runs in self.leaves)
 
 
 def is_streamed(path: Path) -> bool:
@@ -123,7 +130,8 @@ def read_tree(path: Path, memory: Account | None = None) -> Streamed:
         raise BadFile(f"{file.name} is of version {shown(version)}, known is 1.")
     names, environment = tree.texts("filenames"), tree.text("environment", "")
     count = tree.count("lodLevels", 1, MOST_LEVELS)
-    runs = runs_of(tree.value("tree", None), count, len(names), file.name)
+    leaves = tuple(tree_nodes(tree.value("tree", None), count, len(names), file.name))
+    runs = runs_of(leaves, count)
     if not any(run.count for level in runs for run in level):
         raise BadFile(f"{file.name} names no splats; export it again.")
     folder = file.parent
@@ -132,32 +140,49 @@ def read_tree(path: Path, memory: Account | None = None) -> Streamed:
         tuple(file_inside(folder, name, file.name) for name in names),
         runs,
         file_inside(folder, environment, file.name) if environment else None,
+        leaves,
     )
 
 
-def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[SplatRun, ...], ...]:
-    """The runs of each level, in the tree's order.  Raises BadFile."""
-    out: list[list[SplatRun]] = [[] for _ in range(levels)]
+def tree_nodes(
+    tree: object, levels: int, files: int, name: str
+) -> Iterator[tuple[dict, dict[int, SplatRun]]]:
+    """Every node that has runs, with its runs by level, in the tree's order.  Raises BadFile."""
     waiting = [tree]
     while waiting:
         node = waiting.pop()
-        runs: object = {}
+        lods: object = {}
         children: object = None
         if isinstance(node, dict):
-            runs, children = node.get("lods") or {}, node.get("children") or []
-        if not isinstance(runs, dict) or not isinstance(children, list):
+            lods, children = node.get("lods") or {}, node.get("children") or []
+        if not isinstance(lods, dict) or not isinstance(children, list):
             raise BadFile(f"{name} holds a node that is none; export it again.")
         waiting += reversed(children)
-        for level, run in runs.items():
+        runs = {}
+        for level, run in lods.items():
             entries = run if isinstance(run, dict) else {}
             file, first, count = (entries.get(key) for key in ("file", "offset", "count"))
             if not (is_count(file) and is_count(first) and is_count(count)):
                 raise BadFile(f"{name} holds a level without file, offset and count.")
             if not (level.isdecimal() and level.isascii() and int(level) < levels):
                 raise BadFile(f"{name} holds a level {level[:20]!r}, it states {levels} levels.")
+            if first + count > LARGEST_FILE:
+                raise BadFile(f"{name} names row {first + count:,} of a file; export it again.")
             if file >= files:
                 raise BadFile(f"{name} names file {file}, it lists {files}.")
-            out[int(level)].append(SplatRun(file, first, count))
+            runs[int(level)] = SplatRun(file, first, count)
+        if runs and isinstance(node, dict):
+            yield node, runs
+
+
+def runs_of(
+    leaves: Sequence[tuple[dict, dict[int, SplatRun]]], levels: int
+) -> tuple[tuple[SplatRun, ...], ...]:
+    """The runs of each level, in the tree's order."""
+    out: list[list[SplatRun]] = [[] for _ in range(levels)]
+    for _, runs in leaves:
+        for level, run in runs.items():
+            out[level].append(run)
     return tuple(map(tuple, out))
 
 
@@ -182,7 +207,7 @@ def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers
     plain = judge(joined(parts, name), reading)
     kept = [file.relative_to(streamed.folder).as_posix() for file in used]
     layers = join_layers([plain], (Stop(name, 0.0, "layer"),), reading.mode, kept)
-    shown = {"level": number, "level_splats": list(streamed.counts)}
+    shown = {"level": number, "level_splats": list(streamed.counts), "leaves": streamed.filled}
     return replace(
         layers,
         provenance=layers.provenance | shown,

@@ -23,6 +23,7 @@ KEYS, VALUES, ALL = "keys", "values", "all"
 TABLES = {
     "cuts_panel": {"ADD": ALL, "EDGES": VALUES},
     "empty_panel": {"CHOICES": ALL, "WHAT": ALL},
+    "inspection.ruler_panel": {"KIND_LABELS": VALUES, "KIND_TIPS": ALL, "ACTIONS": ALL},
     "keys_sheet": {"GROUPS": ALL},
     "open_row": {"NEW": ALL},
     "panel": {"LARGER": ALL, "SMALLER": ALL, "ORDER": ALL},
@@ -60,8 +61,8 @@ HEADSET_TABLES = {
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
 # of app/editor/window: KEYS of the sheet
 KEY_TABLES = (
-    "devices.gamepads", "devices.space_mice", "inspection.mouse_marks", "objects", "parts",
-    "sections.section_handles", "split", "touch", "wipe",
+    "devices.gamepads", "devices.space_mice", "inspection.mouse_marks", "inspection.mouse_ruler",
+    "objects", "parts", "sections.section_handles", "split", "touch", "wipe",
 )  # fmt: skip
 STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
 LETTERS = re.compile(r"[A-Za-z]{2}")

@@ -5,7 +5,7 @@ from imgui_bundle import imgui
 Box = tuple[float, float, float, float]
 KINDS = (
     "button", "checkbox", "selectable", "combo", "slider_float", "slider_int", "drag_float",
-    "drag_float3", "input_text", "color_edit3", "invisible_button",
+    "drag_float3", "input_text", "input_text_with_hint", "color_edit3", "invisible_button",
 )  # fmt: skip
 
 

@@ -22,6 +22,14 @@ RNG = np.random.default_rng
 GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1).reshape(-1, 3)
 
 
+def sphere(count: int) -> np.ndarray:
+    """(count, 3) even places on a sphere of radius 1, a spiral from pole to pole."""
+    up = 1 - 2 * (np.arange(count) + 0.5) / count
+    turn = np.pi * (1 + 5**0.5) * np.arange(count)
+    around = np.sqrt(1 - up**2)
+    return np.stack([around * np.cos(turn), up, around * np.sin(turn)], axis=1)
+
+
 def first_of(points: np.ndarray, guesses: np.ndarray | None = None) -> InitialPoints:
     guesses = np.zeros((0, 3)) if guesses is None else guesses
     return InitialPoints(points, "points", (points,), guesses)
@@ -104,6 +112,23 @@ def test_guesses_get_their_share_at_most():
     assert len(places) == 1000
     assert (places[:, 0] > 5).sum() == GUESSES * 1000
     assert len(choose_positions(first_of(points, guesses[:7]), 10_000)) == 3007
+
+
+def test_a_small_shape_within_a_large_one_has_as_many_places_as_alone():
+    """Guesses of several shapes; where two are the same, the places are there once."""
+    small = 0.3 * sphere(2000)
+    large, same, points = sphere(8000), sphere(8000), np.zeros((20, 3))
+    shapes = (small, large, same)
+    first = InitialPoints(points, "points", (points,), np.concatenate(shapes), 0.3, shapes)
+    distance = np.linalg.norm(choose_positions(first, 1000)[1:], axis=1)  # all points are one
+    inner = (distance < 0.5).sum()
+    assert inner == 300 and 300 <= (distance > 0.5).sum() <= 400
+    crowd = first._replace(points=RNG(2).random((5000, 3)) + 10)  # points keep their share
+    places = choose_positions(crowd, 1000)
+    assert len(places) == 1000 and (places[:, 0] > 5).sum() == 700
+    alone = choose_positions(first._replace(guesses=small, guess_shapes=(small,)), 1000)
+    one = choose_positions(first._replace(guesses=small, guess_shapes=()), 1000)
+    np.testing.assert_array_equal(alone, one)
 
 
 def test_what_the_optimiser_starts_with():

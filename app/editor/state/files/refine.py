@@ -26,6 +26,7 @@ class Refiner:
 
     def __init__(self, options: ReadingOptions) -> None:
         self._options = options
+        self._by_leaves = options.reading().leaves is not None  # the renderer asks for them itself
         self._opened: list[tuple[SplatLayers, Iterator[SplatLayers]]] = []  # not followed yet
         self._finer: queue.Queue[tuple[SplatLayers, SplatLayers]] = queue.Queue(maxsize=1)
         self._unwanted = threading.Event()
@@ -41,7 +42,7 @@ class Refiner:
 
     def open(self, path: Path, progress: Callable[[str, float], None] | None = None) -> Model:
         """The model at `path`; of a streamed scene its coarsest level.  Raises BadFile."""
-        if not path.exists() or not is_streamed(path):
+        if self._by_leaves or not path.exists() or not is_streamed(path):
             return open_model(path, self._options, progress)
         finer = levels(path, self._options.reading())
         first = next(finer)

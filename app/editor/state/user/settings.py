@@ -27,6 +27,7 @@ class ProgramSettings:
     panel_open: bool | None = None  # None: as there is room
     language: str = "en"  # code of a table of texts
     temperature: str = ""  # unit of legends; "": as the scene has it
+    lengths: str = ""  # unit of what is measured; "": metres
     palette: str = ""  # of thermal stops; "": the scene's own
     place: tuple[int, int, int, int] | None = None  # left, top, width, height of the window
     sections: dict[str, bool] = field(default_factory=dict)  # of the panel, that a hand has moved
@@ -43,6 +44,7 @@ class ProgramSettings:
             panel if isinstance(panel, bool) else None,
             a_word(found.get("language")) or "en",
             a_word(found.get("temperature")),
+            a_word(found.get("lengths")),
             a_word(found.get("palette")),
             a_place(found.get("place")),
             some_sections(found.get("sections")),

@@ -52,8 +52,8 @@ def test_first_comes_what_a_first_visitor_needs(viewer, unfolded):
     run_frames(viewer, 1)
     sections = [name for name in unfolded if name in panel.ORDER]
     assert sections == [
-        "Stops", "Look", "Inspect", "Gallery", "Camera", "Film", "Objects", "Parts", "Regions",
-        "Sections", "Export", "Settings", "Performance",
+        "Stops", "Look", "Inspect", "Measure", "Gallery", "Camera", "Film", "Objects", "Parts",
+        "Regions", "Sections", "Export", "Settings", "Performance",
     ]  # fmt: skip
     inside = unfolded[unfolded.index("Performance") + 1 :]
     assert [n for n in inside if n in ("Budget", "Quality", "Passes", "Counts", "Machine")] == [

@@ -77,9 +77,9 @@ def test_settings_stay(viewer, hands, window, tmp_path, monkeypatch):
     widgets, file = Widgets(monkeypatch), tmp_path / "config" / "settings.json"
     run_frames(viewer, 2)
     left, *_ = viewer.window.covered[0]
-    low = max(box[3] for label, box in widgets.boxes.items() if label in ("Top", "Keep view"))
+    high = widgets.boxes["Front"][1]
     before = dict(viewer.settings.sections)
-    hands.click(left + 40, low + 40)  # a heading below the camera's buttons
+    hands.click(left + 40, high - 14)  # the heading of the camera's buttons
     toggled = {k for k in viewer.settings.sections if k not in before}
     assert toggled and json.loads(file.read_text())["sections"] == viewer.settings.sections
     viewer.state.choose_palette("turbo")

@@ -1,0 +1,174 @@
+"""Levels of detail of a package: averaged anchors that learn to look like it, from afar."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.app.errors import UsageError
+from shapeshift.app.streaming.level_errors import LevelErrors, LevelMeter
+from shapeshift.runtime_models.blocks.block_model import BlockModel
+from shapeshift.runtime_models.lod.average_anchors import average_anchors, cell_for
+from shapeshift.runtime_models.lod.level_files import (
+    is_levels,
+    level_table,
+    read_level,
+    write_levels,
+)
+from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, CoarserAnchors, Model
+from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, open_package
+from shapeshift.runtime_models.package.read_manifest import read_manifest
+from shapeshift.runtime_models.package.write_package import zip_files
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.scene.cameras.framing import orbit_path
+from shapeshift.scene.pose import View
+
+SHARES = (0.25, 0.08)  # of the anchors, that the coarser levels have
+SIZES_PX = (200.0, 90.0)  # at which they are meant to be good, and learn to be
+NEARER_AND_FARTHER = (1.25, 1.0, 0.5)  # times that size, in turns
+LARGER = 1.26  # times that size: from there on it is tried
+APART = 1.3  # times a level's size is the one before it: beyond what hysteresis keeps apart
+SECONDS = (0.65, 0.35)  # of the time that each may learn
+VIEWS = 12  # that it learns from
+LEAST_ANCHORS = 24  # of a level
+GOLDEN = 0.618034  # of a turn between two views: any number of them is spread evenly
+LOW, HIGH = -0.2, 0.9  # sines of the elevations
+MARGIN = 1.15  # of a picture's side, about the model
+MEASURING = 0.3  # of the time
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class MadeLevels:
+    """A package with its coarser levels, and what they are like."""
+
+    model: AnchorModel
+    tables: tuple[bytes, ...]
+    errors: tuple[LevelErrors, ...]
+    steps: tuple[int, ...]  # that each has learned
+    left_out: tuple[int, ...]  # anchors of those that are good at no size
+
+
+def make_levels(model: AnchorModel, seconds: float, progress: Progress) -> MadeLevels:
+    """The levels of a package, which learn for so many processor seconds.  Raises BadFile."""
+    made, tables, found, steps, left_out = [], [], [], [], []
+    meter = LevelMeter(model)
+    try:
+        before = meter.model
+        for number, share in enumerate(SHARES):
+            done = sum(SECONDS[:number])
+            if share * len(model.anchors) < LEAST_ANCHORS:
+                break
+
+            def report(
+                part: float,
+                number: int = number,
+                before: float = done,
+                own: float = SECONDS[number],
+            ) -> None:
+                progress(f"level {number + 1} learns", (1 - MEASURING) * (before + own * part))
+
+            level, count = learned_level(
+                meter, share, SIZES_PX[number], (seconds * SECONDS[number], report)
+            )
+            table = level_table(level)
+            read = read_level(table, model, f"level {number + 1}")
+            stored = standing(model, read)
+            below = LARGER * SIZES_PX[number]
+            if found:
+                below = min(below, found[-1].pixels / APART)
+            progress(f"level {number + 1} is measured", 1 - MEASURING + MEASURING * done)
+            errors = meter.largest_good(stored, before, below)
+            if errors is None:
+                left_out.append(len(level.anchors))
+                continue
+            cell = cell_for(model, share)
+            made.append(replace(read, cell_m=cell, from_pixels=errors.pixels, error_db=errors.db))
+            tables.append(table)
+            found.append(errors)
+            steps.append(count)
+            before = stored
+    finally:
+        meter.close()
+    return MadeLevels(
+        model.with_coarser(tuple(made)), tuple(tables), tuple(found), tuple(steps), tuple(left_out)
+    )
+
+
+def learned_level(
+    meter: LevelMeter, share: float, pixels: float, how: tuple[float, Callable[[float], None]]
+) -> tuple[AnchorModel, int]:
+    """A level with about that share of the anchors, and how many steps it has learned, in so many
+    processor seconds.
+    """
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.training.lod.distill import distill
+
+    seconds, progress = how
+    coarse = average_anchors(meter.model, cell_for(meter.model, share))
+    views = learning_views(meter, pixels)
+    return distill(open_device(), meter.model, coarse, views, seconds, progress)
+
+
+def learning_views(meter: LevelMeter, pixels: float) -> list[View]:
+    """All about the model, as large as it is seen, in pictures that it fills."""
+    views = []
+    for i in range(VIEWS):
+        size = pixels * NEARER_AND_FARTHER[i % len(NEARER_AND_FARTHER)]
+        side = max(8 * int(np.ceil(MARGIN * size / 8)), 16)
+        height = LOW + (HIGH - LOW) * ((i + 0.5) * 2**0.5 % 1)
+        # The bounds' diameter is `size` pixels of the picture's side.
+        (probe,) = orbit_path(1, meter.centre, meter.radius, (side, side), distance=1.0)
+        views += orbit_path(
+            1, meter.centre, meter.radius, (side, side),
+            distance=side / (probe.tangents[1] - probe.tangents[0]) * 2 * meter.radius / size,
+            elevation=float(np.arcsin(height)), start=2 * np.pi * (GOLDEN * i % 1),
+        )  # fmt: skip
+    return views
+
+
+def standing(model: AnchorModel, level: CoarserAnchors) -> AnchorModel:
+    """A level as a model of its own."""
+    return model.with_coarser((level,)).levels[1]
+
+
+def refuse_other(model: Model, path: Path) -> AnchorModel:
+    """The package that a scene is, without levels.  Raises UsageError."""
+    if is_levels(path):
+        raise UsageError(f"{path} has levels already; name the package that they were made of.")
+    if isinstance(model, BlockModel):
+        raise UsageError(
+            f"{path} is a scene in blocks, which has no levels; make one package of it with "
+            "`launch.py export`, and levels of that."
+        )
+    if not isinstance(model, AnchorModel):
+        raise UsageError(
+            f"{path} is no package of anchors; leave the ending of --out away to write its levels "
+            "as streamed SOG."
+        )
+    return model
+
+
+def package_bytes(path: Path) -> bytes:
+    """The package as one file: as it is, or a folder's files zipped.  Raises BadFile."""
+    if path.is_file() and path.name != MANIFEST:
+        return path.read_bytes()
+    folder = path if path.is_dir() else path.parent
+    read = open_package(folder, Reading().within(folder).account)
+    files = {MANIFEST: read(MANIFEST), ANCHORS: read(ANCHORS)}
+    heads = read_manifest(files[MANIFEST], str(folder)).heads
+    files |= {heads[name].file: read(heads[name].file) for name in HEADS}
+    return zip_files(files)
+
+
+def write_made(made: MadeLevels, source: Path, out: Path) -> int:
+    """The folder, all or nothing; its bytes.  Raises BadFile, also where no level is good."""
+    if not made.model.coarser:
+        counts = " and ".join(f"{count:,}" for count in made.left_out) or "none"
+        raise BadFile(
+            f"{source}: no coarser level is good enough at any size (tried: {counts} anchors); let "
+            "them learn longer with --distill, or show the package as it is."
+        )
+    return write_levels(out, package_bytes(source), made.model, made.tables)

@@ -1,0 +1,58 @@
+"""Reads parts of scenes in a thread, those that are wanted most first."""
+
+import threading
+from collections.abc import Sequence
+
+from shapeshift.runtime_models.leaf_levels import LeafSource
+from shapeshift.runtime_models.model import BadFile
+
+MOST_WAITING = 16  # parts: those of later frames are asked for then
+THREAD = "leaves"  # its name
+PATIENCE_S = 5.0  # longest wait at the end for a part that is being read
+
+
+class Fetcher:
+    """One thread, which begins with the first request; `close` ends it."""
+
+    def __init__(self) -> None:
+        self._wanted: list[tuple[LeafSource, int]] = []
+        self._wake = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self._ended = False
+        self.busy = False  # a part is being read
+
+    def want(self, parts: Sequence[tuple[LeafSource, int]]) -> None:
+        """These instead of those before that are not begun."""
+        with self._wake:
+            self._wanted = list(parts[:MOST_WAITING])
+            if self._wanted and self._thread is None:
+                self._thread = threading.Thread(target=self._run, name=THREAD, daemon=True)
+                self._thread.start()
+            self._wake.notify()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether something is still to come."""
+        return self.busy or bool(self._wanted)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                self.busy = False
+                while not self._wanted and not self._ended:
+                    self._wake.wait()
+                if self._ended:
+                    return
+                source, part = self._wanted.pop(0)
+                self.busy = True
+            try:
+                source.load(part)
+            except (BadFile, MemoryError):
+                pass  # the source says so, and asks no more for it
+
+    def close(self) -> None:
+        with self._wake:
+            self._ended, self._wanted = True, []
+            self._wake.notify()
+        if self._thread is not None:
+            self._thread.join(PATIENCE_S)

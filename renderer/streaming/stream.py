@@ -1,0 +1,379 @@
+"""Splats of models in levels of detail, put into the arena as views and a budget want them.
+
+The file to read first in streaming/.  Of each frame: sight (which leaves are in the picture), seen
+(in how many pixels), choose (at which level), and the pages of what changes.
+"""
+
+import logging
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from shapeshift.rasterizer.device import Device, NoDevice, open_device
+from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.renderer.drawing import Drawing
+from shapeshift.renderer.limits import arena_rows
+from shapeshift.renderer.settings import StreamStats
+from shapeshift.renderer.streaming.ahead import views_ahead
+from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, steps_of
+from shapeshift.renderer.streaming.fetch import Fetcher
+from shapeshift.renderer.streaming.pages import (
+    ROOM,
+    Filled,
+    PageTable,
+    fill_pages,
+    pages_needed,
+    together,
+)
+from shapeshift.renderer.streaming.seen import CoarseLook
+from shapeshift.renderer.streaming.sight import LeafSight, sight_of
+from shapeshift.renderer.streaming.weights import Weights, bytes_of
+from shapeshift.runtime_models.leaf_levels import LeafSource, LeafSplats
+from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+CHANGED = 0.05  # of the budget: what a frame in motion may upload, in splats
+EACH = 8  # frames, one in so many looks ahead
+BESIDE = 1e-6  # pixels that a leaf beside the picture counts: last, and the coarsest of all
+SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
+AT_ONCE = 1 << 16  # splats that are uploaded together
+LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
+
+
+def has_leaves(model: Model) -> bool:
+    return isinstance(model, SplatLayers) and model.leaves is not None
+
+
+class Stream:
+    """The leaves of all objects of a scene that have any."""
+
+    def __init__(self, drawing: Drawing, models: Sequence[Model], budget: int = 0) -> None:
+        """Makes room in the drawing.  budget: instead of the models' own; 0: theirs.
+
+        Raises BadFile where other objects leave nothing of the budget.
+        """
+        self._drawing = drawing
+        self.objects = [i for i, model in enumerate(models) if has_leaves(model)]
+        mine = [models[i] for i in self.objects]
+        self._models: list[SplatLayers] = [m for m in mine if isinstance(m, SplatLayers)]
+        self._sources: list[LeafSource] = [m.leaves for m in self._models if m.leaves is not None]
+        self.budget = budget or max(source.budget for source in self._sources) or auto_budget()
+        fixed = sum(map(arena_rows, models))
+        self._left = self.budget - fixed
+        if not self._left > 0:
+            raise BadFile(
+                f"objects without levels of detail have {fixed:,} splats and the budget is "
+                f"{self.budget:,}; give a larger --budget, or make levels of them: launch.py lod."
+            )
+        made = {id(source): steps_of(source.levels) for source in self._sources}
+        self._steps = joined([made[id(source)] for source in self._sources])
+        sizes = [len(source.part) for source in self._sources]
+        self.first = np.concatenate([[0], np.cumsum(sizes, dtype=int)])
+        self._object = np.repeat(np.arange(len(sizes)), sizes)  # of each leaf, in self.objects
+        self._every_count = every_count(self._sources)  # (L, K) splats
+        pairs = zip(self._models, self._sources, strict=True)
+        self._coarse = {id(source): CoarseLevels(model, source) for model, source in pairs}
+        self._finest = np.concatenate([source.levels.finest_counts for source in self._sources])
+        self._pages = pages_for(self._finest, self._left)
+        coefficients = max(source.coefficients for source in self._sources)
+        drawing.allocate_pages(list(models), self._pages, coefficients)
+        self.follows_eye = coefficients > 1  # then its colours are decoded a frame
+        self._waiting: list[tuple[np.ndarray, Filled]] = []  # pages that are still to be written
+        self.table = PageTable(self._pages, int(self.first[-1]))
+        self.weights = Weights(int(self.first[-1]), self._look())
+        self._fetcher = Fetcher()
+        self._last: tuple = ()  # the views and poses that all is there for
+        self.placed = np.zeros(0, np.int64)  # pages that were filled for the last frame
+        self._views: tuple[Sequence[View], Sequence[View]] = ((), ())  # of the last two frames
+        self._poses: list[np.ndarray] = []
+        self._shown: list[bool] = []
+        self._frame = self._decoded = 0  # frames; parts that were at hand in the last
+        self.stats = StreamStats(self.budget, 0, 0, int(self._finest.sum()), 0, False, "")
+        self.converges = True  # each frame gets all that it wants, and forgets the one before
+
+    def _look(self) -> CoarseLook | None:
+        try:
+            device: Device = open_device()
+        except NoDevice as reason:
+            logging.getLogger("renderer").warning(f"What is hidden counts as seen: {reason}")
+            return None
+        return CoarseLook(device, self._models, self.first)
+
+    def follow(self, scene: Scene, views: Sequence[View]) -> list[int]:
+        """Puts in what these views want; the objects whose splats have changed.
+
+        Raises BadFile where a part cannot be read, and all were to be there.
+        """
+        mine = [scene.objects[i] for i in self.objects]
+        poses = [obj.world_from_object.matrix() for obj in mine]
+        shown = [obj.seen for obj in mine]
+        now = (*map(key_of, views), bytes_of(poses), *shown, self.converges)
+        if now == self._last and not self.stats.pending:
+            self.stats = self._stats(0, False, self.stats.in_sight)
+            return []
+        self._views = (self._views[1], views)
+        self._poses, self._shown = poses, shown
+        sight = self.find_sight(poses, shown, views)
+        weight = self.weights.of(sight, views, poses, shown, fresh=self.converges)
+        wanted, worth = self._choose(weight, sight)
+        changed = self._change(wanted, worth)
+        self._last = now
+        splats = int(self.table.splats[changed].sum())
+        pending = bool((wanted != self.table.level).any())
+        self.stats = self._stats(splats, pending, int(self._finest[sight.held].sum()))
+        return sorted({self.objects[i] for i in np.unique(self._object[changed])})
+
+    def _choose(self, weight: np.ndarray, sight: LeafSight) -> tuple[np.ndarray, np.ndarray]:
+        """Levels of all leaves that fit the budget and the pages, and what each is worth."""
+        beside = sight.wide & (weight <= 0) & (not self.converges)
+        held = None if self.converges else self.table.level
+        left = self._left
+        while True:
+            level, worth = choose(self._steps, np.where(beside, BESIDE, weight), left, held)
+            level = np.where(beside & (level >= 0), self._steps.coarsest, level)
+            if not self.converges:
+                level = self._finest_of(level, [~source.broken() for source in self._sources])
+            if pages_needed(self._counts(level)).sum() <= self._pages:
+                return level, worth
+            left = int(0.9 * left)
+
+    def _counts(self, level: np.ndarray) -> np.ndarray:
+        """(L,) splats of all leaves at these levels."""
+        rows = np.arange(len(level))
+        return np.where(level >= 0, self._every_count[rows, np.maximum(level, 0)], 0)
+
+    def _finest_of(self, level: np.ndarray, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """(L,) the finest level from the wanted one on that lies in one of these parts (a mask a
+        source), or is the coarsest, which is in memory.
+        """
+        kinds = self._every_count.shape[1]
+        numbers = np.arange(kinds)
+        there = np.zeros(self._every_count.shape, bool)
+        for source, first, mask in zip(self._sources, self.first, parts, strict=False):
+            own = source.levels.counts
+            there[first : first + len(own), : own.shape[1]] = mask[source.part] & (own > 0)
+        there |= numbers == self._steps.coarsest[:, None]
+        fits = there & (numbers >= level[:, None])
+        return np.where(level >= 0, np.argmax(fits, axis=1), level)
+
+    def _stats(self, changed: int, pending: bool, in_sight: int) -> StreamStats:
+        problem = next((source.problem for source in self._sources if source.problem), "")
+        shown = int(self.table.splats.sum())
+        return StreamStats(
+            self.budget, shown, in_sight, self.stats.whole, changed, pending, problem
+        )
+
+    def find_sight(
+        self, poses: list[np.ndarray], shown: list[bool], views: Sequence[View]
+    ) -> LeafSight:
+        """Of all leaves, one object after the other."""
+        each = [sight_of(s.levels, p, views) for s, p in zip(self._sources, poses, strict=True)]
+        held, wide, cover, distance = (
+            np.concatenate([getattr(one, name) for one in each])
+            for name in ("held", "wide", "cover", "distance")
+        )
+        there = np.array(shown)[self._object]
+        return LeafSight(held & there, wide & there, cover, distance)
+
+    def _change(self, wanted: np.ndarray, worth: np.ndarray) -> np.ndarray:
+        """Brings the arena nearer to the wanted levels; the leaves that changed."""
+        table, level = self.table, wanted
+        gone = np.flatnonzero((wanted == NOT_DRAWN) & (table.level != NOT_DRAWN))
+        pages = [table.free(gone)]
+        due = np.flatnonzero(wanted != table.level)
+        if not self.converges:
+            at_hand = [source.at_hand() for source in self._sources]
+            missing = self._missing(wanted, worth, at_hand)
+            self._fetcher.want([*missing, *self._ahead(at_hand)])
+            self._decoded = sum(int(np.count_nonzero(there)) for there in at_hand)
+            level = self._finest_of(wanted, at_hand)
+            now = table.level
+            level = np.where((now != NOT_DRAWN) & (level != wanted) & (level > now), now, level)
+            due, level = self._first_of(np.flatnonzero(level != now), level, worth)
+        pages.append(table.free(due))
+        self._drawing.clear_pages(np.concatenate(pages))
+        self._upload(due, level[due])
+        return np.concatenate([gone, due])
+
+    def _missing(
+        self, wanted: np.ndarray, worth: np.ndarray, at_hand: Sequence[np.ndarray]
+    ) -> list[tuple[LeafSource, int]]:
+        """Parts that are wanted and not at hand, what is worth most first."""
+        found: dict[tuple[int, int], float] = {}
+        sources = {id(source): source for source in self._sources}
+        for source, first, there in zip(self._sources, self.first, at_hand, strict=False):
+            own = slice(first, first + len(source.part))
+            rows = np.flatnonzero((wanted[own] >= 0) & (wanted[own] != self.table.level[own])
+                                  & (wanted[own] != self._steps.coarsest[own]))  # fmt: skip
+            parts = source.part[rows, wanted[own][rows]]
+            most = np.zeros(len(there))
+            np.maximum.at(most, parts, worth[own][rows])
+            for part in np.flatnonzero((most > 0) & ~there & ~source.broken()):
+                key = (id(source), int(part))
+                found[key] = max(found.get(key, 0.0), float(most[part]))
+        order = sorted(found, key=lambda key: (-found[key], key[1]))
+        return [(sources[which], part) for which, part in order]
+
+    def _ahead(self, at_hand: Sequence[np.ndarray]) -> list[tuple[LeafSource, int]]:
+        """Parts that the eye will want if it goes on as it does, and that are not at hand."""
+        self._frame += 1
+        if self._frame % EACH:
+            return []
+        views = views_ahead(*self._views)
+        if not views:
+            return []
+        sight = self.find_sight(self._poses, self._shown, views)
+        weight = np.where(sight.held, self.weights.guessed(sight), 0.0)
+        wanted, worth = choose(self._steps, weight, self._left)
+        return self._missing(wanted, worth, at_hand)
+
+    @property
+    def due(self) -> bool:
+        """Whether another frame of the same views would show more."""
+        if not self.stats.pending:
+            return False
+        decoded = sum(int(np.count_nonzero(source.at_hand())) for source in self._sources)
+        return self.stats.changed > 0 or decoded != self._decoded
+
+    def _first_of(
+        self, due: np.ndarray, level: np.ndarray, worth: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What of the changes this frame makes, and all levels after it.
+
+        What comes into sight comes at its coarsest at least, and what has to go for it goes; finer
+        ones, best first, until CHANGED of the budget is uploaded.  Never more than the budget.
+        """
+        table, base = self.table, self._steps.base
+        counts, there, now = self._counts(level), table.splats, table.level
+        new = due[now[due] == NOT_DRAWN]
+        downs = due[level[due] > now[due]]
+        downs = np.setdiff1d(downs, new)
+        downs = downs[np.argsort(worth[downs], kind="stable")]
+        room = int(CHANGED * self.budget)
+        freed = np.cumsum(there[downs] - counts[downs])
+        total = int(there.sum())
+        needed = total + int(base[new].sum()) - self._left
+        number = int(np.searchsorted(freed, needed)) + 1 if needed > 0 else 0
+        number = max(number, int(np.searchsorted(np.cumsum(counts[downs]), room, side="right")))
+        downs = downs[:number]
+        total -= int((there[downs] - counts[downs]).sum())
+        new = new[np.argsort(-worth[new], kind="stable")]
+        new = new[: int(np.searchsorted(total + np.cumsum(base[new]), self._left, side="right"))]
+        total += int(base[new].sum())
+        finer = due[(now[due] != NOT_DRAWN) & (level[due] < now[due])]
+        ups = np.union1d(new[level[new] != self._steps.coarsest[new]], finer)
+        ups = ups[np.argsort(-worth[ups], kind="stable")]
+        more = counts[ups] - np.where(now[ups] == NOT_DRAWN, base[ups], there[ups])
+        left = max(room - int(counts[downs].sum()), 0)
+        taken = np.cumsum(counts[ups]) <= left
+        taken[:1] = True  # or a large leaf would never come
+        ups = ups[taken & (total + np.cumsum(more) <= self._left)]
+        after = now.copy()
+        after[new] = self._steps.coarsest[new]
+        after[downs], after[ups] = level[downs], level[ups]
+        return np.unique(np.concatenate([new, downs, ups])), after
+
+    def _upload(self, leaves: np.ndarray, levels: np.ndarray) -> None:
+        """Reads leaves (n,) at levels (n,) into free pages: each part once for all copies."""
+        self.placed = np.zeros(0, np.int64)
+        numbers = np.array([id(source) for source in self._sources])
+        object_of = self._object[leaves]
+        for source in {id(source): source for source in self._sources}.values():
+            mine = np.flatnonzero(numbers[object_of] == id(source))
+            own = leaves[mine] - self.first[object_of[mine]]
+            kinds = source.levels.counts.shape[1]
+            pairs, copy_of = np.unique(own * kinds + levels[mine], return_inverse=True)
+            number = {int(pair): n for n, pair in enumerate(pairs)}
+            for part in self._read(source, pairs // kinds, pairs % kinds):
+                given = part.leaves * kinds + part.levels
+                place = np.full(len(pairs), -1)
+                place[[number[int(pair)] for pair in given]] = np.arange(len(given))
+                there = place[copy_of] >= 0
+                which = place[copy_of][there]
+                self._place(part, which, leaves[mine][there])
+        self._flush()
+        if not self.follows_eye:
+            self._drawing.shade_pages(self.placed)
+
+    def _read(
+        self, source: LeafSource, leaves: np.ndarray, levels: np.ndarray
+    ) -> Iterator[LeafSplats]:
+        """LeafSplats of all of these; coarsest levels are in memory already."""
+        coarse = levels == source.levels.coarsest[leaves]
+        if coarse.any():
+            yield self._coarse[id(source)].picked(leaves[coarse], levels[coarse])
+        if not coarse.all():
+            yield from source.read(leaves[~coarse], levels[~coarse])
+
+    def _place(self, part: LeafSplats, which: np.ndarray, leaves: np.ndarray) -> None:
+        """Some leaves of a part into pages, as many as fit."""
+        needed = np.cumsum(pages_needed(part.counts[which]))
+        fit = int(np.searchsorted(needed, self.table.room, side="right"))
+        which, leaves = which[:fit], leaves[:fit]
+        owner = np.array(self.objects)[self._object[leaves]]
+        pages = self.table.reserve(leaves, part.levels[which], part.counts[which])
+        self._waiting.append((pages, fill_pages(part, which, owner)))
+        if sum(len(each) for each, _ in self._waiting) * PAGE >= AT_ONCE:
+            self._flush()
+
+    def _flush(self) -> None:
+        """Uploads what waits: few large writes instead of one a file."""
+        pages = np.concatenate([np.zeros(0, np.int64), *(each for each, _ in self._waiting)])
+        if len(pages):
+            self._drawing.place_pages(pages, *together([filled for _, filled in self._waiting]))
+            self.placed = np.union1d(self.placed, pages)
+        self._waiting.clear()
+
+    def close(self) -> None:
+        self._fetcher.close()
+
+
+def key_of(view: View) -> tuple:
+    """What of a view says which leaves it wants."""
+    pose = view.world_from_eye
+    return (*pose.position, *pose.wxyz, *view.tangents, *view.size, view.near)
+
+
+def auto_budget() -> int:
+    """What suits the processor, or a GPU."""
+    try:
+        device = open_device()
+    except NoDevice:
+        return LEAST_AUTO
+    if device.kind == "gpu":
+        return MOST_AUTO
+    return int(min(max(SPLATS_A_UNIT * device.units, LEAST_AUTO), MOST_AUTO))
+
+
+def every_count(sources: Sequence[LeafSource]) -> np.ndarray:
+    """(L, K) splats of all leaves of several sources; K of the one that has most."""
+    most = max(source.levels.counts.shape[1] for source in sources)
+    counts = [source.levels.counts for source in sources]
+    return np.concatenate([np.pad(c, ((0, 0), (0, most - c.shape[1]))) for c in counts])
+
+
+def pages_for(finest: np.ndarray, budget: int) -> int:
+    """Pages for so many splats: one of each leaf is not full, but no more than ROOM allows."""
+    splats = min(int(finest.sum()), budget)
+    full = splats // PAGE + min(len(finest), budget) + 1
+    return min(full, int(ROOM * budget) // PAGE + 1)
+
+
+class CoarseLevels:
+    """The splats of a model by leaf."""
+
+    def __init__(self, model: SplatLayers, source: LeafSource) -> None:
+        self._model, leaf = model, source.coarse_leaf
+        self._order = np.argsort(leaf, kind="stable")
+        self._counts = np.bincount(leaf, minlength=len(source.part))
+        self._starts = np.cumsum(self._counts) - self._counts
+
+    def picked(self, leaves: np.ndarray, levels: np.ndarray) -> LeafSplats:
+        """Leaves (n,), one after the other."""
+        counts = self._counts[leaves]
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        rows = self._order[np.repeat(self._starts[leaves], counts) + within]
+        m = self._model
+        arrays = (array[rows] for array in (m.means, m.scales, m.wxyz, m.opacity, m.sh))
+        return LeafSplats(leaves, levels, counts, *arrays)

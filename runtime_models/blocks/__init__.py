@@ -1,0 +1,1 @@
+"""Scenes in blocks: packages side by side, each with networks of its own, as one model."""

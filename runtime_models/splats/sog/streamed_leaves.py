@@ -1,0 +1,240 @@
+"""A streamed SOG leaf by leaf and level by level: what is to be drawn is decoded, nothing else."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.json_fields import shown
+from shapeshift.runtime_models.leaf_levels import LeafLevels, LeafSplats
+from shapeshift.runtime_models.lint.lint_rows import repair_rows
+from shapeshift.runtime_models.lint.lint_whole import (
+    refuse_boundless,
+    refuse_filling,
+    sample_of,
+)
+from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
+from shapeshift.runtime_models.splats.layers.read_layers import check_mode, widened
+from shapeshift.runtime_models.splats.operations.activate import activate
+from shapeshift.runtime_models.splats.operations.recentre import origin_of, recentred
+from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
+from shapeshift.runtime_models.splats.plain_splats import COLMAP_UP, RawSplats, Reading
+from shapeshift.runtime_models.splats.sog.read_streamed import (
+    TREE,
+    Streamed,
+    folder_of,
+    read_tree,
+)
+from shapeshift.runtime_models.splats.sog.sog_chunk import SogChunk
+
+AT_ONCE = 1 << 16  # splats that are converted together: some 100 bytes each for a moment
+FARTHEST = 1e12  # metres of a box; as of a scene
+
+
+class StreamedLeaves:
+    """The leaves of one folder, a LeafSource: its parts are the folder's files."""
+
+    def __init__(self, streamed: Streamed, reading: Reading) -> None:
+        """Raises BadFile."""
+        assert reading.leaves is not None
+        nodes = [leaf for leaf in streamed.leaves if any(run.count for run in leaf[1].values())]
+        self.budget = reading.leaves.budget
+        self.problem = ""
+        self.cache, self._reading = reading.leaves.cache, reading
+        self._ours = ours_from_file(reading.up or COLMAP_UP, reading.flip)
+        self._origin, self._antialiased = (0.0, 0.0, 0.0), False
+        files = [*streamed.files]
+        environment = streamed.environment
+        if environment is not None:
+            files.append(environment)
+        self._files, self._folder = files, streamed.folder
+        self._broken = np.zeros(len(files), bool)
+        self._key = (str(streamed.folder.resolve()),)
+        count, kinds = len(nodes) + (environment is not None), len(streamed.levels)
+        shape = (count, kinds)
+        self.part, self._first = np.zeros(shape, np.int32), np.zeros(shape, np.int64)
+        counts = np.zeros(shape, np.int64)
+        for leaf, (_, runs) in enumerate(nodes):
+            for level, run in runs.items():
+                self.part[leaf, level] = run.file
+                self._first[leaf, level], counts[leaf, level] = run.first, run.count
+        if environment is not None:
+            self.part[-1] = len(files) - 1
+            counts[-1, 0] = self._chunk(len(files) - 1).count
+        low, high = boxes_of([node for node, _ in nodes])
+        if environment is not None:
+            low = np.concatenate([low, np.full((1, 3), -FARTHEST)])
+            high = np.concatenate([high, np.full((1, 3), FARTHEST)])
+        corners = np.stack([low @ self._ours.T, high @ self._ours.T])
+        errors = errors_of([node for node, _ in nodes], counts)
+        self.levels = LeafLevels(corners.min(axis=0), corners.max(axis=0), counts, errors)
+        self.coefficients = 1
+        self.coarse_leaf = np.zeros(0, np.int32)
+
+    def coarse_model(self) -> SplatLayers:
+        """The coarsest level of every leaf as a scene of one stop.  Raises BadFile."""
+        leaves = np.arange(len(self.part))
+        coarsest = self.levels.coarsest
+        parts, findings = [], []
+        for run in self._runs(leaves, coarsest):
+            found, splats = self._converted(*run)
+            findings += found
+            parts.append(splats)
+        self.coefficients = max(part.sh.shape[1] for part in parts)
+        joined = [
+            np.concatenate([np.asarray(getattr(part, name)) for part in parts])
+            for name in ("means", "scales", "wxyz", "opacity")
+        ]
+        sh = np.concatenate([widened(part.sh, self.coefficients) for part in parts])
+        leaf = np.concatenate([np.repeat(part.leaves, part.counts) for part in parts])
+        name = self._folder.resolve().name
+        if not len(sh):
+            raise BadFile(f"{name}: not one splat of its coarsest levels can be drawn.")
+        means, scales, wxyz, opacity = joined
+        sample = sample_of(means, scales, opacity)
+        refuse_boundless(name, sample)
+        if not self._reading.allow_huge:
+            refuse_filling(name, sample)
+        self._origin, found = origin_of(sample, means.dtype, name)
+        findings += found
+        shift = np.array(self._origin)
+        if shift.any():
+            low, high = self.levels.low - shift, self.levels.high - shift
+            self.levels = replace(self.levels, low=low, high=high)
+            means = recentred(means, self._origin)
+        self.coarse_leaf = leaf.astype(np.int32)
+        counts = [int(n) for n in self.levels.counts.sum(axis=0)]
+        last = int(coarsest.max())
+        provenance = {
+            "format": "SOG v2", "files": [TREE], "level": last, "level_splats": counts,
+            "leaves": len(leaves),
+        }  # fmt: skip
+        return SplatLayers(
+            means, scales, wxyz, opacity, sh, np.zeros(len(sh), np.int32),
+            (Stop(name, 0.0, "layer"),), provenance=provenance, origin=self._origin,
+            antialiased=self._antialiased, findings=tuple(findings), leaves=self,
+        )  # fmt: skip
+
+    def at_hand(self) -> np.ndarray:
+        return np.array([(*self._key, n) in self.cache for n in range(len(self._files))])
+
+    def broken(self) -> np.ndarray:
+        return self._broken
+
+    def load(self, part: int) -> None:
+        self._chunk(part)
+
+    def read(self, leaves: np.ndarray, levels: np.ndarray) -> Iterator[LeafSplats]:
+        for run in self._runs(leaves, levels):
+            yield self._converted(*run)[1]
+
+    def _runs(
+        self, leaves: np.ndarray, levels: np.ndarray
+    ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """(file, its leaves, their levels), file by file, AT_ONCE splats or a leaf at a time."""
+        files, counts = self.part[leaves, levels], self.levels.counts[leaves, levels]
+        for file in np.unique(files):
+            mine = np.flatnonzero(files == file)
+            block = (np.cumsum(counts[mine]) - counts[mine]) // AT_ONCE
+            for rows in np.split(mine, np.flatnonzero(np.diff(block)) + 1):
+                yield int(file), leaves[rows], levels[rows]
+
+    def _chunk(self, file: int) -> SogChunk:
+        """A file's pictures.  Raises BadFile, then and ever after."""
+        path = self._files[file]
+
+        def decode() -> SogChunk:
+            return SogChunk(path, self._reading.account)
+
+        try:
+            return self.cache.get((*self._key, file), decode)
+        except (BadFile, OSError) as error:
+            self._broken[file] = True
+            where = path.relative_to(self._folder).as_posix()
+            self.problem = f"{self._folder.resolve().name}: {where} cannot be read: {error}"
+            raise BadFile(self.problem) from None
+
+    def _converted(
+        self, file: int, leaves: np.ndarray, levels: np.ndarray
+    ) -> tuple[list[Finding], LeafSplats]:
+        """Splats of some leaves of one file, in our axes and units, as `judge` makes them."""
+        chunk = self._chunk(file)
+        counts, first = self.levels.counts[leaves, levels], self._first[leaves, levels]
+        beyond = first + counts > chunk.count
+        if beyond.any():
+            self._broken[file] = True
+            where = self._files[file].relative_to(self._folder).as_posix()
+            self.problem = (
+                f"{self._folder.resolve().name}: {where} has {chunk.count:,} splats, {TREE} names "
+                f"row {int((first + counts).max()):,}; copy the whole folder or export it again."
+            )
+            raise BadFile(self.problem)
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        raw = chunk.rows(np.repeat(first, counts) + within)
+        self._antialiased = raw.antialiased
+        raw.extra = {"leaf": np.repeat(np.arange(len(leaves)), counts)}
+        odd, filed = activate(raw, self._ours)
+        findings = [*raw.findings, *repair_rows(raw, odd, filed)]
+        kept = np.bincount(raw.extra["leaf"], minlength=len(leaves))
+        return findings, LeafSplats(
+            leaves, levels, kept, recentred(raw.means, self._origin), raw.scales, raw.wxyz,
+            raw.opacity, self._harmonics(raw),
+        )  # fmt: skip
+
+    def _harmonics(self, raw: RawSplats) -> np.ndarray:
+        """(n, M, 3) of the coarsest level's M; before that is known as many as the file has."""
+        known = len(self.coarse_leaf) > 0
+        return widened(raw.sh, self.coefficients) if known else raw.sh
+
+
+def open_leaves(path: Path, reading: Reading) -> SplatLayers:
+    """The coarsest levels of a streamed SOG, whose `leaves` give all others.  Raises BadFile."""
+    check_mode(reading.mode)
+    reading = reading.within(folder_of(path))
+    return StreamedLeaves(read_tree(path, reading.account), reading).coarse_model()
+
+
+def boxes_of(nodes: list[dict]) -> tuple[np.ndarray, np.ndarray]:
+    """(L, 3) and (L, 3) metres in the file.  Raises BadFile."""
+    ends = np.zeros((len(nodes), 2, 3))
+    for i, node in enumerate(nodes):
+        bound = node.get("bound")
+        for k, name in enumerate(("min", "max")):
+            end = bound.get(name) if isinstance(bound, dict) else None
+            if not (isinstance(end, list) and len(end) == 3 and all(map(is_number, end))):
+                raise BadFile(
+                    f"{TREE} holds a leaf whose bound has the {name} {shown(end)}, expected three "
+                    "numbers; export it again."
+                )
+            ends[i, k] = end
+    low, high = ends[:, 0], ends[:, 1]
+    wrong = ~((np.abs(ends) <= FARTHEST).all(axis=(1, 2)) & (low <= high).all(axis=1))
+    if wrong.any():
+        bound = nodes[int(np.argmax(wrong))]["bound"]
+        raise BadFile(f"{TREE} holds a leaf whose bound is {shown(bound)}; export it again.")
+    return low, high
+
+
+def errors_of(nodes: list[dict], counts: np.ndarray) -> np.ndarray:
+    """(L, K): what the tree states, or where a leaf states none, how many fewer splats it has, as
+    PlayCanvas's engine has it.  Raises BadFile.
+    """
+    most = counts.max(axis=1, keepdims=True)
+    errors = np.where(counts > 0, np.log(most / np.maximum(counts, 1)), 0.0)
+    for i, node in enumerate(nodes):
+        stated = node.get("errors")
+        if stated is None:
+            continue
+        levels = counts.shape[1]
+        if not (isinstance(stated, list) and len(stated) <= levels and all(map(is_number, stated))):
+            raise BadFile(f"{TREE} holds a leaf with the errors {shown(stated)}; export it again.")
+        if not all(0 <= error <= FARTHEST for error in stated):
+            raise BadFile(f"{TREE} holds a leaf with the errors {shown(stated)}; export it again.")
+        errors[i, : len(stated)] = stated
+        errors[i, len(stated) :] = max(stated, default=0.0)
+    return errors
+
+
+def is_number(value: object) -> bool:
+    return type(value) in (int, float)

@@ -1,0 +1,35 @@
+"""The words of options are those that `parse` makes the same options of."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shapeshift.app.cluster.words import words_for
+from shapeshift.app.command_line import parse
+from shapeshift.app.film.film import Options as FilmOptions
+from shapeshift.app.training.table import Options as TableOptions
+from shapeshift.app.training.train import Options as TrainOptions
+
+FILM = FilmOptions(Path("/a/b c.shift"), Path("/out"))
+TABLE = TableOptions(Path("/capture"), Path("/out"))
+
+
+@pytest.mark.parametrize("options", [
+    FILM, TABLE,
+    replace(FILM, up="-Z", flip=True, only="50:100", seconds=0.1 + 0.2, size="64x36", every=3,
+            streams=("depth", "normal"), style_path="RGB@0 Thermal@3s", stereo=0.063,
+            background=(0.0, 1e-7, 1.0), save_path=Path("/p.film.json")),
+    replace(TABLE, asked={"max_anchors": 400, "background": "black", "seed": 0}, iterations=20,
+            splats={"sh_degree": 1}, methods=("joint", "splats"), vgg=Path("/-v.onnx")),
+    TrainOptions(Path("/capture"), Path("/out.shift"), {"iterations": 9, "fixed": "-"}, {}, True),
+])  # fmt: skip
+def test_options_come_back_out_of_their_words(options):
+    command, *words = words_for("cluster", options)
+    assert command == "cluster" and parse(type(options), words, "x") == options
+
+
+def test_defaults_are_left_out_and_paths_are_absolute(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    words = words_for("film", FilmOptions(Path("a.shift"), Path("b")))
+    assert words == ("film", str(tmp_path / "a.shift"), "--out", str(tmp_path / "b"))

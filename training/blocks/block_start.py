@@ -1,0 +1,166 @@
+"""What a block's run begins with: its part of the coarse run's state, its photos, its box.
+
+One file a block, which is all that its run reads beside the capture.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shapeshift.runtime_models.blocks.block_box import BlockBox, Corner, turned
+from shapeshift.runtime_models.files.json_fields import Fields
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.training.blocks.cover import Cover
+from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.run import SETTLE
+
+OF_PHOTOS = ("exposure", "poses")  # groups of a state that are about all photos: begun anew
+ADVICE = "train again with --blocks"
+
+
+@dataclass(frozen=True)
+class BlockPlace:
+    """Where a block's anchors belong: a box in a turned frame, and the cube outside of which all is
+    far and no block's."""
+
+    box: BlockBox
+    turn_degrees: float
+    middle: Corner  # metres, world: of the cube
+    half: float  # metres; infinite: nothing is far
+
+    def __post_init__(self) -> None:
+        """ValueError, one sentence."""
+        if not self.half > 0:
+            raise ValueError(f"half the side of what is near is {self.half}")
+
+    def holds(self, places: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """(N,) bool of places (N, 3) in the world; margin: metres the box is enlarged by."""
+        near = (np.abs(np.asarray(places, np.float64) - self.middle) <= self.half).all(axis=1)
+        return near & self.box.holds(turned(places, self.turn_degrees), margin)
+
+
+@dataclass(frozen=True)
+class BlockPhoto:
+    """A photo of a block, by its path in the capture."""
+
+    path: str
+    modality: str
+    split: str
+
+
+@dataclass(frozen=True)
+class BlockStart:
+    place: BlockPlace
+    photos: tuple[BlockPhoto, ...]
+    state: dict[str, np.ndarray]  # as of Trainer.checkpoint
+    notes: dict[str, Any]  # likewise
+    provenance: dict[str, Any]  # of the coarse run's package
+
+    def write(self, path: Path) -> None:
+        photos = [[p.path, p.modality, p.split] for p in self.photos]
+        box, place = self.place.box, self.place
+        mine = {
+            "low": finite(box.low), "high": finite(box.high), "turn_degrees": place.turn_degrees,
+            "middle": list(place.middle), "half": finite([place.half])[0], "photos": photos,
+            "provenance": self.provenance,
+        }  # fmt: skip
+        write_checkpoint(path, self.state, self.notes | {"block": mine})
+
+    @staticmethod
+    def read(path: Path) -> "BlockStart":
+        """Raises BadFile."""
+        if not path.is_file():
+            raise BadFile(f"{path}: no start of a block is there; {ADVICE} makes one.")
+        state, notes = read_checkpoint(path)
+        try:
+            mine = Fields(notes.pop("block"), str(path), ADVICE)
+            low, high = (endless(mine.value(key), side) for key, side in (("low", -1), ("high", 1)))
+            half = endless([mine.value("half")] * 3, 1)[0]
+            place = BlockPlace(
+                BlockBox(low, high), mine.number("turn_degrees"),
+                mine.numbers("middle", 3), half,  # type: ignore[arg-type]  # three of them
+            )  # fmt: skip
+            photos = []
+            for name, modality, split in mine.value("photos"):
+                photos.append(BlockPhoto(str(name), str(modality), str(split)))
+            provenance = mine.typed("provenance", dict, {})
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            if isinstance(error, BadFile):
+                raise
+            raise BadFile(f"{path}: not the start of a block ({error}); {ADVICE}.") from None
+        return BlockStart(place, tuple(photos), state, notes, provenance)
+
+    def capture_of(self, capture: Capture) -> Capture:
+        """The capture with the photos of the block alone.  Raises BadFile."""
+        known = {(path_in(capture, p), p.modality): p for p in capture.photos}
+        found = []
+        for mine in self.photos:
+            photo = known.get((mine.path, mine.modality))
+            if photo is None:
+                raise BadFile(
+                    f"{capture.folder} has no photo '{mine.path:.200}' of '{mine.modality:.60}' "
+                    f"any more; {ADVICE}, anew."
+                )
+            found.append(photo)
+        return replace(capture, photos=tuple(found))
+
+
+def finite(values: Sequence[float]) -> list[float | None]:
+    """JSON has no infinity: null."""
+    return [v if math.isfinite(v) else None for v in values]
+
+
+def endless(values: Sequence[float | None], side: int) -> Corner:
+    x, y, z = (side * math.inf if v is None else float(v) for v in values)
+    return x, y, z
+
+
+def path_in(capture: Capture, photo: Photo) -> str:
+    """A photo's path as seen from its capture, with forward slashes."""
+    path = Path(photo.path)
+    inside = path.is_absolute() and path.is_relative_to(capture.folder.absolute())
+    if inside:
+        return path.relative_to(capture.folder.absolute()).as_posix()
+    return path.as_posix().removeprefix(capture.folder.as_posix() + "/")
+
+
+def photos_of(cover: Cover, capture: Capture, photos: Sequence[Photo]) -> tuple[BlockPhoto, ...]:
+    """The photos of a block as its run finds them again."""
+    return tuple(
+        BlockPhoto(path_in(capture, photos[i]), photos[i].modality, photos[i].split)
+        for i in cover.photos
+    )
+
+
+def part_of_state(
+    state: dict[str, np.ndarray], rows: np.ndarray, layout: HeadLayout
+) -> dict[str, np.ndarray]:
+    """The state of the anchors `rows` (R,): Adam's moments stay, statistics begin anew."""
+    out = {}
+    for name, array in state.items():
+        group = name.partition(".")[0]
+        if group in OF_PHOTOS:
+            continue
+        if group in layout.per_anchor or name == "min_scale.pixels":
+            array = array[rows]
+        elif name == "visibility.reach":
+            array = array[:, rows]
+        out[name] = array
+    count, stops = len(rows), len(state["densify.contribution"])
+    out["densify.grad2d"] = np.zeros((count * layout.splats, 2), np.float32)
+    out["densify.opacity"] = np.zeros((count, 2), np.float32)
+    out["densify.contribution"] = np.zeros((stops, count, 2), np.float32)
+    out["densify.steps"] = np.array(0)
+    return out
+
+
+def begun_anew(notes: dict[str, Any]) -> dict[str, Any]:
+    """The notes of a run whose clock begins here: rates and growing follow it."""
+    fresh = {"iteration": 0, "elapsed": 0.0, "densified_at": -SETTLE, "run_length": None}
+    return notes | fresh | {"lr_warmup_start": None}

@@ -1,0 +1,1 @@
+"""Coarser levels of a package learn to look like the package."""
