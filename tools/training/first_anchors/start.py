@@ -1,6 +1,6 @@
 """What the start may take of a run's seconds: quality at equal seconds in all, start and training.
 
-    python3 tools/training/start.py CAPTURE ... --out docs/bench/start.csv
+    python3 tools/training/first_anchors/start.py CAPTURE ... --out docs/bench/start.csv
         [--seconds 60] [--downscale N] [--ways chosen whole] [--seeds 0]
 
 First anchors are triangulated out of the photos (and stand on a hull, where there are masks), the
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+sys.path[:0] = [str(Path(__file__).resolve().parents[n]) for n in (1, 3)]
 
 from ways import Turn, asked, parser_of, settings_of, table, turns  # noqa: E402
 
