@@ -1,11 +1,16 @@
 """Which level of detail each object is drawn at: by the pixels that its bounds have on screen."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from operator import is_
 
 import numpy as np
 
+from shapeshift.renderer.colors.color_cache import ColorCache, centre_of
+from shapeshift.renderer.decoded_object import DecodedObject
+from shapeshift.renderer.drawing import Drawing
 from shapeshift.runtime_models.model import AnchorModel, Model
 from shapeshift.scene.cameras.framing import frame_points
 from shapeshift.scene.pose import View
@@ -22,6 +27,7 @@ class LevelChoice:
 
     def __init__(self) -> None:
         self._models: list[Model] = []  # of the objects that the levels are of
+        self._whole = False  # all is drawn at level 0
         self._bounds: list[Bounds | None] = []  # of each; None: it has no levels
         self.levels: tuple[int, ...] = ()  # of each the one that it is drawn at; 0: all there is
 
@@ -43,15 +49,26 @@ class LevelChoice:
 
     def shown(self, scene: Scene) -> Scene:
         """The scene that `begin` was given, or one of the same models, each object at its level."""
-        if not any(self._bounds):
+        if self._whole or not any(self._bounds):
             return scene
         pairs = zip(scene.objects, self.levels, strict=False)
         return Scene(tuple(at_level(obj, level) for obj, level in pairs))
+
+    @contextmanager
+    def all_whole(self) -> Iterator[None]:
+        """Within it all is drawn at level 0, from the next `update` on: for who measures."""
+        self._whole = True
+        try:
+            yield
+        finally:
+            self._whole = False
 
     def choose(self, scene: Scene, views: list[View]) -> bool:
         """Looks at the same scene from all eyes of a frame; whether an object is to be drawn at
         another level than before.
         """
+        if self._whole:
+            return False
         before = self.levels
         rows = zip(scene.objects, self._bounds, before, strict=True)
         self.levels = tuple(
@@ -61,6 +78,25 @@ class LevelChoice:
             for obj, bounds, level in rows
         )
         return self.levels != before
+
+
+def exchange_levels(
+    drawing: Drawing, before: list[DecodedObject], scene: Scene
+) -> list[DecodedObject]:
+    """The objects of a scene of which some have another level; the others stay decoded."""
+    models = [obj.model for obj in scene.objects]
+    try:
+        kept = drawing.exchange(models)
+    except ValueError:  # a finer level does not fit
+        drawing.allocate([])
+        raise
+    fresh = decoded_objects(models)
+    return [before[i] if kept[i] else fresh[i] for i in range(len(models))]
+
+
+def decoded_objects(models: list[Model]) -> list[DecodedObject]:
+    """Of each model one that is not decoded yet."""
+    return [DecodedObject(model, [ColorCache(centre_of(model))]) for model in models]
 
 
 def has_levels(model: Model) -> bool:
