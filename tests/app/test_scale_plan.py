@@ -28,10 +28,7 @@ def test_the_page_has_the_programs_figures(program):
 
 def test_a_step_costs_what_its_row_says(program):
     """The two shares, put together again for the row's own capture, but for the unlisted rest."""
-    (cost,) = (
-        row for row in program.read_rows("step_cost.csv")
-        if (row["code"], row["run"]) == ("after", "all")
-    )  # fmt: skip
+    cost = program.step_row()
     measured = program.measure()
     step_ms = int(cost["anchors"]) * measured.anchor_ms
     step_ms += program.PLUSH_PIXELS * measured.pixel_ms
