@@ -182,7 +182,7 @@ def still(renderer: Renderer, view: View, way: str, picture: Path) -> dict:
 
 
 def walk(renderer: Renderer, view: View, picture: Path) -> dict:
-    """Frames in motion; dB are the mean over some of them, less what a fresh choice would have."""
+    """Frames in motion, after the first has rested; dB are the mean over COMPARED of them."""
     path, streaming = walk_of(view), renderer.streaming
     streaming.converges = False
     begun = time.process_time()
