@@ -108,8 +108,8 @@ class StreamedLeaves:
         counts = [int(n) for n in self.levels.counts.sum(axis=0)]
         last = int(coarsest.max())
         provenance = {
-            "format": self._format, "files": self._file_names(), "level": last, "level_splats": counts,
-            "leaves": len(leaves),
+            "format": self._format, "files": self._file_names(), "level": last,
+            "level_splats": counts, "leaves": len(leaves),
         }  # fmt: skip
         return SplatLayers(
             means, scales, wxyz, opacity, sh, np.zeros(len(sh), np.int32),
