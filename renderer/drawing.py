@@ -36,6 +36,13 @@ class Drawing(ABC):
     def allocate(self, models: list[Model]) -> None:
         """Room for these objects; what was decoded before is gone."""
 
+    def exchange(self, models: list[Model]) -> list[bool]:
+        """Room for other models of the same objects; of which what is decoded is kept.  Raises
+        ValueError as `allocate` does.
+        """
+        self.allocate(models)
+        return [False] * len(models)
+
     def allocate_pages(self, models: list[Model], pages: int, coefficients: int) -> None:
         """The same, with pages of rasterizer/paging/pages.py for what a budget draws of models with
         leaves (streaming/); coefficients: harmonics of each of their splats.

@@ -6,6 +6,9 @@ from operator import is_
 
 import numpy as np
 
+from shapeshift.renderer.colors.color_cache import ColorCache, centre_of
+from shapeshift.renderer.decoded_object import DecodedObject
+from shapeshift.renderer.drawing import Drawing
 from shapeshift.runtime_models.model import AnchorModel, Model
 from shapeshift.scene.cameras.framing import frame_points
 from shapeshift.scene.pose import View
@@ -61,6 +64,25 @@ class LevelChoice:
             for obj, bounds, level in rows
         )
         return self.levels != before
+
+
+def exchange_levels(
+    drawing: Drawing, before: list[DecodedObject], scene: Scene
+) -> list[DecodedObject]:
+    """The objects of a scene of which some have another level; the others stay decoded."""
+    models = [obj.model for obj in scene.objects]
+    try:
+        kept = drawing.exchange(models)
+    except ValueError:  # a finer level does not fit
+        drawing.allocate([])
+        raise
+    fresh = decoded_objects(models)
+    return [before[i] if kept[i] else fresh[i] for i in range(len(models))]
+
+
+def decoded_objects(models: list[Model]) -> list[DecodedObject]:
+    """Of each model one that is not decoded yet."""
+    return [DecodedObject(model, [ColorCache(centre_of(model))]) for model in models]
 
 
 def has_levels(model: Model) -> bool:

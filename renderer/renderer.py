@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.backends import choose_backends, open_drawing
-from shapeshift.renderer.colors.color_cache import ColorCache, centre_of, forget_colors
+from shapeshift.renderer.colors.color_cache import ColorCache, forget_colors
 from shapeshift.renderer.colors.decode_colors import decode_colors
 from shapeshift.renderer.colors.eye_colors import by_eye, drawn_together, eyes_among
 from shapeshift.renderer.colors.false_colors import (
@@ -39,7 +39,7 @@ from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import BESIDE_SET, DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
-from shapeshift.renderer.levels import LevelChoice
+from shapeshift.renderer.levels import LevelChoice, decoded_objects, exchange_levels
 from shapeshift.renderer.resample import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
 from shapeshift.renderer.streaming.follow import Streaming
@@ -65,13 +65,9 @@ class Renderer:
     """
 
     def __init__(
-        self,
-        ctx: moderngl.Context | None,
-        drawing: str = "auto",
-        mlps: str = "auto",
-        sort: str = "auto",
-        target: str | None = None,
-    ) -> None:
+        self, ctx: moderngl.Context | None, drawing: str = "auto", mlps: str = "auto",
+        sort: str = "auto", target: str | None = None,
+    ) -> None:  # fmt: skip
         drawing, mlps, sort = choose_backends(ctx, drawing, mlps, sort)
         if target not in (None, *TARGETS):
             raise ValueError(f"there is no target {target!r}; choose {', '.join(TARGETS)}.")
@@ -109,7 +105,11 @@ class Renderer:
     def _look_from(self, views: list[View]) -> None:
         """Objects with levels of detail at those that these views ask for.  Raises BadFile."""
         if self.levels.choose(self._given, self._scaled(views)):
-            self._take_over(self.levels.shown(self._given))
+            scene = self.levels.shown(self._given)
+            if self.streaming.stream is None:  # else all is made anew
+                before, self._decoded, self._false_key = self._decoded, [], None
+                self._decoded = exchange_levels(self.drawing, before, scene)
+            self._take_over(scene)
         self.streaming.follow(self._scene, self._decoded, views, self._timer)
 
     def _scaled(self, views: Sequence[View]) -> list[View]:
@@ -158,7 +158,7 @@ class Renderer:
         models = [o.model for o in scene.objects]
         self._scene, self._decoded, self._false_key = Scene(()), [], None
         self.streaming.allocate(models, self.settings.budget)
-        self._decoded = [DecodedObject(model, [ColorCache(centre_of(model))]) for model in models]
+        self._decoded = decoded_objects(models)
 
     def draw(
         self, views: list[View],

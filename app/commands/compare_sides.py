@@ -11,7 +11,12 @@ from shapeshift.app.paths import plain
 from shapeshift.runtime_models.model import BadFile
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
-SCENE_MARKS = ("scene.json", "meta.json", "lod-meta.json")  # folders of these hold no photographs
+SCENE_MARKS = (
+    "scene.json",
+    "meta.json",
+    "lod-meta.json",
+    "lod.json",
+)  # folders of these hold no photographs
 
 
 @dataclass(frozen=True)

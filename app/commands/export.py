@@ -11,6 +11,7 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 
 PACKAGE = ".shift"
+LEVELS_ENDING = ".lod"
 PAGES = (".html", ".zip")
 
 
@@ -79,6 +80,8 @@ def run(options: Options) -> int:
     package = not page and (is_folder(options.out) or options.out.suffix.lower() == PACKAGE)
     if options.encoding != "kept" and not package:
         raise UsageError("--encoding is of packages; name --out NAME.shift, or leave it out.")
+    if options.out.suffix.lower() == LEVELS_ENDING:
+        raise UsageError(f"--out {options.out}: levels of detail are written by `launch.py lod`.")
     if options.for_ != "any" and not page:
         raise UsageError(
             "--for is of pages; name --out NAME.html or .zip, or --web, or leave it out."
@@ -91,6 +94,8 @@ def run(options: Options) -> int:
     eye = parse_eye(options.eye)
     opened = [open_scene(path, options) for path in scenes]
     models = [obj.model for scene in opened for obj in scene.scene.objects]
+    if any(getattr(model, "coarser", ()) for model in models):
+        say("Coarser levels stay behind: what is written is of all anchors.")
     if package:
         return export_package(options, opened)
     if eye and not any(map(follows_eye, models)):

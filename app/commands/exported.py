@@ -12,6 +12,7 @@ from shapeshift.renderer.colors.false_colors import mixed_colors, shade_of
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.runtime_models.bake import ColorAt, Recolor, bake
 from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.lod.level_files import ENDING, LEVELS
 from shapeshift.runtime_models.model import BadFile, Finding, Model, SplatLayers
 from shapeshift.runtime_models.package.package_files import MANIFEST
 from shapeshift.runtime_models.parts import find_label, splat_labels
@@ -155,7 +156,7 @@ def check_output(path: Path, inputs: Sequence[Path], overwrite: bool, said: str 
     said: what stands before a name where it is typed.
     """
     out = f"{said}out {path}"
-    folders = [given.parent for given in inputs if given.name in (MANIFEST, META, TREE)]
+    folders = [given.parent for given in inputs if given.name in (MANIFEST, META, TREE, LEVELS)]
     for given in (*inputs, *folders):
         if given.is_dir() and path.resolve().is_relative_to(given.resolve()):
             raise UsageError(f"{out} lies in {given}, which is read; choose another folder.")
@@ -163,7 +164,8 @@ def check_output(path: Path, inputs: Sequence[Path], overwrite: bool, said: str 
             raise UsageError(f"{out} is the scene that is read; choose another name.")
     if path.exists() and not overwrite:
         raise UsageError(f"{out} exists; {said}overwrite replaces it.")
-    if path.is_dir() != is_folder(path) and path.exists():
+    folder = is_folder(path) or path.suffix.lower() == ENDING
+    if path.is_dir() != folder and path.exists():
         raise UsageError(f"{out} is of another kind than what is written; choose another.")
 
 

@@ -25,6 +25,8 @@ from shapeshift.runtime_models.files.plain_text import json_text, one_line
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.cameras.camera_list import CameraList, moved
 from shapeshift.scene.cameras.write_own_cameras import own_rows
+from shapeshift.scene.inspection.mark_photos import photo_pixels
+from shapeshift.scene.inspection.marks import Mark
 from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.pose import View
 
@@ -37,6 +39,7 @@ VALUES_WORDS = (
 )
 NO_ERROR = "The error of these values was not measured; --capture CAPTURE measures it."
 TEXT_COLUMNS = ("mark", "length", "kind", "note")  # of tables; the others are figures
+SMALL_PX = 480  # a mark's own photo is no wider
 JUMP = 8.0  # times the usual step along a line: it goes from one surface to another
 PROFILE_SIZE, PROFILE_EDGES = (640, 170), (56, 10, 10, 28)  # px; left, right, top, bottom
 STYLE = """
@@ -84,6 +87,7 @@ class ReportView:
     notes: list[str]
     lines: list[str]
     profiles: list[Profile]
+    photos: list[tuple[str, np.ndarray]] = field(default_factory=list)  # of marks, as pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +144,9 @@ def report_of(
         own = [mark for mark in marks if mark.emissivity is not None]
         notes += [f"{mark.name}: emissivity {mark.emissivity:g}" for mark in own]
         pictures = three_pictures(each, scale)
-        views.append(ReportView(title, pictures, rows, notes, summary_lines(each), profiles))
+        photos = mark_photos(marks) if not number else []  # once, they are of no view
+        lines = summary_lines(each)
+        views.append(ReportView(title, pictures, rows, notes, lines, profiles, photos))
     error = NO_ERROR
     corrected = any(each.values.emission is not None for each in shown)
     if file.held_out is not None:
@@ -156,6 +162,16 @@ def report_of(
     return InspectionReport(
         head, views, settings, error, scene.name, stop.name, cameras, length_rows(measured)
     )
+
+
+def mark_photos(marks: Sequence[Mark]) -> list[tuple[str, np.ndarray]]:
+    """(title, (H, W, 3)) of the marks' own photos that can be read."""
+    found = [(mark, photo_pixels(mark.photo)) for mark in marks if mark.photo]
+    return [
+        (f"{mark.name}: {mark.note}" if mark.note else mark.name, pixels)
+        for mark, pixels in found
+        if pixels is not None
+    ]
 
 
 def settings_rows(
@@ -228,23 +244,30 @@ def html_of(report: InspectionReport, cameras_name: str) -> str:
 
 def html_of_view(view: ReportView) -> list[str]:
     """One view: pictures, table, sentences, profiles."""
-    parts = [f'<h2>{text_of(view.title)}</h2><div class="row">']
-    for title, picture in view.pictures:
-        data = base64.b64encode(png_bytes(picture)).decode()
-        name = text_of(title)
-        source = f'<img alt="{name}" src="data:image/png;base64,{data}">'
-        wide = picture.shape[1] / picture.shape[0]  # so all of a row are equally high
-        flex = f"flex: {wide:.3f} 1 {240 * wide:.0f}px"
-        caption = f"<figcaption>{name}</figcaption>"
-        parts.append(f'<figure style="{flex}">{source}{caption}</figure>')
-    parts.append("</div>")
+    parts = [f"<h2>{text_of(view.title)}</h2>", *html_figures(view.pictures)]
     if view.rows:
         parts += html_table("Marks", COLUMNS, view.rows)
     parts += [f"<p>{text_of(note)}</p>" for note in view.notes]
+    if view.photos:
+        parts += html_figures(view.photos, SMALL_PX)
     parts.append("<p>" + "<br>".join(map(text_of, view.lines)) + "</p>")
     for profile in view.profiles:
         parts.append(f"<h2>Profile of {text_of(profile.name)}</h2>{profile_svg(profile)}")
     return parts
+
+
+def html_figures(pictures: Sequence[tuple[str, np.ndarray]], most_px: int = 10_000) -> list[str]:
+    """Pictures in a row, equally high, each with its title; most_px: none becomes wider."""
+    parts = ['<div class="row">']
+    for title, picture in pictures:
+        data = base64.b64encode(png_bytes(picture)).decode()
+        name = text_of(title)
+        source = f'<img alt="{name}" src="data:image/png;base64,{data}">'
+        wide = picture.shape[1] / picture.shape[0]
+        flex = f"flex: {wide:.3f} 1 {240 * wide:.0f}px; max-width: {most_px}px"
+        caption = f"<figcaption>{name}</figcaption>"
+        parts.append(f'<figure style="{flex}">{source}{caption}</figure>')
+    return [*parts, "</div>"]
 
 
 def html_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> list[str]:

@@ -30,6 +30,8 @@ COLUMN_STARTS = (0.0, 0.17, 0.26, 0.36, 0.46, 0.56, 0.66, 0.76)  # of the text's
 SHORTEST = 18  # letters of a name in the table
 BETWEEN = 0.02  # of the page, from one picture to the next
 TALLEST = 0.24  # of the page: a picture
+SMALLER = 0.14  # of the page: a mark's own photo
+PHOTOS_A_ROW = 2
 
 
 class ReportPages:
@@ -129,6 +131,8 @@ def write_view(view: ReportView, pages: ReportPages) -> None:
     pages.gap()
     for first in range(0, len(view.rows), ROWS):
         write_table(view.rows[first : first + ROWS], pages)
+    for first in range(0, len(view.photos), PHOTOS_A_ROW):
+        write_pictures(view.photos[first : first + PHOTOS_A_ROW], pages, SMALLER)
     for profile in view.profiles:
         height = 0.11
         figure = pages.room(height + 0.06)
@@ -143,13 +147,15 @@ def write_view(view: ReportView, pages: ReportPages) -> None:
         pages.y -= height + 0.045
 
 
-def write_pictures(pictures: Sequence[tuple[str, np.ndarray]], pages: ReportPages) -> None:
+def write_pictures(
+    pictures: Sequence[tuple[str, np.ndarray]], pages: ReportPages, tallest: float = TALLEST
+) -> None:
     """Two in a row, equally high; a third below."""
     for first in range(0, len(pictures), 2):
         pair = pictures[first : first + 2]
         shapes = [picture.shape[1] / picture.shape[0] for _, picture in pair]
         most = RIGHT - LEFT - BETWEEN * (len(pair) - 1)
-        tall = min(most * A4[0] / sum(shapes), TALLEST * A4[1]) / A4[1]  # of the page
+        tall = min(most * A4[0] / sum(shapes), tallest * A4[1]) / A4[1]  # of the page
         figure = pages.room(tall + 0.03)
         left = LEFT
         for (title, picture), shape in zip(pair, shapes, strict=True):

@@ -100,6 +100,10 @@ class Options(ReadingOptions):
     """Another file of marks.  Default: NAME.marks.json beside the scene."""
     forget: Annotated[tuple[str, ...], Opt(metavar="NAME")] = ()
     """Leave these marks of the file out.  Default: none."""
+    remark: Annotated[tuple[str, ...], Opt(metavar="NAME=TEXT")] = ()
+    """A note of a mark, for tables and reports.  Default: as the file of marks has them."""
+    mark_photo: Annotated[tuple[str, ...], Opt(metavar="NAME=FILE")] = ()
+    """A photo of what a mark is at, for reports; it is kept small.  Default: as in the file."""
     capture: Path | None = None
     """The photos that the scene was trained on: the held-out ones give the stated error.
     Default: the error that the file of marks has, else none is stated."""
@@ -143,6 +147,7 @@ def run(options: Options) -> int:
     from shapeshift.app.inspection.emission_options import choose_emission, with_emissivities
     from shapeshift.app.inspection.held_out import held_out_error
     from shapeshift.app.inspection.inspect_view import inspect_view, with_readings
+    from shapeshift.app.inspection.mark_options import with_remarks
     from shapeshift.app.inspection.outputs import print_readings, write_picture, write_tables
     from shapeshift.app.opening import open_capture
     from shapeshift.app.progress import tracked
@@ -168,6 +173,7 @@ def run(options: Options) -> int:
             for view in tracked(views, "measuring")
         ]
         file = with_emissivities(with_new_marks(options, file, shown[0], document), own)
+        file = with_remarks(file, options.remark, options.mark_photo)
         if capture is not None:
             error = held_out_error(renderer, thermal, document, capture)
             file = replace(file, held_out=error)

@@ -88,7 +88,10 @@ class LevelMeter:
                 return found
         return None
 
-    def close(self) -> None:
+    def __enter__(self) -> "LevelMeter":
+        return self
+
+    def __exit__(self, *failure) -> None:
         self.renderer.close()
 
 

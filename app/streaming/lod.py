@@ -18,7 +18,7 @@ LEAST_LEAF = 64  # splats: of smaller ones the tree would take more bytes than t
 MOST_LEAF = 1 << 19  # a leaf lies in one file
 BAKED = 0.2  # of the time
 WHERE = {"stops": "at stops", "between": "between them"}
-PACKAGE_LEVELS = ".lod"  # the ending of a folder with levels of a package
+PACKAGE_LEVELS = ".lod"  # as level_files.py has it, which is loaded when it is asked for
 
 
 @dataclass(frozen=True)
@@ -87,22 +87,30 @@ def write_package_levels(options: Options) -> int:
     from shapeshift.app.commands.exported import check_output
     from shapeshift.app.errors import UsageError
     from shapeshift.app.opening import open_model
-    from shapeshift.app.streaming.package_levels import make_levels, refuse_other, write_made
+    from shapeshift.app.streaming.package_levels import (
+        make_levels,
+        refuse_foreign_folder,
+        refuse_other,
+        write_made,
+    )
 
     if not 0 <= options.distill < math.inf:
         raise UsageError(f"--distill is {options.distill}, expected processor seconds, 0 or more.")
     if options.x:
         raise UsageError("--x is of streamed SOG; levels of a package follow x, leave it out.")
     check_output(options.out, [options.scene], options.overwrite)
+    refuse_foreign_folder(options.out)
     start = process_time()
     model = refuse_other(open_model(options.scene, options), options.scene)
     with progress_after(PATIENCE_S) as progress:
         made = make_levels(model, options.distill, progress)
     size = write_made(made, options.scene, options.out)
-    for level, errors, steps in zip(made.model.coarser, made.errors, made.steps, strict=True):
+    for level in made.levels:
+        errors, steps = level.errors, level.steps
+        assert errors is not None, "levels that are good nowhere are left out"
         db = ", ".join(f"{value:.1f} dB {WHERE[at]}" for at, value in errors.db.items())
         say(
-            f"{len(level.anchors):,} anchors where the scene is up to {level.from_pixels:.0f} "
+            f"{len(level.anchors.anchors):,} anchors where the scene is up to {errors.pixels:.0f} "
             f"pixels across: {db}, a switch changes its pixels by {errors.change:.1f}/255 in the "
             f"mean ({steps:,} steps)."
         )

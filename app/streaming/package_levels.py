@@ -41,73 +41,73 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
+class MadeLevel:
+    """A coarser level as it is stored, and what it is like."""
+
+    table: bytes
+    anchors: CoarserAnchors
+    errors: LevelErrors | None  # None: it is good at no size
+    steps: int  # that it has learned
+
+
+@dataclass(frozen=True)
 class MadeLevels:
-    """A package with its coarser levels, and what they are like."""
+    """A package with its coarser levels."""
 
     model: AnchorModel
-    tables: tuple[bytes, ...]
-    errors: tuple[LevelErrors, ...]
-    steps: tuple[int, ...]  # that each has learned
-    left_out: tuple[int, ...]  # anchors of those that are good at no size
+    levels: tuple[MadeLevel, ...]  # that are good somewhere
+    left_out: tuple[int, ...]  # anchors of those that are not
 
 
 def make_levels(model: AnchorModel, seconds: float, progress: Progress) -> MadeLevels:
     """The levels of a package, which learn for so many processor seconds.  Raises BadFile."""
-    made, tables, found, steps, left_out = [], [], [], [], []
-    meter = LevelMeter(model)
-    try:
-        before = meter.model
+    with LevelMeter(model) as meter:
+        made: list[MadeLevel] = []
         for number, share in enumerate(SHARES):
-            done = sum(SECONDS[:number])
-            if share * len(model.anchors) < LEAST_ANCHORS:
-                break
-
-            def report(
-                part: float,
-                number: int = number,
-                before: float = done,
-                own: float = SECONDS[number],
-            ) -> None:
-                progress(f"level {number + 1} learns", (1 - MEASURING) * (before + own * part))
-
-            level, count = learned_level(
-                meter, share, SIZES_PX[number], (seconds * SECONDS[number], report)
-            )
-            table = level_table(level)
-            read = read_level(table, model, f"level {number + 1}")
-            stored = standing(model, read)
-            below = LARGER * SIZES_PX[number]
-            if found:
-                below = min(below, found[-1].pixels / APART)
-            progress(f"level {number + 1} is measured", 1 - MEASURING + MEASURING * done)
-            errors = meter.largest_good(stored, before, below)
-            if errors is None:
-                left_out.append(len(level.anchors))
-                continue
-            cell = cell_for(model, share)
-            made.append(replace(read, cell_m=cell, from_pixels=errors.pixels, error_db=errors.db))
-            tables.append(table)
-            found.append(errors)
-            steps.append(count)
-            before = stored
-    finally:
-        meter.close()
+            if share * len(model.anchors) >= LEAST_ANCHORS:
+                good = [each for each in made if each.errors is not None]
+                made.append(make_level(meter, number, good[-1:], seconds, progress))
+    good = [each for each in made if each.errors is not None]
+    left_out = tuple(len(each.anchors.anchors) for each in made if each.errors is None)
     return MadeLevels(
-        model.with_coarser(tuple(made)), tuple(tables), tuple(found), tuple(steps), tuple(left_out)
+        model.with_coarser(tuple(each.anchors for each in good)), tuple(good), left_out
     )
 
 
-def learned_level(
-    meter: LevelMeter, share: float, pixels: float, how: tuple[float, Callable[[float], None]]
-) -> tuple[AnchorModel, int]:
-    """A level with about that share of the anchors, and how many steps it has learned, in so many
-    processor seconds.
-    """
+def make_level(
+    meter: LevelMeter, number: int, before: list[MadeLevel], seconds: float, progress: Progress
+) -> MadeLevel:
+    """Level `number` + 1; before: the last good one, where there is any."""
+    done, own = sum(SECONDS[:number]), SECONDS[number]
+
+    def report(part: float) -> None:
+        progress(f"level {number + 1} learns", (1 - MEASURING) * (done + own * part))
+
+    cell = cell_for(meter.model, SHARES[number])
+    coarse = average_anchors(meter.model, cell)
+    level, steps = learned(meter, coarse, SIZES_PX[number], (seconds * own, report))
+    table = level_table(level)
+    stored = read_level(table, meter.model, f"level {number + 1}")
+    progress(f"level {number + 1} is measured", 1 - MEASURING + MEASURING * done)
+    last, first_size = meter.model, LARGER * SIZES_PX[number]
+    for one in before:
+        last = standing(meter.model, one.anchors)
+        first_size = min(first_size, one.anchors.from_pixels / APART)
+    errors = meter.largest_good(standing(meter.model, stored), last, first_size)
+    if errors is not None:
+        stored = replace(stored, from_pixels=errors.pixels, error_db=errors.db)
+    return MadeLevel(table, replace(stored, cell_m=cell), errors, steps)
+
+
+def learned(
+    meter: LevelMeter, coarse: AnchorModel, pixels: float,
+    how: tuple[float, Callable[[float], None]],
+) -> tuple[AnchorModel, int]:  # fmt: skip
+    """A level that is meant for that size, after so many processor seconds, and its steps."""
     from shapeshift.rasterizer.device import open_device
     from shapeshift.training.lod.distill import distill
 
     seconds, progress = how
-    coarse = average_anchors(meter.model, cell_for(meter.model, share))
     views = learning_views(meter, pixels)
     return distill(open_device(), meter.model, coarse, views, seconds, progress)
 
@@ -151,6 +151,12 @@ def refuse_other(model: Model, path: Path) -> AnchorModel:
     return model
 
 
+def refuse_foreign_folder(out: Path) -> None:
+    """UsageError where a folder that is not of levels, and not empty, would be lost."""
+    if out.is_dir() and not is_levels(out) and any(out.iterdir()):
+        raise UsageError(f"--out {out} is no folder of levels; choose another name.")
+
+
 def package_bytes(path: Path) -> bytes:
     """The package as one file: as it is, or a folder's files zipped.  Raises BadFile."""
     if path.is_file() and path.name != MANIFEST:
@@ -171,4 +177,5 @@ def write_made(made: MadeLevels, source: Path, out: Path) -> int:
             f"{source}: no coarser level is good enough at any size (tried: {counts} anchors); let "
             "them learn longer with --distill, or show the package as it is."
         )
-    return write_levels(out, package_bytes(source), made.model, made.tables)
+    tables = [each.table for each in made.levels]
+    return write_levels(out, package_bytes(source), made.model, tables)

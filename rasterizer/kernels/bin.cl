@@ -112,10 +112,10 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
 // HIDDEN = 1: tiles whose `shown` (bins,) is 0 get empty lists, whatever touches them.
 #ifdef HIDDEN
 #define AND_SHOWN , __global const uchar* shown
-#define IF_SHOWN(tile, touched) ((touched) & shown[tile])
+#define IF_SHOWN(tile, number) (shown[tile] ? (number) : 0)
 #else
 #define AND_SHOWN
-#define IF_SHOWN(tile, touched) (touched)
+#define IF_SHOWN(tile, number) (number)
 #endif
 
 // One row of a tile mask, at the row's first tile: ones where its tiles begin, taken back behind

@@ -16,8 +16,9 @@ __kernel void project(int count, int width, int height, float near, float min_al
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
   // The steps of the paper: R, M = W R S, J, Sigma' = (J M)(J M)^T + low pass.
-  const Splat s = project_splat(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
-                        LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, low_pass);
+  const floatn4 q = LOAD4(wxyz, 4, 0);
+  const Splat s =
+      project_splat(LOAD3(means), LOAD3(scales), q.x, q.y, q.z, q.w, camera, low_pass);
   const floatn alpha = LOAD(opacity, 1, 0);
   const floatn3 rgb = LOAD3(color);
   // alpha(d) = o exp(-power / 2) >= min_alpha  <=>  power <= 2 ln(o / min_alpha), the threshold;
@@ -37,19 +38,16 @@ __kernel void project(int count, int width, int height, float near, float min_al
   // A culled splat's record is all zeros with extents of -1: raster never meets it, and its
   // gradients are zero.
   const floatn none = 0, culled = -1, far = CULLED_DEPTH;
-  STORE(record, RECORD, MEAN_X, select(none, x, seen));
-  STORE(record, RECORD, MEAN_Y, select(none, y, seen));
-  // The inverse of [a b; b c] is [c -b; -b a] / determinant.
-  STORE(record, RECORD, CONIC_A, select(none, s.c * per, seen));
-  STORE(record, RECORD, CONIC_B, select(none, -s.b * per, seen));
-  STORE(record, RECORD, CONIC_C, select(none, s.a * per, seen));
-  STORE(record, RECORD, OPACITY, select(none, alpha, seen));
-  STORE(record, RECORD, RED, select(none, rgb.x, seen));
-  STORE(record, RECORD, GREEN, select(none, rgb.y, seen));
-  STORE(record, RECORD, BLUE, select(none, rgb.z, seen));
-  STORE(record, RECORD, EXTENT_X, select(culled, half_x, seen));
-  STORE(record, RECORD, EXTENT_Y, select(culled, half_y, seen));
-  STORE(record, RECORD, POWER_THRESHOLD, select(none, power_threshold, seen));
+  // Its twelve columns in three parts, in the order of record.cl: mean and conic, of which
+  // the inverse of [a b; b c] is [c -b; -b a] / determinant,
+  STORE4(record, RECORD, MEAN_X, select(none, x, seen), select(none, y, seen),
+         select(none, s.c * per, seen), select(none, -s.b * per, seen));
+  // the conic's end, opacity and colour,
+  STORE4(record, RECORD, CONIC_C, select(none, s.a * per, seen), select(none, alpha, seen),
+         select(none, rgb.x, seen), select(none, rgb.y, seen));
+  // and how far the splat reaches.
+  STORE4(record, RECORD, BLUE, select(none, rgb.z, seen), select(culled, half_x, seen),
+         select(culled, half_y, seen), select(none, power_threshold, seen));
   STORE(depth, 1, 0, select(far, s.p.z, seen));
 }
 
@@ -62,20 +60,24 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
   // Computed again: cheaper than to store it between the passes.
-  const Splat s = project_splat(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
-                        LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, low_pass);
+  const floatn4 q = LOAD4(wxyz, 4, 0);
+  const Splat s =
+      project_splat(LOAD3(means), LOAD3(scales), q.x, q.y, q.z, q.w, camera, low_pass);
   const intn seen = LOAD(record, RECORD, EXTENT_X) > 0;
   const floatn none = 0;
-#define GRAD(column) LOAD(grad_record, RECORD, column)
+  // What of a record and of its gradient is needed, in the order of record.cl.
+  const floatn4 from_mean = LOAD4(record, RECORD, MEAN_X);
+  const floatn4 by_mean = LOAD4(grad_record, RECORD, MEAN_X);
+  const floatn4 by_conic_c = LOAD4(grad_record, RECORD, CONIC_C);
 #define KEEP(value) select(none, value, seen)  // a culled splat's may be NaN
   // Opacity and colour go through projection unchanged.
-  STORE(grad_opacity, 1, 0, KEEP(GRAD(OPACITY)));
-  STORE3(grad_color, make3(KEEP(GRAD(RED)), KEEP(GRAD(GREEN)), KEEP(GRAD(BLUE))));
+  STORE(grad_opacity, 1, 0, KEEP(by_conic_c.y));
+  STORE3(grad_color, make3(KEEP(by_conic_c.z), KEEP(by_conic_c.w),
+                           KEEP(LOAD(grad_record, RECORD, BLUE))));
 
   // conic Q = Sigma'^-1, so dSigma' = -Q dQ Q (the off-diagonal entry counts twice).
-  const floatn A = LOAD(record, RECORD, CONIC_A), B = LOAD(record, RECORD, CONIC_B);
-  const floatn C = LOAD(record, RECORD, CONIC_C);
-  const floatn gA = GRAD(CONIC_A), gB = GRAD(CONIC_B), gC = GRAD(CONIC_C);
+  const floatn A = from_mean.z, B = from_mean.w, C = LOAD(record, RECORD, CONIC_C);
+  const floatn gA = by_mean.z, gB = by_mean.w, gC = by_conic_c.x;
   const floatn xx = A * gA + 0.5f * B * gB, xy = 0.5f * A * gB + B * gC;
   const floatn yx = B * gA + 0.5f * C * gB, yy = 0.5f * B * gB + C * gC;
   // b stands twice in Sigma', so its gradient is that of both.
@@ -93,7 +95,8 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
   rotation_scale_backward(&s, camera, scale3(s.j00, gx), scale3(s.j11, gy),
                 blend3(s.j02, gx, s.j12, gy), &grad_scale, grad_q);
   STORE3(grad_scales, make3(KEEP(grad_scale.x), KEEP(grad_scale.y), KEEP(grad_scale.z)));
-  for (int k = 0; k < 4; k++) STORE(grad_wxyz, 4, k, KEEP(grad_q[k]));
+  // Of the quaternion as it was given, of any length.
+  STORE4(grad_wxyz, 4, 0, KEEP(grad_q[0]), KEEP(grad_q[1]), KEEP(grad_q[2]), KEEP(grad_q[3]));
 
   // The mean acts through x = fx X/Z + cx, through j00 = fx/Z and through j02 = -fx/Z tan_x, where
   // tan_x = X/Z unless it is held; the low pass is a constant.
@@ -102,7 +105,7 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
   const intn free_y = (ty > camera[MIN_TAN_Y]) & (ty < camera[MAX_TAN_Y]);
   const floatn along_x = select(none, -grad_j02 * s.j00 * s.inv_z, free_x);
   const floatn along_y = select(none, -grad_j12 * s.j11 * s.inv_z, free_y);
-  const floatn mean_x = GRAD(MEAN_X) * s.j00, mean_y = GRAD(MEAN_Y) * s.j11;
+  const floatn mean_x = by_mean.x * s.j00, mean_y = by_mean.y * s.j11;
   const floatn px = mean_x + along_x, py = mean_y + along_y;
   // All of J's entries fall as 1/Z.
   const floatn jacobian =

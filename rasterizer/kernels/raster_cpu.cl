@@ -51,7 +51,7 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
   }
   Batch batch;
   uint open = ALL_BLOCKS;
-  int p = tile_start[tile];
+  int p = tile_start[tile];  // the next intersection, near to far
   const int end = tile_start[tile + 1];
   while (p < end && open) {
     const int n = fetch(p, end, x0, y0, intersections, record, &batch);
@@ -89,7 +89,7 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
       }
     }
     p += n;
-    open = still_open(open, T);
+    open = still_open(open, T);  // what is opaque takes no part in the next batch
   }
   // The backward pass stops at the same intersection.
   tile_end[tile] = p;

@@ -10,10 +10,13 @@ import numpy as np
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.fovea.foveate import rasterize_foveated
+from shapeshift.rasterizer.heat import compile_heat
 from shapeshift.rasterizer.project import Projected
-from shapeshift.rasterizer.raster import rasterize_with_heat
+from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
+from shapeshift.renderer.colors.false_colors import has_heat
 from shapeshift.renderer.foveation import foveas_of
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import Model
 from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
@@ -40,3 +43,12 @@ def say_whole() -> None:
     logging.getLogger("renderer").warning(
         "tiles on an OpenCL GPU are drawn in all pixels, whatever foveation says; quads follow it."
     )
+
+
+def compile_for_heat(device: Device, models: list[Model]) -> None:
+    """What the first frame of models with heat would compile, now."""
+    counts = {m.splat_count for m in models if m.splat_count and has_heat(m)}
+    if counts:
+        for count in {min(counts), max(counts)}:
+            compile_heat(device, count)
+        compile_with_heat(device, min_transmittance=RenderSettings().min_transmittance)

@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 RESTS = 4  # frames with the same splats before boxes are made: these cost as one projection
-LEAST_SHARE = 1 / 16  # of the clusters: fewer are not worth the question
+LEAST_SPLATS = 1 << 16  # left out: to ask takes as long as to project a third of them
 PAUSE = 8  # frames until it is asked again
-LEAST_CLUSTERS = 16
 
 
 class Culling:
@@ -53,7 +52,7 @@ class Culling:
             self.forget()
         self._rested += 1
         due = self._clusters is None and self._rested > RESTS
-        if due and arena[0].shape[0] >= LEAST_CLUSTERS * CLUSTER:
+        if due and arena[0].shape[0] >= LEAST_SPLATS:
             self._clusters = bound_clusters(device, *arena, least)
 
     def note(self, device: Device, unseen: "Array | None") -> None:
@@ -61,7 +60,7 @@ class Culling:
         self.left_out = None
         if unseen is not None:
             self.left_out = int(np.count_nonzero(device.view(unseen)))
-            if self.left_out < LEAST_SHARE * unseen.shape[0]:
+            if self.left_out * CLUSTER < LEAST_SPLATS:
                 self._paused = PAUSE
 
     def seen_rows(

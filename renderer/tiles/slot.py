@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.pack import pack_color
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
+from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.tiles.heads import BlockHeads, ModelHeads, uncovered
 from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
@@ -63,6 +64,10 @@ class Slot:
         self._kept = ColorMemory(self.decoding.heads or self.decoding.evaluator)
 
     @property
+    def model(self) -> Model:
+        return self.decoding.evaluator.model
+
+    @property
     def rows(self) -> slice:
         return slice(self.start, self.start + self.count)
 
@@ -91,3 +96,22 @@ class Slot:
         """Drops the parts of a set that have a higher number: they are mixed in no more."""
         self._colors.forget_after(which, number)
         self._kept.forget_after(which, number)
+
+
+def slots_of(
+    device: Device, models: list[Model], mlps: str, known: dict[int, Decoding]
+) -> tuple[list[Slot], dict[int, Decoding]]:
+    """One after the other, and what decodes each model, by its id; `known` is gone on with."""
+    made = dict(known)
+    for model in models:
+        if id(model) not in made:
+            made[id(model)] = decoding_of(device, model, mlps)
+    counts = [arena_rows(model) for model in models]
+    rows = zip(np.cumsum([0, *counts]), counts, models, strict=False)
+    return [Slot(int(start), count, made[id(m)]) for start, count, m in rows], made
+
+
+def run_by(mlps: str, slots: list[Slot]) -> str:
+    """Who runs the networks, in words."""
+    others = dict.fromkeys(slot.decoding.instead for slot in slots if slot.decoding.instead)
+    return ", ".join([mlps, *others])

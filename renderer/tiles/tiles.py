@@ -14,23 +14,22 @@ from shapeshift.rasterizer.bin import Tiles, bin_tiles, sort_order
 from shapeshift.rasterizer.clusters.clusters import Clusters
 from shapeshift.rasterizer.device import Device, open_device
 from shapeshift.rasterizer.grade import grade_color
-from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
+from shapeshift.rasterizer.heat import add_heat, blend_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
 from shapeshift.rasterizer.project import CULL_REASONS, Projected
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
-from shapeshift.rasterizer.raster import compile_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.splat_edges import draw_edges
-from shapeshift.renderer.colors.false_colors import Shade, has_heat
+from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.limits import arena_rows, check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
-from shapeshift.renderer.tiles.blend import blend_views
+from shapeshift.renderer.tiles.blend import blend_views, compile_for_heat
 from shapeshift.renderer.tiles.culling import Culling
 from shapeshift.renderer.tiles.depth import blend_depth, depth_pictures, surface_picture
 from shapeshift.renderer.tiles.inputs import (
@@ -41,7 +40,8 @@ from shapeshift.renderer.tiles.inputs import (
     read_rows,
     write_rows,
 )
-from shapeshift.renderer.tiles.slot import Slot, decoding_of
+from shapeshift.renderer.tiles.keep_rows import keep_rows
+from shapeshift.renderer.tiles.slot import Decoding, Slot, run_by, slots_of
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import only_fades
 from shapeshift.runtime_models.model import Model, is_antialiased
@@ -70,6 +70,8 @@ class TilesDrawing(Drawing):
         }
         self.allocations = 0  # how often the arena was made: once for each set of objects
         self._slots: list[Slot] = []
+        self._decodings: dict[int, Decoding] = {}
+        self._known: dict[int, Decoding] = {}  # of models that were drawn before and may be again
         self._images: dict[int, np.ndarray] = {}
         self._projected: list[Projected] = []
         self._rooms: dict[int, list[Projected]] = {}  # arrays of projection, kept between frames
@@ -83,12 +85,24 @@ class TilesDrawing(Drawing):
         self._heat_images: dict[int, np.ndarray] = {}
         self._depths: dict[int, np.ndarray] = {}
 
+    def exchange(self, models: list[Model]) -> list[bool]:
+        arena, slots, self._known = self._tables(), self._slots, self._decodings
+        self.allocate(models)
+        self._known = {}
+        self._colors = [self.device.zeros((self.splats, 4)) for _ in arena[1]]
+        self._heats = [h if h is None else self.device.zeros((self.splats, 4)) for h in arena[2]]
+        self._color = self._colors[0]
+        tables = [*zip(arena, self._tables(), strict=True)]
+        return keep_rows(self.device, slots, self._slots, tables)
+
+    def _tables(self) -> tuple[list, list, list]:
+        return [self._mean_opacity, self._covariance], self._colors, self._heats
+
     def allocate(self, models: list[Model], more: int = 0) -> None:
         """more: rows behind those of the objects."""
         check_tiles(self.device, models, more)
         counts = [arena_rows(model) for model in models]
-        starts = np.concatenate([[0], np.cumsum(counts, dtype=int)])
-        self.splats = int(starts[-1]) + more
+        self.splats = sum(counts) + more
         self.allocations += 1
         device = self.device
         self._projected, self._rooms, self._orders = [], {}, []
@@ -101,25 +115,14 @@ class TilesDrawing(Drawing):
         self._antialiased = tuple(map(is_antialiased, models))
         index = np.repeat(np.arange(len(models), dtype=np.int32), counts)
         self._object_index = device.upload(np.pad(index, (0, more)))
-        made = {id(model): decoding_of(device, model, self._mlps) for model in models}
-        self._slots = [
-            Slot(int(start), n, made[id(model)])
-            for start, n, model in zip(starts, counts, models, strict=False)
-        ]
-        others = dict.fromkeys(each.instead for each in made.values() if each.instead)
-        self.backends["mlps"] = ", ".join([self._mlps, *others])
-        if with_heat := {m.splat_count for m in models if m.splat_count and has_heat(m)}:
-            for count in {min(with_heat), max(with_heat)}:
-                compile_heat(device, count)
-            compile_with_heat(device, min_transmittance=RenderSettings().min_transmittance)
+        self._slots, self._decodings = slots_of(device, models, self._mlps, self._known)
+        self.backends["mlps"] = run_by(self._mlps, self._slots)
+        compile_for_heat(device, models)
 
     def decode_geometry(
-        self,
-        i: int,
-        x: Controls,
-        eye_object: np.ndarray | None = None,
+        self, i: int, x: Controls, eye_object: np.ndarray | None = None,
         seen: np.ndarray | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         slot = self._slots[i]
         heads, evaluator = slot.decoding.heads, slot.decoding.evaluator
         arena = (self._mean_opacity, self._covariance)
@@ -144,14 +147,9 @@ class TilesDrawing(Drawing):
         self._color, self._set = self._colors[which], which
 
     def decode_color(
-        self,
-        i: int,
-        shade: Shade,
-        eye_object: np.ndarray,
-        seen: np.ndarray | None = None,
-        at_once: bool = False,
-        grade: Appearance | None = None,
-    ) -> None:
+        self, i: int, shade: Shade, eye_object: np.ndarray, seen: np.ndarray | None = None,
+        at_once: bool = False, grade: Appearance | None = None,
+    ) -> None:  # fmt: skip
         slot = self._slots[i]
         rows = slot.rows
         if self._heats[self._set] is None and shade.heats:

@@ -24,6 +24,7 @@ from shapeshift.runtime_models.package.read_package import (
 from shapeshift.runtime_models.splats.plain_splats import Reading
 
 LEVELS = "lod.json"
+ENDING = ".lod"  # of the folder
 FORMAT = "shapeshift-lod 1"
 PACKAGE = "scene.shift"  # what `write_levels` calls the package
 LARGEST_LIST = 1 << 20  # bytes
@@ -97,9 +98,10 @@ def read_rows(folder: Path) -> list[LevelRow]:
     rows: list[LevelRow] = []
     for number, fields in enumerate(top.rows("levels", MOST_LEVELS, "level", first=0)):
         file = level_file(folder, fields)
-        counts = [fields.count(name, 1, MOST_COUNT) for name in ("anchors", "splats")]
+        anchors = fields.count("anchors", 1, MOST_COUNT)
+        splats = fields.count("splats", 1, MOST_COUNT)
         if not number:
-            rows.append(LevelRow(file, *counts))
+            rows.append(LevelRow(file, anchors, splats))
             continue
         least = "a number above 0"
         cell = fields.number("voxel", wanted=least, low=1e-30)
@@ -109,7 +111,7 @@ def read_rows(folder: Path) -> list[LevelRow]:
             raise fields.error(
                 "from_pixels", f"a number below {before.from_pixels:g}, as before it"
             )
-        rows.append(LevelRow(file, *counts, cell, pixels, read_errors(fields)))
+        rows.append(LevelRow(file, anchors, splats, cell, pixels, read_errors(fields)))
     if not rows:
         raise top.error("levels", "a list of the package and its coarser levels")
     if len({row.file for row in rows}) < len(rows):

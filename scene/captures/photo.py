@@ -15,7 +15,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lens_resampling import LARGEST, resampled
-from shapeshift.scene.captures.number_photos import (
+from shapeshift.scene.captures.radiometric.number_photos import (
     GRIDS,
     is_radiometric,
     open_grid,

@@ -8,8 +8,11 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.number_photos import can_read_radiometric, is_radiometric
 from shapeshift.scene.captures.photo import FLOATS, GREY_16, numbers_of, open_image
+from shapeshift.scene.captures.radiometric.number_photos import (
+    cannot_read_radiometric,
+    is_radiometric,
+)
 
 LOOKED_AT = 24  # photos of a modality
 PERCENTILES = (0.1, 99.9)  # between which the range begins; a dead pixel is beyond
@@ -29,10 +32,11 @@ def with_own_ranges(
     for stop in stops:
         mine = [photo for photo in photos if photo.modality == stop.name]
         kind = _kind(mine) if stop.kind == "thermal" else ""
-        if kind == "radiometric" and not can_read_radiometric():
+        missing = cannot_read_radiometric(mine[0].path) if kind == "radiometric" else ""
+        if missing:
             doubts.append(
                 f"The photos of {stop.name} hold temperatures, but only their colours are read; "
-                "for degrees: pip install flyr."
+                f"{missing}."
             )
             kind = ""
         if not kind or (kind == "counts" and stop.value_range is not None):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.number_photos import is_radiometric, read_radiometric
+from shapeshift.scene.captures.radiometric.number_photos import is_radiometric, read_radiometric
 from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import ZERO_C, SurfaceRadiation
 

@@ -37,6 +37,7 @@ class Mark:
     radius_m: float = 0.0  # of a circle
     note: str = ""
     emissivity: float | None = None  # of its surface; None: as the picture has it
+    photo: bytes = b""  # a small JPEG of it, for reports
 
     def __post_init__(self) -> None:
         """Refuses what is none: ValueError, one sentence."""

@@ -26,6 +26,7 @@ from shapeshift.scene.inspection.length_marks import (
     read_length,
 )
 from shapeshift.scene.inspection.lengths import Scale
+from shapeshift.scene.inspection.mark_photos import photo_text, read_photo
 from shapeshift.scene.inspection.marks import (
     FARTHEST,
     KINDS,
@@ -145,10 +146,11 @@ def _mark(row: Fields) -> Mark:
     radius = row.number("radius", 0.0, "metres above 0", 0.0, FARTHEST) if kind == "circle" else 0.0
     note = row.line("note", "")
     wanted = f"a number from {LEAST_EMISSIVITY:g} to 1"
+    photo = read_photo(row)
     share = row.number("emissivity", None, wanted, LEAST_EMISSIVITY, 1)
     row.refuse_unknown_keys()
     try:
-        return Mark(name, kind, np.array(points, np.float64), radius, note, share)
+        return Mark(name, kind, np.array(points, np.float64), radius, note, share, photo)
     except ValueError as error:
         raise BadFile(f"{row.where}: {error}") from None
 
@@ -240,6 +242,7 @@ def marks_rows(file: MarksFile) -> dict:
         row["points"] = (np.round(mark.points, DECIMALS) + 0.0).tolist()
         row |= {"radius": round(float(mark.radius_m), 7)} if mark.kind == "circle" else {}
         row |= {"note": mark.note} if mark.note else {}
+        row |= {"photo": photo_text(mark.photo)} if mark.photo else {}
         marks.append(row | ({} if mark.emissivity is None else {"emissivity": mark.emissivity}))
     rows: dict = {MARK: VERSION, "marks": marks}
     rows["differences"] = [{"of": a, "less": b} for a, b in file.differences]

@@ -155,6 +155,22 @@ def test_both_forms_agree_record_by_record():
         assert error <= 1e-5, slot
 
 
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 16, 17])
+def test_the_last_few_splats_project_as_in_a_longer_list(count):
+    """Eight lie in a vector; what is left is read and written by itself, to the same bits."""
+    d, camera = device(), off_centre_camera((90, 70))
+    splats = random_splats(24, seed=3)
+    grad = np.random.default_rng(2).normal(size=(24, 12)).astype(np.float32)
+    found = []
+    for n in (24, count):
+        arrays = upload([a[:n] for a in splats])
+        projected = project(d, *arrays, camera)
+        back = project_backward(d, *arrays, camera, projected, d.upload(grad[:n]))
+        found.append([d.download(a) for a in (projected.record, projected.depth, *back)])
+    for whole, part in zip(*found, strict=True):
+        np.testing.assert_array_equal(part, whole[:count])
+
+
 @pytest.mark.parametrize("with_depth", [False, True])
 @pytest.mark.parametrize("size", [(90, 70), (16, 16), (17, 1), (3, 33)])
 @pytest.mark.parametrize(("thinner", "bound"), [(0.1, 1e-5), (1.0, 1e-4)])

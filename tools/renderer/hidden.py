@@ -8,8 +8,9 @@ cover as much; "field" is a square of copies.  Views go around it in steps of 1.
 ("near": a sixth of it in view), or turn in the middle of the field.  Each row is one scene, size
 and path: processor ms of whole frames (update and draw), medians over the frames after those in
 which boxes are made, in turns frame by frame between processes: "now", "whole" (nothing is left
-out) and "before".  same_bits: whether all pictures and counts of now and whole are equal to the
-bit; db_before: of the last picture to that of the earlier checkout.
+out) and "before".  Ratios are medians of those of each frame.  same_bits: whether all pictures and
+counts of now and whole are equal to the bit; db_before: of the last picture to that of the earlier
+checkout.
 """
 
 import argparse
@@ -181,7 +182,9 @@ def measure(leg: Path, case: Case, trees: dict[str, Path]) -> str:
     for worker in workers.values():
         worker.stdin.close()
         worker.wait()
-    ms = {n: float(np.median([t["ms"] for t in told[n][WARM_UP:]])) for n in told}
+    frames = {n: np.array([t["ms"] for t in told[n][WARM_UP:]]) for n in told}
+    ms = {n: float(np.median(each)) for n, each in frames.items()}
+    over = {n: f"{np.median(frames['now'] / each):.3f}" for n, each in frames.items()}
     same = all(a["digest"] == b["digest"] for a, b in zip(told["now"], told["whole"], strict=True))
     before, db = ms.get("before"), ""
     if before is not None:
@@ -192,7 +195,7 @@ def measure(leg: Path, case: Case, trees: dict[str, Path]) -> str:
     row = [
         case.scene, told["now"][-1]["splats"], "x".join(map(str, case.size)), case.eyes, case.path,
         f"{ms['now']:.2f}", f"{ms['whole']:.2f}", "" if before is None else f"{before:.2f}",
-        f"{ms['now'] / ms['whole']:.3f}", "" if before is None else f"{ms['now'] / before:.3f}",
+        over["whole"], over.get("before", ""),
         f"{np.mean([t['left'] for t in told['now'][WARM_UP:]]):.2f}", "yes" if same else "NO", db,
     ]  # fmt: skip
     return ",".join(map(str, row))

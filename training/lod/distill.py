@@ -117,7 +117,8 @@ def distill(
     looks = [(v, c) for v in range(len(views)) for c in range(len(controls))]
     pictures: dict[tuple[int, int], Any] = {}
     loss: Any = PictureError(device)
-    steps, done, order = 0, 0.0, []
+    order: list[tuple[int, int]] = []
+    steps, done = 0, 0.0
     while done < 1 and steps < most_steps:
         if not order:
             order = [looks[i] for i in rng.permutation(len(looks))]

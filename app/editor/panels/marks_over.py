@@ -59,10 +59,13 @@ def draw_words(
 
 
 def draw_rubber(kind: str, start: tuple[float, float], end: tuple[float, float]) -> None:
-    """What a drag would lay: a line or a box."""
+    """What a drag would lay: a line, a circle or a box."""
     draw, ink = imgui.get_background_draw_list(), theme.color(theme.ACCENT)
     if kind == "line":
         draw.add_line(Vec(*start), Vec(*end), ink, 2.0)
+    elif kind == "circle":
+        radius = float(np.hypot(end[0] - start[0], end[1] - start[1]))
+        draw.add_circle(Vec(*start), radius, ink, 0, 2.0)
     else:
         draw.add_rect(Vec(*start), Vec(*end), ink, 0, 0, 2.0)
 

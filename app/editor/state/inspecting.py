@@ -19,6 +19,7 @@ from shapeshift.runtime_models.files.plain_text import name_line
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
+from shapeshift.scene.inspection.mark_photos import MOST_OF_ALL, shrunk_photo
 from shapeshift.scene.inspection.marks import (
     MOST_MARKS,
     Bound,
@@ -27,6 +28,7 @@ from shapeshift.scene.inspection.marks import (
     Mark,
     MarkReading,
     box_at,
+    circle_at,
     line_at,
     read_mark,
     spot_at,
@@ -163,6 +165,9 @@ class Inspecting:
                 mark = spot_at(name, picture, start)
             elif kind == "line":
                 mark = line_at(name, picture, np.array([start, end]))
+            elif kind == "circle":
+                radius = float(np.hypot(end[0] - start[0], end[1] - start[1]))
+                mark = circle_at(name, picture, start, radius)
             else:
                 mark = box_at(name, picture, start, end)
         except ValueError as error:
@@ -190,6 +195,51 @@ class Inspecting:
         self.chosen = text if self.chosen == name else self.chosen
         self.edit(replace(self.file, marks=marks, differences=pairs))
         return True
+
+    def mark(self, name: str) -> Mark:
+        """The mark of that name.  KeyError: there is none."""
+        return self.file.named(name)
+
+    def change(self, name: str, changed: Mark) -> None:
+        """Another mark in the place of the one of that name."""
+        marks = tuple(changed if mark.name == name else mark for mark in self.file.marks)
+        self.edit(replace(self.file, marks=marks))
+
+    def write_note(self, name: str, text: str) -> None:
+        """A line about a mark, for tables and reports."""
+        note = name_line(text.strip()) if text.strip() else ""
+        self.change(name, replace(self.mark(name), note=note))
+
+    def attach_photo(self, name: str, path: Path) -> None:
+        """A photo of what a mark is at, for reports; says what stands against it."""
+        try:
+            photo = shrunk_photo(path)
+        except BadFile as error:
+            self.fail(str(error))
+            return
+        if sum(len(mark.photo) for mark in self.file.marks) + len(photo) > MOST_OF_ALL:
+            self.fail(said("The photos of all marks are too many; remove some first."))
+            return
+        self.change(name, replace(self.mark(name), photo=photo))
+        self.note(said("{name} has a photo now, for reports.", name=name))
+
+    def drop_photo(self, name: str) -> None:
+        self.change(name, replace(self.mark(name), photo=b""))
+
+    def less_of(self, name: str) -> str:
+        """The mark whose mean is taken off that of another one; "": none is."""
+        return next((less for of, less in self.file.differences if of == name), "")
+
+    def take_off(self, name: str, less: str) -> None:
+        """The difference of two marks from now on; "": of none."""
+        others = tuple(pair for pair in self.file.differences if pair[0] != name)
+        pairs = (*others, (name, less)) if less else others
+        self.edit(replace(self.file, differences=pairs))
+
+    def difference(self, of: str, less: str) -> float:
+        """Mean less mean, as they are read now; NaN: one of them is not seen."""
+        a, b = self.readings.get(of), self.readings.get(less)
+        return a.mean - b.mean if a is not None and b is not None else np.nan
 
     def isotherm(self, kind: Bound) -> Isotherm | None:
         """The first of that kind."""

@@ -356,3 +356,26 @@ def test_objects_that_mean_another_range_are_refused(wall):
     pair = (SceneObject("a", model), SceneObject("b", other))
     with pytest.raises(UsageError, match="different palettes, ranges or units"):
         thermal_scene(Document(Scene(pair)))
+
+
+def test_marks_have_notes_and_photos_that_go_into_reports(wall, tmp_path, capsys):
+    """Kept by one call, shown by the next, taken away by a third."""
+    photo, marks, report = (tmp_path / name for name in ("a.png", "w.marks.json", "r.html"))
+    Image.new("RGB", (900, 600), (10, 200, 30)).save(photo)
+    common = ("thermal", str(wall), "--marks", str(marks), "--drawing", "tiles", *NO_GL)
+    laid = ("--spot", "pump=320,240", "--remark", "pump=worn = hot", "--mark-photo")
+    assert cli.main([*common, *laid, f"pump={photo}", "--save"]) == 0
+    (mark,) = json.loads(marks.read_text())["marks"]
+    assert mark["note"] == "worn = hot" and len(mark["photo"]) > 100
+    assert cli.main([*common, "--report", str(report), str(report.with_suffix(".pdf"))]) == 0
+    text = report.read_text()
+    assert "pump: worn = hot" in text and text.count("data:image/png") == 3  # and two of the view
+    assert report.with_suffix(".pdf").read_bytes().count(b"/Subtype /Image") >= 3
+    assert cli.main([*common, "--remark", "pump=", "--mark-photo", "pump=", "--save"]) == 0
+    (mark,) = json.loads(marks.read_text())["marks"]
+    assert "note" not in mark and "photo" not in mark
+    capsys.readouterr()
+    for wrong in (("--remark", "fan=x"), ("--mark-photo", "pump"), ("--mark-photo", "pump=no.jpg")):
+        assert cli.main([*common, *wrong]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1 and ("pump" in said or "no.jpg" in said)

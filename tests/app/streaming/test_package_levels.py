@@ -54,12 +54,15 @@ def test_a_package_gets_levels(clumps, tmp_path, capsys, form):
     if form == "file":
         assert (out / "scene.shift").read_bytes() == clumps.read_bytes()
     assert cli.main(words) == 2 and "--overwrite replaces it" in capsys.readouterr().err
+    assert cli.main([*words, "--overwrite"]) == 0 and read_model(out).coarser
     for command in (["info", str(out)], ["lint", str(out), "--json"]):
         assert cli.main(command) == 0
     assert "pixels" in capsys.readouterr().out
     assert cli.main(["export", str(out), "--out", str(tmp_path / "back.shift"), "--no-pace"]) == 0
     assert not read_model(tmp_path / "back.shift").coarser  # the package itself
-    capsys.readouterr()
+    assert "Coarser levels stay behind" in capsys.readouterr().err
+    assert cli.main(["export", str(out), "--out", str(tmp_path / "b.lod")]) == 2
+    assert "written by `launch.py lod`" in capsys.readouterr().err
     again = ["lod", str(out), "--out", str(tmp_path / "b.lod")]
     assert cli.main(again) == 2 and "has levels already" in capsys.readouterr().err
 
@@ -88,6 +91,15 @@ def test_a_scene_file_names_it(clumps, tmp_path):
 def test_options_that_do_not_fit(clumps, tmp_path, capsys, words, said):
     assert cli.main(["lod", str(clumps), "--out", str(tmp_path / "a.lod"), *words]) == 2
     assert said in capsys.readouterr().err and not (tmp_path / "a.lod").exists()
+
+
+def test_what_is_no_folder_of_levels_stays(clumps, tmp_path, capsys):
+    out = tmp_path / "mine.lod"
+    out.mkdir()
+    (out / "diary.txt").write_text("dear")
+    assert cli.main(["lod", str(clumps), "--out", str(out), "--overwrite"]) == 2
+    assert "is no folder of levels" in capsys.readouterr().err
+    assert (out / "diary.txt").read_text() == "dear"
 
 
 def test_splats_and_rough_packages_are_refused(tmp_path, capsys):
@@ -126,9 +138,8 @@ def test_views_show_the_bounds_as_large_as_asked_for(clumps):
     from shapeshift.scene.scene import SceneObject
 
     model = read_package(clumps)
-    meter = LevelMeter(model)
     obj = SceneObject("it", model)
-    for pixels in (12.0, 100.0, 250.0):
-        found = object_pixels(obj, (meter.centre, meter.radius), meter.views(pixels))
-        assert found == pytest.approx(pixels, rel=1e-6)
-    meter.close()
+    with LevelMeter(model) as meter:
+        for pixels in (12.0, 100.0, 250.0):
+            found = object_pixels(obj, (meter.centre, meter.radius), meter.views(pixels))
+            assert found == pytest.approx(pixels, rel=1e-6)

@@ -9,6 +9,7 @@ from shapeshift.renderer.levels import HYSTERESIS, choose_level, object_pixels
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.lod.average_anchors import average_anchors
 from shapeshift.runtime_models.model import CoarserAnchors
+from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject, Tint
 from tests.support.models import make_random_model
@@ -118,3 +119,34 @@ def test_quads_draw_the_same_level(ctx):
         for away, level in ((3.0, 0), (40.0, 2)):
             renderer.update(Scene((placed(model),)))
             assert renderer.draw([view_of(away)]).splats == 5 * len(model.levels[level].anchors)
+
+
+def test_a_switch_leaves_other_objects_decoded():
+    model, other = leveled(100), make_random_model(50, seed=2)
+    scene = Scene((placed(other, (1, 0, 0)), placed(model, x=0.3), placed(other, (-1, 0, 0))))
+    with Renderer(None, "tiles") as renderer, Renderer(None, "tiles") as fresh:
+        # The first frame decodes all; later ones the object that has another level.
+        for away, level, runs in ((40.0, 2, 3), (9.0, 1, 1), (3.0, 0, 1), (40.0, 2, 1)):
+            renderer.update(scene)
+            stats = renderer.draw([view_of(away), view_of(away, 0.06)])
+            assert (renderer.levels.levels, stats.geometry_runs) == ((0, level, 0), runs)
+            whole = Scene((scene.objects[0], placed(model.levels[level], x=0.3), scene.objects[2]))
+            fresh.update(whole)
+            fresh.draw([view_of(away), view_of(away, 0.06)])
+            for eye in range(2):
+                np.testing.assert_array_equal(renderer.image(eye), fresh.image(eye))
+
+
+def test_cut_and_faint_objects_stay_so_through_a_switch():
+    model = leveled(100)
+    faint = Appearance(opacity=0.5)
+    still = placed(make_random_model(50, seed=2), (1, 0, 0), appearance=faint)
+    with Renderer(None, "tiles") as renderer, Renderer(None, "tiles") as fresh:
+        for away in (9.0, 40.0, 9.0):
+            scene = Scene((placed(model, appearance=faint), still))
+            renderer.update(scene)
+            renderer.draw([view_of(away)])
+            level = renderer.levels.levels[0]
+            fresh.update(Scene((placed(model.levels[level], appearance=faint), still)))
+            fresh.draw([view_of(away)])
+            np.testing.assert_array_equal(renderer.image(), fresh.image())

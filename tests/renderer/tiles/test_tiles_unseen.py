@@ -183,7 +183,7 @@ def test_behind_the_near_plane(device):
 @pytest.fixture
 def at_once(monkeypatch):
     """Boxes from the first frame on, of any scene, and asked for in each."""
-    for name, value in (("RESTS", 0), ("LEAST_CLUSTERS", 1), ("LEAST_SHARE", 0)):
+    for name, value in (("RESTS", 0), ("LEAST_SPLATS", 0)):
         monkeypatch.setattr(culling, name, value)
 
 
@@ -290,9 +290,10 @@ def test_what_is_no_number_anywhere(renderer, at_once, seed):
     Film(renderer).check(film, 0)
 
 
-def test_boxes_wait_until_a_scene_rests(renderer):
-    """Frames with the same splats before boxes are made, and none while x moves."""
-    layers = in_order(culling.LEAST_CLUSTERS * CLUSTER, layers=2)
+def test_boxes_wait_until_a_scene_rests(renderer, monkeypatch):
+    """Frames with the same splats before boxes are made, and none while x moves or for so few."""
+    monkeypatch.setattr(culling, "LEAST_SPLATS", 2 * CLUSTER)
+    layers = in_order(COUNT, layers=2)
     view = View(look_at((0, 0, 1), (1, 0, 0)), (-0.1, 0.1, -0.1, 0.1), 0.05, 50, (64, 64))
     drawing = renderer.drawing
     renderer.settings = RenderSettings()
@@ -304,18 +305,17 @@ def test_boxes_wait_until_a_scene_rests(renderer):
         assert (drawing.culling.in_use(LEAST) is None) == (number < culling.RESTS)
         renderer.draw([view])
     assert drawing.culling.in_use(2 * LEAST) is None
-    one_less = only(layers, np.arange(layers.splat_count - 1))
-    renderer.update(Scene((SceneObject("cloud", one_less),)))
-    for _ in range(culling.RESTS + 2):
-        renderer.draw([view])
-    assert drawing.culling.in_use(LEAST) is not None or one_less.splat_count < (
-        culling.LEAST_CLUSTERS * CLUSTER
-    )
+    for count in (2 * CLUSTER - 1, 2 * CLUSTER):
+        renderer.update(Scene((SceneObject("cloud", only(layers, np.arange(count))),)))
+        for _ in range(culling.RESTS + 1):
+            renderer.draw([view])
+        assert (drawing.culling.left_out is None) == (count < 2 * CLUSTER)
 
 
-def test_where_all_is_in_view_nobody_is_asked(renderer):
-    layers = in_order(culling.LEAST_CLUSTERS * CLUSTER)
-    far = View(look_at((0, 0, 40), (0, 0, 0)), (-0.4, 0.4, -0.4, 0.4), 0.05, 100, (64, 64))
+def test_where_too_little_is_out_of_view_nobody_is_asked(renderer, monkeypatch):
+    monkeypatch.setattr(culling, "LEAST_SPLATS", CLUSTER)
+    layers = in_order(COUNT)
+    far = View(look_at((0, 0, 90), (0, 0, 0)), (-0.4, 0.4, -0.4, 0.4), 0.05, 100, (64, 64))
     renderer.settings = RenderSettings()
     renderer.update(Scene((SceneObject("cloud", layers),)))
     asked = []

@@ -8,12 +8,12 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.scene.captures.number_photos import (
+from shapeshift.scene.captures.photo import load_photo, open_image
+from shapeshift.scene.captures.radiometric.number_photos import (
     is_radiometric,
     open_grid,
     radiometric_celsius,
 )
-from shapeshift.scene.captures.photo import load_photo, open_image
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
 from tests.support.scene.captures import simple, write_transforms
@@ -106,7 +106,8 @@ def test_without_the_reader_a_sentence_says_so(tmp_path, monkeypatch):
     with pytest.raises(BadFile, match="pip install flyr"):
         radiometric_celsius(path, (16, 12))
     monkeypatch.setattr(
-        "shapeshift.scene.captures.value_ranges.can_read_radiometric", lambda: False
+        "shapeshift.scene.captures.value_ranges.cannot_read_radiometric",
+        lambda path: "for degrees: pip install flyr",
     )
     capture = capture_of(tmp_path, ".jpg")  # their colours, as before
     assert capture.stops[-1].value_range is None

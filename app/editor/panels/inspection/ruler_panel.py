@@ -124,7 +124,7 @@ def _chosen(ruler: Ruler, actions: RulerActions, unit: str, ui_scale: float) -> 
     if not theme.has_keys():
         return
     imgui.set_next_item_width(-1)
-    hint = item_label("note")
+    hint = said("note")
     done, text = imgui.input_text_with_hint(f"##note of length {name}", hint, each.note, enter)
     tip("A line about it, for the report; Enter takes it over.", ui_scale)
     if done:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from imgui_bundle import imgui
 
+from shapeshift.app.editor.panels.inspection.mark_panel import draw_about_mark
 from shapeshift.app.editor.panels.scale_bar import in_unit
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import button_row, item_label, tip
@@ -29,7 +30,9 @@ USUAL_EMISSIVITY = 0.95  # of most paints, and of brick, wood, rubber
 EMISSIVITY = (
     "Readings become temperatures of surfaces; colours and their scale stay as photographed."
 )
-MEASURES = "Click a spot, drag a box, Shift+drag a line; right drag orbits. Key Y."
+MEASURES = (
+    "Click a spot, drag a box, Shift+drag a line, Ctrl+drag a circle; right drag orbits. Key Y."
+)
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
     unit = in_unit(thermal.stop.unit, 0, 1, wanted)[0]
     if tool.file.marks:
         _table(tool, wanted, unit, ui_scale)
+    for of, less in tool.file.differences:
+        _difference(tool, of, less, wanted)
     if tool.chosen:
         _chosen(tool, ui_scale)
     for kind, words in BOUND_TIPS.items():
@@ -116,6 +121,15 @@ def _table(tool: Inspecting, wanted: str, unit: str, ui_scale: float) -> None:
     imgui.end_table()
 
 
+def _difference(tool: Inspecting, of: str, less: str, wanted: str) -> None:
+    """A row of two marks: the mean of the one less that of the other."""
+    thermal = tool.thermal
+    assert thermal is not None  # draw_inspect has seen to it
+    unit, one, none = in_unit(thermal.stop.unit, tool.difference(of, less), 0.0, wanted)
+    shown = f"{one - none:+.1f} {unit}" if np.isfinite(one) else "--"
+    imgui.text_unformatted(f"{of} \u2212 {less}   {shown}")
+
+
 def _chosen(tool: Inspecting, ui_scale: float) -> None:
     """The name of the chosen mark, to be typed, and the button that deletes it."""
     name = tool.chosen
@@ -128,7 +142,10 @@ def _chosen(tool: Inspecting, ui_scale: float) -> None:
         imgui.same_line()
     if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:
         tool.delete(name)
+        return
     tip("Delete the mark; Ctrl+Z brings it back while the tool is on.", ui_scale)
+    if tool.chosen == name:
+        draw_about_mark(tool, name, ui_scale)
 
 
 def _name(tool: Inspecting, name: str, ui_scale: float) -> None:

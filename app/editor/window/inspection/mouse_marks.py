@@ -27,6 +27,7 @@ from shapeshift.app.editor.window.window import (
     CLICK_PIXELS,
     DoubleClick,
     Drag,
+    Drop,
     Event,
     KeyDown,
     Press,
@@ -44,10 +45,12 @@ KEYS = (
     ("Y", "lay marks, on and off"),
     ("click, drag", "a spot, a box; right drag orbits"),
     ("Shift+drag", "a line on the surface"),
+    ("Ctrl+drag", "a circle about a place"),
     ("Delete", "delete the chosen mark"),
     ("Esc", "choose no mark, leave"),
     ("scale", "drag a handle: an end of the palette"),
 )
+PHOTOS = (".jpg", ".jpeg", ".png")  # that are dropped onto the window while a mark is chosen
 STILL_S = 0.25  # so long nothing must move before a view is measured
 MOST_PX = 640  # longer side of the picture that is measured
 
@@ -100,7 +103,8 @@ class MouseMarks:
             case Press(button="left"):
                 held = self._window.held
                 shift = held(glfw.KEY_LEFT_SHIFT) or held(glfw.KEY_RIGHT_SHIFT)
-                self._kind = "line" if shift else "box"
+                ctrl = held(glfw.KEY_LEFT_CONTROL) or held(glfw.KEY_RIGHT_CONTROL)
+                self._kind = "line" if shift else "circle" if ctrl else "box"
                 self._pressed, self._end = (event.x, event.y), None
             case Drag(button="left") if self._pressed is not None:
                 x, y = self._pressed
@@ -114,6 +118,8 @@ class MouseMarks:
                 self._viewpoint.camera.turn(-event.dx * TURN, -event.dy * TURN)
             case DoubleClick():
                 pass  # two clicks: the camera stays
+            case Drop(paths=(path,)) if self._tool.chosen and path.suffix.lower() in PHOTOS:
+                self._tool.attach_photo(self._tool.chosen, path)
             case _:
                 return False
         return True

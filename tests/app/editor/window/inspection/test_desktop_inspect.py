@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.panels.scale_bar import height_of
@@ -153,6 +154,35 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
     left, right = (picture[round(y), round(x)] for x, y in places)
     assert right[0] > left[0] + 60 and right[0] > right[2] + 60  # red lies there alone
     tool.bound("above", None)
+
+    # A circle; the mean of one mark less that of another; a note and a photo of the chosen mark.
+    tool.chosen = "Sp1"
+    run_frames(viewer, 2)
+    hands.move(600, 20)
+    hands.hold_key("Control_L", True)
+    hands.drag(on_wall(viewer, -0.25, -0.1), on_wall(viewer, -0.2, -0.1), 2)
+    hands.hold_key("Control_L", False)
+    circle = tool.file.marks[-1]
+    assert (circle.kind, tool.chosen) == ("circle", circle.name)
+    assert circle.radius_m == pytest.approx(0.05, abs=0.01)
+    assert tool.readings[circle.name].mean == pytest.approx(celsius_at(-0.25), abs=NEAR_C)
+    photo = wall.parent / "plate.jpg"
+    Image.new("RGB", (900, 600), (10, 200, 30)).save(photo)
+    viewer.window.on_drop(None, [str(photo)])  # as GLFW calls it; X has no device for it
+    run_frames(viewer, 2)
+    assert tool.mark(circle.name).photo and not state.problem
+    tool.take_off(circle.name, "Sp1")
+    assert tool.difference(circle.name, "Sp1") == pytest.approx(
+        celsius_at(-0.25) - celsius_at(0.1), abs=2 * NEAR_C
+    )
+    run_frames(viewer, 2)
+    hands.click(*widgets.middle(f"##note of {circle.name}"))
+    hands.type("rim")
+    hands.key("Return")
+    assert tool.mark(circle.name).note == "rim"
+    hands.move(*on_wall(viewer, 0.0, 0.25))
+    hands.key("Delete")
+    assert len(tool.file.marks) == 3 and not tool.file.differences
 
     # The table chooses; Delete deletes; a name that is typed stays.
     hands.click(*widgets.middle("Li1"))

@@ -16,6 +16,7 @@ from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.radiometric.dji_photo import ADVICE, converter, dji_celsius, is_dji
 
 GRIDS = (".npy", ".csv")
 JPEGS = (".jpg", ".jpeg", ".jfif")
@@ -94,7 +95,11 @@ def _row(line: str) -> np.ndarray | None:
 
 
 def is_radiometric(path: Path) -> bool:
-    """Whether a file is a JPEG with a FLIR camera's own numbers."""
+    """Whether a file is a JPEG with a FLIR or DJI camera's own numbers."""
+    return _is_flir(path) or (path.suffix.lower() in JPEGS and is_dji(path))
+
+
+def _is_flir(path: Path) -> bool:
     if path.suffix.lower() not in JPEGS:
         return False
     try:
@@ -104,11 +109,13 @@ def is_radiometric(path: Path) -> bool:
         return False
 
 
-def can_read_radiometric() -> bool:
-    """Whether flyr is installed."""
+def cannot_read_radiometric(path: Path) -> str:
+    """What is to be installed for the temperatures of such a photo; "": nothing."""
     from importlib.util import find_spec
 
-    return find_spec("flyr") is not None
+    if is_dji(path):
+        return "" if converter() else ADVICE
+    return "" if find_spec("flyr") is not None else "for degrees: pip install flyr"
 
 
 def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
@@ -116,7 +123,7 @@ def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
 
     Emissivity, distance and air are those that the camera was set to.  Raises BadFile.
     """
-    celsius, _ = read_radiometric(path)
+    celsius = dji_celsius(path) if is_dji(path) else read_radiometric(path)[0]
     height, width = celsius.shape
     if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
         raise BadFile(
@@ -135,6 +142,8 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
     Raises BadFile.
     """
     where = path_end(path)
+    if is_dji(path):
+        raise BadFile(f"{where}: a DJI camera's settings are not read; say them")
     try:
         import flyr
     except ImportError:
