@@ -1,6 +1,8 @@
 """Which level of detail each object is drawn at: by the pixels that its bounds have on screen."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from operator import is_
 
@@ -25,6 +27,7 @@ class LevelChoice:
 
     def __init__(self) -> None:
         self._models: list[Model] = []  # of the objects that the levels are of
+        self._whole = False  # all is drawn at level 0
         self._bounds: list[Bounds | None] = []  # of each; None: it has no levels
         self.levels: tuple[int, ...] = ()  # of each the one that it is drawn at; 0: all there is
 
@@ -46,15 +49,26 @@ class LevelChoice:
 
     def shown(self, scene: Scene) -> Scene:
         """The scene that `begin` was given, or one of the same models, each object at its level."""
-        if not any(self._bounds):
+        if self._whole or not any(self._bounds):
             return scene
         pairs = zip(scene.objects, self.levels, strict=False)
         return Scene(tuple(at_level(obj, level) for obj, level in pairs))
+
+    @contextmanager
+    def all_whole(self) -> Iterator[None]:
+        """Within it all is drawn at level 0, from the next `update` on: for who measures."""
+        self._whole = True
+        try:
+            yield
+        finally:
+            self._whole = False
 
     def choose(self, scene: Scene, views: list[View]) -> bool:
         """Looks at the same scene from all eyes of a frame; whether an object is to be drawn at
         another level than before.
         """
+        if self._whole:
+            return False
         before = self.levels
         rows = zip(scene.objects, self._bounds, before, strict=True)
         self.levels = tuple(

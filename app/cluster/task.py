@@ -89,6 +89,11 @@ def forget(tasks: Iterable[Task]) -> None:
             os.rmdir(task.notes)
 
 
+def is_task() -> bool:
+    """Whether this process does a task: who reads its words cannot type what comes next."""
+    return "SHAPESHIFT_TASK" in os.environ
+
+
 _digests: dict[tuple[str, int, int], str] = {}  # by path, bytes and time
 
 

@@ -112,8 +112,10 @@ def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> Valu
     pixel lacks to full coverage showed, in training, what stood behind: that is put back where it
     is known, else the value is divided by the coverage (docs/thermal.md has both errors).
     """
-    renderer.update(thermal.scene)
-    renderer.draw([view])
+    with renderer.levels.all_whole():
+        renderer.update(thermal.scene)
+        renderer.draw([view])
+        depth = renderer.surface(view).depth(SOLID).astype(np.float64)
     behind, away = thermal.behind, None
     if thermal.colors:
         rgba = renderer.image(0).astype(np.float64)
@@ -128,7 +130,6 @@ def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> Valu
         rgba = renderer.image(0).astype(np.float64)
         alpha, share = rgba[..., 3], rgba[..., :3] @ LUMINANCE
         share = share / np.maximum(alpha, 1e-6) if behind is None else share + (1 - alpha) * behind
-    depth = renderer.surface(view).depth(SOLID).astype(np.float64)
     assert thermal.stop.value_range is not None  # thermal_scene has seen to it
     low, high = thermal.stop.value_range
     values = low + (high - low) * np.clip(share, 0, 1)
@@ -145,8 +146,9 @@ def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> Valu
 
 def depth_picture(renderer: "Renderer", scene: Scene, view: View) -> ValuePicture:
     """The depths of a view of any scene, at its own x; they are its values, too."""
-    renderer.update(scene)
-    depth = renderer.surface(view).depth(SOLID).astype(np.float64)
+    with renderer.levels.all_whole():
+        renderer.update(scene)
+        depth = renderer.surface(view).depth(SOLID).astype(np.float64)
     return ValuePicture(view, depth, depth, "m", (0.0, float("inf")))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.cluster.open_cluster import NONE
+from shapeshift.app.cluster.task import is_task
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
@@ -19,8 +20,8 @@ from shapeshift.app.training.run_loop import (
     calibrated,
     decibels,
     describe,
-    time_unit,
     train,
+    used,
 )
 from shapeshift.app.training.train_options import Options, settings_of
 
@@ -90,11 +91,11 @@ def run_whole(options: Options) -> int:
         pace_package(options.out)
     more = [*refined(trainer, options.out), *trainer.exposures.warnings()]
     say(summary(trainer, options.out, interrupted), *more)
-    if not interrupted and (
-        found := failed_modalities(trainer) or report(find_outlier_views(trainer))
-    ):
-        say(*found)
-    say(*what_next(options, trainer.iteration, step_s, interrupted))
+    lines = what_next(options, trainer.iteration, step_s, interrupted)
+    if not interrupted:
+        lines = [*(failed_modalities(trainer) or report(find_outlier_views(trainer))), *lines]
+    if lines:
+        say(*lines)
     trainer.photos.close(keep=interrupted)
     return INTERRUPTED if interrupted else 0
 
@@ -149,6 +150,8 @@ def what_next(options: Options, steps: int, step_s: float, interrupted: bool) ->
 
     step_s: by the clock, which is what a person waits.
     """
+    if is_task():
+        return []
     again = [program(), "train", shlex.quote(full(options.capture))]
     out = shlex.quote(full(options.out))
     again += ["--out", out, "--resume"]
@@ -183,7 +186,6 @@ def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:
     quality = f"held-out photos: {psnr}" if psnr else "no photo was held out"
     state = "interrupted, --resume goes on" if interrupted else "done"
     return (
-        f"{full(out)}: {state} after {trainer.iteration} steps in "
-        f"{trainer.elapsed:.1f} {time_unit(trainer.device)}, "
+        f"{full(out)}: {state} after {trainer.iteration} steps in {used(trainer)}, "
         f"{trainer.anchors_count:,} anchors; {quality}"
     )

@@ -150,3 +150,17 @@ def test_cut_and_faint_objects_stay_so_through_a_switch():
             fresh.update(Scene((placed(model.levels[level], appearance=faint), still)))
             fresh.draw([view_of(away)])
             np.testing.assert_array_equal(renderer.image(), fresh.image())
+
+
+def test_who_measures_has_all_of_it():
+    model = leveled(100)
+    with Renderer(None, "tiles") as renderer:
+        scene = Scene((placed(model),))
+        renderer.update(scene)
+        with renderer.levels.all_whole():
+            renderer.update(scene)
+            assert renderer.draw([view_of(40)]).splats == 500
+            assert renderer.surface(view_of(40)).depth().shape == (120, 160)
+            assert renderer.draw([view_of(40)]).splats == 500
+        renderer.update(scene)
+        assert renderer.draw([view_of(40)]).splats == 5 * len(model.levels[2].anchors)

@@ -153,7 +153,21 @@ def archive_seeds(folder: Path) -> list[Seed]:
         "filenames": ["0_0/meta.json", "1_0/meta.json"],
     }  # fmt: skip
     (streamed / "lod-meta.json").write_text(json.dumps(meta))
+    seeds.append(Seed("package levels", files_of(write_some_levels(folder)), read_model))
     return [*seeds, Seed("streamed sog", files_of(streamed), read_model), *torch_seeds(folder)]
+
+
+def write_some_levels(folder: Path) -> Path:
+    """The package above with one coarser level."""
+    from shapeshift.runtime_models.lod.average_anchors import average_anchors, cell_for
+    from shapeshift.runtime_models.lod.level_files import level_table, read_level, write_levels
+
+    model = read_model(folder / "package.shift")
+    table = level_table(average_anchors(model, cell_for(model, 0.5)))
+    level = replace(read_level(table, model, "level"), cell_m=1.0, from_pixels=50.0)
+    package = (folder / "package.shift").read_bytes()
+    write_levels(folder / "levels.lod", package, model.with_coarser((level,)), [table])
+    return folder / "levels.lod"
 
 
 def torch_seeds(folder: Path) -> list[Seed]:
