@@ -1,9 +1,11 @@
 """What a run of anchors and one of plain splats have in common: budget, pace, looks at photos."""
 
+import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +34,7 @@ class Progress:
     fraction: float  # of the budget, 0..1
     loss: float | None  # every few steps
     anchors: int
-    elapsed: float  # seconds, as Run.elapsed
+    elapsed: float  # seconds that the run has used: Run.seconds
     rolled_back: bool = False  # the guard turned the run back
 
 
@@ -43,6 +45,13 @@ def clock_of(device: Device) -> Callable[[], float]:
     depend on what else the machine does.  The time of other devices is seen by the clock alone.
     """
     return time.process_time if device.kind == "cpu" else time.perf_counter
+
+
+def used_seconds(device: Device) -> Callable[[], float]:
+    """The same with what processes took that this one waited for; on Windows without."""
+    if device.kind != "cpu":
+        return time.perf_counter
+    return lambda: sum(os.times()[:4])
 
 
 class Run(ABC):
@@ -58,6 +67,7 @@ class Run(ABC):
     targets: Targets
     exposures: Exposures
     drawing: DrawnView  # the last one
+    start_s = 0.0  # seconds that went by before the first step, by used_seconds, without reading
     iteration: int  # steps done
     schedule: Schedule
     elapsed: float  # seconds that the steps took, by clock_of, without reading photos
@@ -91,9 +101,25 @@ class Run(ABC):
             loss, rolled_back = self.one_step()
             self.elapsed += clock() - self.photos.seconds(processor) - start
             fraction, count = self.budget.fraction(self.iteration, self.elapsed), self.param_group
-            yield Progress(
-                self.iteration, fraction, loss, len(self.adam[count]), self.elapsed, rolled_back
-            )
+            anchors = len(self.adam[count])
+            yield Progress(self.iteration, fraction, loss, anchors, self.seconds, rolled_back)
+
+    @contextmanager
+    def counted_start(self) -> Iterator[None]:
+        """What is done in it is the start: it comes out of the budget."""
+        clock, processor = used_seconds(self.device), self.device.kind == "cpu"
+        began = clock() - self.photos.seconds(processor)
+        yield
+        self.set_start(self.start_s + clock() - self.photos.seconds(processor) - began)
+
+    def set_start(self, seconds: float) -> None:
+        """What the start took; of a run that goes on, what it took then."""
+        self.start_s, self.budget = seconds, replace(self.budget, start=seconds)
+
+    @property
+    def seconds(self) -> float:
+        """What the run has used of its budget."""
+        return self.start_s + self.elapsed
 
     @property
     def settled(self) -> bool:
@@ -102,7 +128,7 @@ class Run(ABC):
 
     def fix_run_length(self) -> None:
         """A timed run's length follows from its first steps, and its rates from the length."""
-        seconds = self.settings.seconds
+        seconds = self.budget.training
         if self.run_length is None and seconds is not None and self.iteration == LENGTH_STEPS:
             self.run_length = int(seconds / (self.elapsed / (LENGTH_STEPS - 1)))
             self.adam.set_rates(self.all_rates())

@@ -9,6 +9,7 @@ import numpy as np
 
 from shapeshift.training.photos import BLACK, LoadedPhoto
 
+TRAINED = 0.5  # of the seconds at least: a start that took more makes the run as much longer
 WARM_UP_STEPS = 200
 LEAST_RATE = 0.01  # of the networks' rates, at the first step of a warm-up
 
@@ -41,12 +42,24 @@ class Budget:
     """How long to train: steps, seconds, or whichever ends first."""
 
     iterations: int | None
-    seconds: float | None
+    seconds: float | None  # of the whole run
+    start: float = 0.0  # of these, what went by before the first step
+
+    @property
+    def training(self) -> float | None:
+        """Seconds for the steps, at least TRAINED of all; None: no limit."""
+        if self.seconds is None:
+            return None
+        return max(self.seconds - self.start, TRAINED * self.seconds)
 
     def fraction(self, iteration: int, elapsed: float) -> float:
-        """0 at the start, 1 or more at the end; learning rates and growing follow it."""
+        """0 at the first step, 1 or more at the end; learning rates and growing follow it.
+
+        elapsed: seconds that the steps took.
+        """
         steps = iteration / max(self.iterations, 1) if self.iterations is not None else 0.0
-        time = elapsed / max(self.seconds, 1e-9) if self.seconds is not None else 0.0
+        most = self.training
+        time = elapsed / max(most, 1e-9) if most is not None else 0.0
         return max(steps, time)
 
 

@@ -56,7 +56,8 @@ class TrainSettings:
     seconds: float | None = None
     """Train for so many seconds of one core: processor time of all threads, so that nothing else
     that runs takes from it, and two cores take half as long.  On a GPU, seconds by the clock.
-    Loading, compiling and looking at held-out photos do not count.  Learning rates follow it.
+    The start (first points, hulls) counts, at most half of them; reading photos, compiling and
+    looking at held-out photos do not.  Learning rates follow it.
     Default: no limit, --iterations decides."""
     iterations: int | None = 2000
     """Train for this many steps; the same number gives the same bits."""

@@ -101,7 +101,8 @@ class Trainer(Run):
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         if empty := [name for name, found in by_modality.items() if not found]:
             raise BadFile(f"{capture.folder}: modality '{empty[0]}' has no training photos.")
-        background = choose_background(settings.background, capture.background, photos)
+        with self.counted_start():
+            background = choose_background(settings.background, capture.background, photos)
         if settings.background == "auto" and background and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
             self.warnings.append(background_warning(background))
@@ -117,7 +118,8 @@ class Trainer(Run):
         views = [photo.view for photo in photos]
         self.min_scale = MinScale(device, views, self.layout.splats, settings.min_scale_px)
         if resume is None:
-            self.initialise(photos, report)
+            with self.counted_start():
+                self.initialise(photos, report)
         else:
             self.restore(*resume)
         self.step = self.new_step()
@@ -141,7 +143,7 @@ class Trainer(Run):
         """Anchors, features and weights of a new run."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        first = initial_points(self.capture, photos, rng, settings.points, report)
+        first = initial_points(self.capture, photos, rng, settings.points, report, settings.seconds)
         self.warnings += first.doubts
         self.origin, background = first.origin, self.schedule.background
         start = first_anchors(first, self.anchor_cap, photos, background)
@@ -169,6 +171,7 @@ class Trainer(Run):
         """Everything as it was when the checkpoint was written."""
         self.voxel, self.origin = notes["voxel"], notes["origin"]
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
+        self.set_start(notes.get("start_s", 0.0))
         self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
         self.run_length = notes["run_length"]
         self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
@@ -189,7 +192,7 @@ class Trainer(Run):
             "elapsed": self.elapsed, "densified_at": self.densified_at,
             "rate_scale": self.rate_scale, "run_length": self.run_length,
             "first_loss": self.guard.first_loss, "settings": self.settings.as_dict(),
-            "lr_warmup_start": self.lr_warmup.start,
+            "lr_warmup_start": self.lr_warmup.start, "start_s": self.start_s,
         }  # fmt: skip
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
         more = self.poses.state() | self.min_scale.state()

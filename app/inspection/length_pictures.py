@@ -32,17 +32,19 @@ def with_lengths(image: np.ndarray, view: View, measured: Measured) -> np.ndarra
     draw = ImageDraw.Draw(drawn)
     height = max(10, drawn.height // 36)  # pixels of a letter
     font, dot = letters(height), max(2, height // 5)
-    nothing = np.zeros((0, 0))
-    for each, words in measured:
-        pixels, _ = ValuePicture(view, nothing, nothing).pixel_of(each.points)
-        if not np.isfinite(pixels).all():
-            continue  # behind the eye, in whole or in part
-        corners = [(float(x), float(y)) for x, y in pixels]
-        way = [*corners, corners[0]] if each.kind == "area" else corners
+    through = ValuePicture(view, np.zeros((0, 0)), np.zeros((0, 0)))
+    places = [through.pixel_of(each.points)[0] for each, _ in measured]
+    shown = [np.isfinite(pixels).all() for pixels in places]  # else behind the eye, in part
+    for (each, _), pixels, is_shown in zip(measured, places, shown, strict=True):
+        corners = [(float(x), float(y)) for x, y in pixels] if is_shown else []
+        way = [*corners, *corners[:1]] if each.kind == "area" else corners
         for color, width in ((BEHIND, dot + 2), (LINE, max(1, dot // 2))):
             draw.line(way, fill=color, width=width)
         for x, y in corners:
             draw.ellipse((x - dot, y - dot, x + dot, y + dot), fill=LINE, outline=BEHIND)
+    for (each, words), pixels, is_shown in zip(measured, places, shown, strict=True):
+        if not is_shown:
+            continue
         text = drawable(f"{each.name}  {words}", height)
         at = pixels[1] if each.kind == "angle" else pixels.mean(axis=0)
         wide = draw.textlength(text, font) + 4

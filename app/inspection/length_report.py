@@ -39,7 +39,7 @@ def length_report(
     Raises ValueError, one sentence, where nothing was measured.
     """
     if not seen.measured:
-        raise ValueError("nothing was measured yet; click points on the surface first.")
+        raise ValueError("nothing was measured yet; lay points on the surface first.")
     picture = with_lengths(np.clip(seen.picture, 0, 1), seen.view, seen.measured)
     view = ReportView("View", [("Picture", picture)], [], [], [], [])
     factor, error = seen.scale.factor, seen.scale.error

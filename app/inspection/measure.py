@@ -40,6 +40,16 @@ class Options(ReadingOptions):
     NAME.marks.json beside the scene, else lengths are those of the scene."""
     save: bool = False
     """Keep the scale of --known in NAME.marks.json beside the scene."""
+    keep: bool = False
+    """Keep what is measured there, too, under names of its own: L1, Way1, Angle1, Area1."""
+    unit: Literal["m", "cm", "mm", "ft", "in"] | None = None
+    """Of lengths; areas in its square, each with the digits that are uncertain.
+    Default: m, with four digits behind the point."""
+    report: tuple[Path, ...] = ()
+    """A .html, one file that loads nothing, or a .pdf, or both: the view with all that was
+    measured and kept, and a table.  Default: none."""
+    overwrite: bool = False
+    """Replace reports of the same names."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands: shapes may differ.  Default: the first stop, and in a scene file
     what it says for each object."""
@@ -67,11 +77,23 @@ def run(options: Options) -> int:
     from shapeshift.app.drawing import open_renderer, parse_size
     from shapeshift.app.errors import UsageError
     from shapeshift.app.inspection.draw_values import depth_picture
+    from shapeshift.app.inspection.measure_outputs import (
+        check_reports,
+        keep_file,
+        kept_lengths,
+        picture_of,
+        with_lengths_of,
+        write_length_reports,
+    )
     from shapeshift.app.terminal import print_json, print_text
 
     if options.save and options.known is None:
         raise UsageError("--save keeps the scale of a known length; name one: --known A B METRES.")
-    if not (options.save or any(getattr(options, kind) for kind in KINDS)):
+    check_reports(options.report, options.overwrite)
+    if options.keep and not any(getattr(options, kind) for kind in KINDS):
+        raise UsageError("--keep keeps what is measured; add --distance or another of them.")
+    wanted = options.save or options.report or any(getattr(options, kind) for kind in KINDS)
+    if not wanted:
         raise UsageError(f"nothing is to be measured; add --{', --'.join(KINDS[:-1])} or --area.")
     size = parse_size(options.size) if options.size else None
     cameras = None
@@ -82,15 +104,25 @@ def run(options: Options) -> int:
     view = choose_view(options, document, cameras, size)
     with open_renderer(options.context, options.drawing) as (renderer, _):
         picture = depth_picture(renderer, document.scene, view)
-    found, scale = measurements(options, picture, document.origin)
-    if options.save:
-        keep_scale(options.scene, scale)
+        drawn = picture_of(renderer, document, view) if options.report else None
+    found, laid, scale = measurements(options, picture, document.origin)
+    file = kept_lengths(options.scene, document.origin)
+    new = with_lengths_of(file, laid, scale)
+    if drawn is not None:
+        unit = options.unit or "m"
+        scene = (options.scene, drawn, view, new, unit, document.origin, options.x)
+        write_length_reports(options.report, *scene)
+    if options.save or options.keep:
+        kept = new if options.keep else with_lengths_of(file, [], scale)
+        keep_file(options.scene, kept, document.origin)
     if options.json:
         rows = [{"kind": m.kind, "value": m.value, "uncertainty": m.uncertainty, "unit": m.unit}
                 for m in found]  # fmt: skip
         print_json({"measurements": rows})
     elif found:
-        print_text("\n".join(f"{each.kind}: {each}" for each in found))
+        words = (each.words(options.unit) if options.unit else str(each) for each in found)
+        lines = (f"{each.kind}: {text}" for each, text in zip(found, words, strict=True))
+        print_text("\n".join(lines))
     return 0
 
 
@@ -110,8 +142,8 @@ def choose_view(options: Options, document: "Document", cameras, size) -> "View"
 
 def measurements(
     options: Options, picture: "ValuePicture", origin: "np.ndarray"
-) -> "tuple[list[Measurement], Scale]":
-    """What the options ask for, in the order of KINDS, and the scale of its lengths.
+) -> "tuple[list[Measurement], list[tuple[str, list[Point]]], Scale]":
+    """What the options ask for, in the order of KINDS, its points, and the scale of its lengths.
 
     Raises UsageError, BadFile, one sentence.
     """
@@ -120,12 +152,12 @@ def measurements(
 
     try:
         scale = known_scale(options, picture, origin)
-        found = [
-            measure(kind, [point_of(text, picture, origin, f"--{kind}") for text in texts], scale)
+        laid = [
+            (kind, [point_of(text, picture, origin, f"--{kind}") for text in texts])
             for kind in KINDS
             if (texts := getattr(options, kind))
         ]
-        return found, scale
+        return [measure(kind, points, scale) for kind, points in laid], laid, scale
     except ValueError as error:
         raise UsageError(str(error)) from None
 
@@ -151,31 +183,6 @@ def known_scale(options: Options, picture: "ValuePicture", origin: "np.ndarray")
         raise UsageError(f"--known ends with '{options.known[2]}', expected metres.")
     ends = [point_of(text, picture, origin, "--known") for text in options.known[:2]]
     return Scale.of_known(ends, numbers[0])
-
-
-def keep_scale(scene: Path, scale: "Scale") -> None:
-    """Writes it into the marks beside the scene.  Raises UsageError, BadFile."""
-    from dataclasses import replace
-
-    from shapeshift.app.errors import UsageError
-    from shapeshift.app.paths import full, is_bundled
-    from shapeshift.app.terminal import say
-    from shapeshift.scene.inspection.marks_file import (
-        MarksFile,
-        marks_path,
-        read_marks_file,
-        write_marks_file,
-    )
-
-    path = marks_path(scene)
-    if is_bundled(path):
-        raise UsageError(f"{scene.name} came with the program; copy it into a folder of yours.")
-    if not 1e-6 <= scale.factor <= 1e6:
-        raise UsageError(f"the scale is {scale.factor:g}, expected 1e-6 to 1e6; check --known.")
-    file = read_marks_file(path) if path.exists() else MarksFile()
-    kept = replace(file, metres_per_unit=scale.factor, scale_error=min(scale.error, 1.0))
-    write_marks_file(kept, path)
-    say(f"scale {scale.factor:.6g} kept in {full(path)}")
 
 
 def point_of(text: str, picture: "ValuePicture", origin: "np.ndarray", said: str) -> "Point":

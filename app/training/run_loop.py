@@ -123,6 +123,15 @@ def train(
     return False
 
 
+def used(trainer: "Trainer | PlainTrainer") -> str:
+    """What a run has used, in words: its budget, what of it the start took, and what is besides."""
+    unit = time_unit(trainer.device)
+    return (
+        f"{trainer.seconds:.1f} {unit} (start {trainer.start_s:.1f}, training "
+        f"{trainer.elapsed:.1f}; besides them reading photos {trainer.photos.read_s:.1f})"
+    )
+
+
 def time_unit(device) -> str:
     """What the seconds of training are: see training.run.clock_of."""
     return "core s" if device.kind == "cpu" else "s"

@@ -188,10 +188,10 @@ def train_method(
     """
     from shapeshift.app.training.run_loop import describe, train
     from shapeshift.app.training.train_baselines import (
-        TrainedFile,
         plain_settings,
         train_separate,
         train_splats,
+        trained_file,
     )
     from shapeshift.app.training.train_options import settings_of
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
@@ -212,7 +212,7 @@ def train_method(
         if train(trainer):
             return None
         write_package(trainer.model(), out)
-        one = TrainedFile(out, trainer.elapsed, trainer.iteration)
+        one = trained_file(out, trainer)
         return {stop.name: one for stop in capture.stops}
     return None if outcome.interrupted else outcome.runs
 
@@ -235,7 +235,7 @@ def pack_splats(capture: "Capture", out: Path, rows: list[TableRow]) -> "dict[st
         layers.append((stop, read_plain(source, reading)))
         made = next(r for r in rows if (r.method, r.modality) == ("splats", stop.name))
         file = out / PLACES["spz"] / layer_name(number, stop, ".spz")
-        runs[stop.name] = TrainedFile(file, made.seconds, made.steps)
+        runs[stop.name] = TrainedFile(file, made.seconds, made.steps, made.start_s)
     try:
         write_layer_list(layers, out / PLACES["spz"], write_spz, ".spz")
     except ValueError as error:  # places that spz cannot hold
@@ -279,8 +279,9 @@ def rows_of(
         rows.append(kind(
             method, stop.name, round(score.psnr_db, 3), round(score.median_db, 3),
             round(score.ssim, 5),
-            bytes_on_disk(made.file) / 1e6, round(made.seconds, 1), made.steps, score.alive,
-            score.photos, *([] if score.vgg is None else [round(score.vgg, 5)]),
+            bytes_on_disk(made.file) / 1e6, round(made.seconds, 1), round(made.start_s, 1),
+            made.steps, score.alive, score.photos,
+            *([] if score.vgg is None else [round(score.vgg, 5)]),
         ))  # fmt: skip
     return [*rows, mean_row(rows, list({run.file: run for run in runs.values()}.values()))]
 

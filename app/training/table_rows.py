@@ -24,7 +24,8 @@ class TableRow:
     median_db: float  # of the photos' PSNR: one that nothing can explain does not move it
     ssim: float
     mb: float  # 1e6 bytes on disk of the file that shows this modality
-    seconds: float  # of training that file: of one core, where a processor computed
+    seconds: float  # that making this file used: of one core, where a processor computed
+    start_s: float  # of these, before the first step
     steps: int
     splats: int  # that are there at this modality's stop
     photos: int  # held out
@@ -47,6 +48,7 @@ def mean_row(rows: list[TableRow], runs: list) -> TableRow:
         rows[0].method, MEAN, mean("psnr_db", 3), mean("median_db", 3), mean("ssim", 5),
         sum(bytes_on_disk(run.file) for run in runs) / 1e6,
         round(sum(round(run.seconds, 1) for run in runs), 1),  # of what the rows above say
+        round(sum(round(run.start_s, 1) for run in runs), 1),
         sum(run.steps for run in runs),
         round(mean("splats", 1)), sum(row.photos for row in rows), *more,
     )  # fmt: skip
@@ -90,13 +92,15 @@ def cells(rows: list[TableRow]) -> tuple[list[str], list[list[str]]]:
         "MB",
         "steps",
         "seconds",
+        "of these start",
     ]
     lines, before = [], ""
     for row in rows:
         more = [f"{row.vgg_distance:.4f}"] if isinstance(row, VggRow) else []
         name, before = NAMES[row.method] if row.method != before else "", row.method
         whole = row.method != "joint" or row.modality == MEAN  # one file for all: counted once
-        size = [f"{row.mb:.2f}", f"{row.steps:,}", f"{row.seconds:.1f}"] if whole else [""] * 3
+        size = [f"{row.mb:.2f}", f"{row.steps:,}", f"{row.seconds:.1f}", f"{row.start_s:.1f}"]
+        size = size if whole else [""] * 4
         likeness = [f"{row.psnr_db:.2f}", f"{row.median_db:.2f}", f"{row.ssim:.4f}", *more]
         lines.append([name, row.modality, *likeness, f"{row.splats:,}", *size])
     return columns, lines

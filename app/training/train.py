@@ -20,8 +20,8 @@ from shapeshift.app.training.run_loop import (
     calibrated,
     decibels,
     describe,
-    time_unit,
     train,
+    used,
 )
 from shapeshift.app.training.train_options import Options, settings_of
 
@@ -186,7 +186,6 @@ def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:
     quality = f"held-out photos: {psnr}" if psnr else "no photo was held out"
     state = "interrupted, --resume goes on" if interrupted else "done"
     return (
-        f"{full(out)}: {state} after {trainer.iteration} steps in "
-        f"{trainer.elapsed:.1f} {time_unit(trainer.device)}, "
+        f"{full(out)}: {state} after {trainer.iteration} steps in {used(trainer)}, "
         f"{trainer.anchors_count:,} anchors; {quality}"
     )

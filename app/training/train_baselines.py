@@ -15,8 +15,8 @@ from shapeshift.app.training.run_loop import (
     calibrated,
     decibels,
     describe,
-    time_unit,
     train,
+    used,
 )
 from shapeshift.app.training.train_options import Options, settings_of
 
@@ -36,8 +36,13 @@ class TrainedFile:
     """What the training of one model left behind."""
 
     file: Path
-    seconds: float  # of training alone
+    seconds: float  # what the run used of its budget
     steps: int
+    start_s: float = 0.0  # of these, before the first step
+
+
+def trained_file(file: Path, trainer: "Trainer | PlainTrainer") -> TrainedFile:
+    return TrainedFile(file, trainer.seconds, trainer.iteration, trainer.start_s)
 
 
 @dataclass(frozen=True)
@@ -140,7 +145,7 @@ def train_splats(
         interrupted = train(trainer)
         layers.append((trainer.stop, trainer.splats()))
         file = out / layer_name(number, trainer.stop)
-        runs[trainer.stop.name] = TrainedFile(file, trainer.elapsed, trainer.iteration)
+        runs[trainer.stop.name] = trained_file(file, trainer)
         say(result_line(trainer, trainer.count), *trainer.exposures.warnings())
         trainer.photos.close()
         if interrupted:
@@ -179,7 +184,7 @@ def train_separate(
         say(describe(trainer), *trainer.warnings)
         interrupted = train(trainer)
         write_package(trainer.model(), files[name])
-        runs[name] = TrainedFile(files[name], trainer.elapsed, trainer.iteration)
+        runs[name] = trained_file(files[name], trainer)
         say(result_line(trainer, trainer.anchors_count), *trainer.exposures.warnings())
         trainer.photos.close()
         if interrupted:
@@ -204,10 +209,8 @@ def describe_plain(trainer: "PlainTrainer") -> str:
 
 def result_line(trainer: "Trainer | PlainTrainer", count: int) -> str:
     psnr = decibels(trainer.held_out_psnr(most=len(trainer.held_out)))
-    return (
-        f"{trainer.iteration} steps in {trainer.elapsed:.1f} {time_unit(trainer.device)}, "
-        f"{count:,} {trainer.primitive}; "
-        + (f"held-out photos: {psnr}" if psnr else "no photo was held out")
+    return f"{trainer.iteration} steps in {used(trainer)}, {count:,} {trainer.primitive}; " + (
+        f"held-out photos: {psnr}" if psnr else "no photo was held out"
     )
 
 

@@ -10,7 +10,7 @@ from shapeshift.app.opening import ReadingOptions, open_capture, open_model
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
-from shapeshift.app.training.run_loop import INTERRUPTED, decibels, time_unit, train
+from shapeshift.app.training.run_loop import INTERRUPTED, decibels, train, used
 from shapeshift.app.training.train_options import Asked, MachineOptions, settings_of
 from shapeshift.training.settings import TrainSettings
 
@@ -108,8 +108,8 @@ def summary(
 ) -> list[str]:
     state = "interrupted, --resume goes on" if interrupted else "done"
     lines = [
-        f"{full(out)}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} "
-        f"{time_unit(trainer.device)}; {trainer.anchors_count - trainer.fixed:,} anchors in the "
+        f"{full(out)}: {state} after {trainer.iteration} steps in {used(trainer)}; "
+        f"{trainer.anchors_count - trainer.fixed:,} anchors in the "
         f"region, all else as it was"
     ]
     if after := trainer.held_out_psnr(most=len(trainer.held_out)):

@@ -39,7 +39,8 @@ class TrainedScene(Scene):
     def __init__(self, model: AnchorModel, path: Path | None, trainer: "Trainer") -> None:
         super().__init__(Document.of(model), path)
         self.steps: int = trainer.iteration
-        self.seconds: float = trainer.elapsed
+        self.seconds: float = trainer.seconds  # with ...
+        self.start_seconds: float = trainer.start_s  # ... what went by before the first step
         self.anchors: int = trainer.anchors_count
         # held-out photos: decibels of each modality, {} where none is held out
         self.psnr_db: dict[str, float] = trainer.held_out_psnr(most=len(trainer.held_out))

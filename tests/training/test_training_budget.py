@@ -1,5 +1,7 @@
 """What a run's seconds are, how they are told, and that no clock is in what it leaves."""
 
+import subprocess
+import sys
 import time
 from types import SimpleNamespace
 
@@ -8,10 +10,13 @@ import pytest
 from shapeshift.app import cli, progress
 from shapeshift.app.training.fit import without_times
 from shapeshift.app.training.train import train
+from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.photo_store.open_photos import TrainingPhotos
 from shapeshift.training.run import LENGTH_STEPS, Progress, Run
 from shapeshift.training.schedule import Budget
+from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 
 
 class Steps(Run):
@@ -94,6 +99,53 @@ def test_a_budget_of_seconds_ends_a_run():
     worked = Steps("cpu", lambda: burn(0.01), seconds=0.1)
     steps = sum(1 for _ in worked.steps())
     assert 8 <= steps <= 10 and 0.1 <= worked.elapsed < 0.13
+
+
+@pytest.mark.parametrize(
+    ("seconds", "start", "training"),
+    [(None, 5.0, None), (10.0, 0.0, 10.0), (10.0, 4.0, 6.0), (10.0, 5.0, 5.0), (10.0, 9.0, 5.0)],
+)
+def test_the_start_comes_out_of_the_seconds(seconds, start, training):
+    """Up to half of them: without steps there is no scene.  Rates and growing follow the steps."""
+    budget = Budget(None if seconds else 100, seconds, start)
+    assert budget.training == training
+    if training:
+        assert budget.fraction(7, 0.0) == 0 and budget.fraction(7, training / 4) == 0.25
+
+
+def test_what_other_processes_took_is_in_the_start():
+    """The photos are matched in one; what comes after it is not, nor is reading.
+
+    Their times come in ticks of 10 ms."""
+    steps = Steps("cpu", lambda: burn(0.01), seconds=2.0)
+    store = SimpleNamespace(read_s=0.0, waited_s=0.0, ahead=0, trouble="")
+    steps.photos = TrainingPhotos([], [], store)
+    code = "import time\nwhile time.process_time() < 0.3: pass"
+    with steps.counted_start():
+        burn(0.1)
+        subprocess.run([sys.executable, "-S", "-c", code], check=True)
+        read(store)  # 20 ms that do not count, 10 that do
+    burn(0.1)
+    assert 0.38 <= steps.start_s < 0.5 and steps.budget.start == steps.start_s
+    for _ in steps.steps():
+        pass
+    assert 2.0 <= steps.seconds < 2.05 and steps.seconds == steps.start_s + steps.elapsed
+
+
+def test_a_run_that_goes_on_has_the_start_it_had(device, tmp_path):
+    """Opening the capture again costs nothing of its budget."""
+    make_balls(tmp_path / "balls", 32, 8, 2)
+    capture, settings = (
+        read_capture(tmp_path / "balls"),
+        TrainSettings(iterations=3, max_anchors=50),
+    )
+    first = Trainer(device, capture, settings)
+    assert 0 < first.start_s == first.seconds == first.budget.start
+    state, notes = first.checkpoint()
+    again = Trainer(device, capture, settings, (state, notes | {"start_s": 7.5}))
+    assert again.start_s == again.seconds == again.budget.start == 7.5
+    del notes["start_s"]  # of a checkpoint that was written before there was such a thing
+    assert Trainer(device, capture, settings, (state, notes)).seconds == 0
 
 
 def test_the_pace_is_that_of_the_steps_before(monkeypatch):

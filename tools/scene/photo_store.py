@@ -83,8 +83,8 @@ def measure(folder: Path, megabytes: int) -> dict:
     from shapeshift.runtime_models.package.write_package import package_files
 
     trainer, first, start = trainer_of(folder, megabytes, STEPS), 0.0, 0.0
-    for now in trainer.steps():
-        first, start = first or time.process_time(), start or now.elapsed
+    for _ in trainer.steps():
+        first, start = first or time.process_time(), start or trainer.elapsed
     step = (trainer.elapsed - start) / (trainer.iteration - 1)
     files = package_files(trainer.model(), "float16")
     digest = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()

@@ -79,7 +79,8 @@ class PlainTrainer(Run):
         self.factor = settings.downscale or choose_downscale(capture.photos)
         self.photos = open_photos(capture, self.factor, settings.masks, room)
         photos, self.held_out = self.photos.train, self.photos.test
-        background = choose_background(settings.background, capture.background, photos)
+        with self.counted_start():
+            background = choose_background(settings.background, capture.background, photos)
         if settings.background == "auto":
             self.capture = replace(capture, background=background)  # hulls are carved out of it
         self.schedule = Schedule({self.stop.name: photos}, settings.seed, background)
@@ -88,7 +89,9 @@ class PlainTrainer(Run):
         self.exposures = Exposures(device, self.schedule.photos, has_one_exposure(photos))
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, 1.0
-        self.adam = Adam(device, self.first_values(photos, report), self.all_rates())
+        with self.counted_start():
+            values = self.first_values(photos, report)
+        self.adam = Adam(device, values, self.all_rates())
         self.step = PlainStep(device, self.adam, settings.sh_degree)
         self.stats = PlainDensificationStats(device, self.count)
         self.guard, self.next_snapshot = DivergenceGuard(self.adam.state()), SNAPSHOT_EVERY
@@ -99,7 +102,7 @@ class PlainTrainer(Run):
         """Round, faint splats at the first points, in the colours of the photos."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        first = initial_points(self.capture, photos, rng, settings.points, report)
+        first = initial_points(self.capture, photos, rng, settings.points, report, settings.seconds)
         points, self.origin = np.concatenate([first.points, first.guesses]), first.origin
         self.warnings = [*self.photos.warnings(), *first.doubts]
         most = min(settings.splats, settings.max_splats)

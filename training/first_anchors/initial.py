@@ -166,7 +166,7 @@ def filler_points(
 
 def initial_points(
     capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto",
-    report: Report | None = None,
+    report: Report | None = None, seconds: float | None = None,
 ) -> InitialPoints:  # fmt: skip
     """The first points, from the best source that there is.  Raises BadFile.
 
@@ -189,7 +189,7 @@ def initial_points(
     doubts: tuple[str, ...] = ()
     if source in ("auto", "triangulated"):
         try:
-            found = from_photos(capture, photos, rng, report)
+            found = from_photos(capture, photos, rng, report, seconds)
             return with_hull(found, hull) if hull else found
         except BadFile as why:
             if source == "triangulated":
@@ -236,15 +236,16 @@ def with_hull(found: InitialPoints, hull: InitialPoints) -> InitialPoints:
 
 
 def from_photos(
-    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, report: Report | None
-) -> InitialPoints:
+    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, report: Report | None,
+    seconds: float | None = None,
+) -> InitialPoints:  # fmt: skip
     """Points triangulated out of the photos.  Raises BadFile where they are too few."""
 
     def progress(stage: str, done: int, of: int) -> None:
         if report is not None:
             report(f"points out of the photos: {stage}, {done} of {of}")
 
-    points = triangulated_points(photos, capture.background, progress)
+    points = triangulated_points(photos, capture.background, progress, seconds)
     if len(points) < FEWEST:
         raise BadFile(
             f"{capture.folder}: only {len(points)} points could be triangulated out of its photos "

@@ -36,6 +36,7 @@ def extract(pycolmap: Any, job: Any, count: int) -> list[tuple]:
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads, options.use_gpu = 1, False
     options.sift.max_num_features, options.sift.peak_threshold = FEATURES, PEAK
+    options.sift.first_octave = int(job["first_octave"])
     extractor = pycolmap.FeatureExtractor.create(options, pycolmap.Device.cpu)
     found = []
     for i in range(count):

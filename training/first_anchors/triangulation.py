@@ -3,9 +3,11 @@
 Which photos are matched with which follows from their poses; triangulate_run.py does the rest.
 """
 
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +23,10 @@ FAILURE = (
 )
 MOST_PHOTOS = 120  # of all modalities together; half a second to a second of one core each
 NEIGHBOURS = 8  # photos that each is matched with, and those that chose it
+SHARE = 0.2  # of a run's seconds that the matching may take: docs/bench/start.csv
+# What it takes of one core, as measured on tankard and plush at 500 and 250 pixels.
+PIXEL_S, PAIR_S = 0.9e-6, 1.6e-8  # seconds a pixel for features, and a pair of features compared
+FEATURES_A_PIXEL, MOST_FEATURES = 8e-3, 4096
 GRID = 5  # sampled pixels along each side of a photo by which its neighbours are chosen
 DEPTHS = (0.5, 1.0, 2.0)  # of the distance at which the cameras look together
 ANGLES = (2.0, 35.0)  # degrees between two rays: below no depth is told, above SIFT fails
@@ -28,24 +34,61 @@ ENOUGH_PHOTOS = 4  # of a modality: then three must show a point, else two
 OUTSIDE = 0.1  # of the photos that have a point in them may show background there
 
 
+class Effort(NamedTuple):
+    """How closely the photos are looked at."""
+
+    first_octave: int = -1  # -1: photos are doubled first, which finds four times the features
+    neighbours: int = NEIGHBOURS  # photos that each is matched with, and those that chose it
+    most: int = MOST_PHOTOS  # photos of all modalities together
+
+
+# From dear to cheap.  Of the tankard at 500 pixels these take 29, 20, 4, 2.6 and 1.3 s of a core.
+EFFORTS = (
+    Effort(), Effort(neighbours=4), Effort(0), Effort(0, 4), Effort(0, 4, MOST_PHOTOS // 4),
+)  # fmt: skip
+
+
+def choose_effort(photos: list[LoadedPhoto], seconds: float | None) -> Effort:
+    """The closest look that takes no more than SHARE of a run's seconds; the cheapest else.
+
+    It follows from the photos and the budget alone: no clock is looked at.
+    """
+    if seconds is None:
+        return EFFORTS[0]
+    return next((e for e in EFFORTS if cost_s(photos, e) <= SHARE * seconds), EFFORTS[-1])
+
+
+def cost_s(photos: list[LoadedPhoto], effort: Effort) -> float:
+    """About how many seconds of one core the matching takes."""
+    chosen = thinned(photos, effort.most)
+    less = 1.0 if effort.first_octave < 0 else 0.25
+    pixels = np.array([math.prod(photo.view.size) for photo in chosen], float)
+    features = less * np.minimum(FEATURES_A_PIXEL * pixels, MOST_FEATURES)
+    pairs = 0.6 * effort.neighbours * len(chosen)
+    return float(less * PIXEL_S * pixels.sum() + PAIR_S * pairs * (features**2).mean())
+
+
 def triangulated_points(
-    photos: list[LoadedPhoto], background: tuple | None, progress: Progress
-) -> np.ndarray:
+    photos: list[LoadedPhoto], background: tuple | None, progress: Progress,
+    seconds: float | None = None,
+) -> np.ndarray:  # fmt: skip
     """(P, 3) metres, sorted, each once; (0, 3) where nothing matches.
 
-    Raises BadFile where pycolmap is absent or fails.
+    seconds: of the whole run; None: as many as it takes.  Raises BadFile where pycolmap is absent
+    or fails.
     """
-    chosen = thinned(photos)
+    effort = choose_effort(photos, seconds)
+    chosen = thinned(photos, effort.most)
     pairs = [
         (rows[i], rows[j])
         for rows in by_modality(chosen).values()
-        for i, j in choose_pairs([chosen[row].view for row in rows])
+        for i, j in choose_pairs([chosen[row].view for row in rows], effort.neighbours)
     ]
     if not pairs:
         return np.zeros((0, 3))
     with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
         given, wanted = Path(folder, "photos.npz"), Path(folder, "points.npz")
-        write_job(given, chosen, pairs, background)
+        write_job(given, chosen, pairs, background, effort.first_octave)
         log = Path(folder, "log.txt")
         run_child(SCRIPT, [str(given), str(wanted)], log, progress, FAILURE)
         with np.load(wanted) as file:
@@ -61,10 +104,10 @@ def by_modality(photos: list[LoadedPhoto]) -> dict[str, list[int]]:
     return found
 
 
-def thinned(photos: list[LoadedPhoto]) -> list[LoadedPhoto]:
-    """At most MOST_PHOTOS, evenly out of each modality."""
+def thinned(photos: list[LoadedPhoto], most: int = MOST_PHOTOS) -> list[LoadedPhoto]:
+    """At most so many photos, evenly out of each modality."""
     rows = by_modality(photos).values()
-    most = max(MOST_PHOTOS // max(len(rows), 1), 2)
+    most = max(most // max(len(rows), 1), 2)
     counts = [min(len(mine), most) for mine in rows]
     return [
         photos[mine[i * len(mine) // count]]
@@ -73,9 +116,9 @@ def thinned(photos: list[LoadedPhoto]) -> list[LoadedPhoto]:
     ]
 
 
-def choose_pairs(views: list[View]) -> list[tuple[int, int]]:
+def choose_pairs(views: list[View], neighbours: int = NEIGHBOURS) -> list[tuple[int, int]]:
     """Each view with those that see most of what it sees from a different place, i < j, sorted."""
-    if len(views) <= NEIGHBOURS + 1:
+    if len(views) <= neighbours + 1:
         return [(i, j) for j in range(len(views)) for i in range(j)]
     centre, _ = common_box(views)
     eyes = np.array([view.world_from_eye.position for view in views])
@@ -85,7 +128,7 @@ def choose_pairs(views: list[View]) -> list[tuple[int, int]]:
         points = places_before(view, away)
         shared = np.array([shared_part(points, eyes[i], other) for other in views])
         shared[i] = -1
-        for j in np.argsort(-shared, kind="stable")[:NEIGHBOURS].tolist():
+        for j in np.argsort(-shared, kind="stable")[:neighbours].tolist():
             if shared[j] > 0:
                 pairs.add((min(i, j), max(i, j)))
     return sorted(pairs)
@@ -118,20 +161,22 @@ def shared_part(points: np.ndarray, eye: np.ndarray, other: View) -> float:
 
 
 def write_job(
-    path: Path, photos: list[LoadedPhoto], pairs: list[tuple[int, int]], background: tuple | None
-) -> None:
+    path: Path, photos: list[LoadedPhoto], pairs: list[tuple[int, int]], background: tuple | None,
+    first_octave: int = -1,
+) -> None:  # fmt: skip
     """What triangulate_run.py reads of N photos.
 
     gray0 ... (H, W) uint8; counts0 ... (H, W) bool where not all of a photo counts;
     camera_from_world (N, 4, 4); pinholes (N, 4) fx fy cx cy; sizes (N, 2); pairs (M, 2) numbers
-    of photos; least (N,) photos that must show a point of this one's modality.
+    of photos; least (N,) photos that must show a point of this one's modality; first_octave of
+    SIFT.
     """
     arrays: dict[str, np.ndarray] = {}
     cameras = [photo.view.pinhole() for photo in photos]
     arrays["camera_from_world"] = np.array([camera[0] for camera in cameras])
     arrays["pinholes"] = np.array([camera[1:] for camera in cameras])
     arrays["sizes"] = np.array([photo.view.size for photo in photos])
-    arrays["pairs"] = np.array(pairs)
+    arrays["pairs"], arrays["first_octave"] = np.array(pairs), np.array(first_octave)
     many = {name: len(rows) >= ENOUGH_PHOTOS for name, rows in by_modality(photos).items()}
     arrays["least"] = np.array([3 if many[photo.modality] else 2 for photo in photos])
     for i, photo in enumerate(photos):

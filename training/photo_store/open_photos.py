@@ -1,5 +1,6 @@
 """The photos of a run: all of them in memory where they fit, else from a store on the disk."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,7 @@ class TrainingPhotos:
         self, train: list[LoadedPhoto], test: list[LoadedPhoto], store: PhotoStore | None = None
     ) -> None:
         self.train, self.test, self.store = train, test, store
+        self.load_s = 0.0  # processor time of those that were all read at the beginning
         self.asked = 0  # the first iteration whose photo was not asked for
 
     def read_ahead(self, photo_of: Callable[[int], LoadedPhoto], iteration: int) -> None:
@@ -47,10 +49,15 @@ class TrainingPhotos:
         self.asked = end
 
     def seconds(self, processor: bool) -> float:
-        """That reading took since the run began: of processors, or waited for by the clock."""
+        """Of reading from the store: of processors, or waited for by the clock."""
         if self.store is None:
             return 0.0
         return self.store.read_s if processor else self.store.waited_s
+
+    @property
+    def read_s(self) -> float:
+        """Processor seconds that reading photos has taken in all; no budget counts them."""
+        return self.load_s + self.seconds(True)
 
     @property
     def most(self) -> int | None:
@@ -92,8 +99,11 @@ def open_photos(
     room = room or PhotoRoom()
     most = memory_for_photos() if room.most is None else room.most
     if memory_of(capture.photos, factor) <= most:
+        began = time.process_time()
         train, test = (load_photos(capture, split, factor, masks) for split in ("train", "test"))
-        return TrainingPhotos(train, test)
+        loaded = TrainingPhotos(train, test)
+        loaded.load_s = time.process_time() - began
+        return loaded
     reader = PhotoReader.of(capture.photos, factor, masks)
     files = PhotoFiles(capture.photos, reader, room.folder)
     store = PhotoStore(capture.photos, reader, files, most)

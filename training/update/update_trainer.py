@@ -87,7 +87,7 @@ class UpdateTrainer(Trainer):
             for name, rows in rows_of(self.outside, self.layout).items()
         }
         rng = np.random.default_rng([settings.seed, 0])
-        first = initial_points(self.capture, photos, rng, settings.points, report)
+        first = initial_points(self.capture, photos, rng, settings.points, report, settings.seconds)
         self.warnings += first.doubts
         self.origin = first.origin
         start = first_anchors(first, settings.max_anchors, photos, self.schedule.background)

@@ -10,6 +10,7 @@ import shapeshift as ss
 from shapeshift.app import cli
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
+from shapeshift.scene.inspection.lengths import Scale
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.scene.inspection.marks_file import (
     MarksFile,
@@ -72,10 +73,35 @@ def test_a_scale_is_kept_beside_the_scene(words, capsys):
         beside.unlink()
 
 
+def test_what_was_measured_is_kept_in_a_unit_and_reported(words, tmp_path, capsys):
+    """Two calls: L1, then L2 in feet; the report has both, the file their uncertainty."""
+    beside, report = marks_path(Path(words[1])), tmp_path / "lengths.html"
+    try:
+        assert cli.main([*words, "--distance", "20,36", "76,36", "--keep"]) == 0
+        one = float(capsys.readouterr().out.split()[1])
+        more = ["--distance", "0,0,0", "0,0,0.3048", "--unit", "ft", "--keep", "--report"]
+        assert cli.main([*words, *more, str(report), str(report.with_suffix(".pdf"))]) == 0
+        assert capsys.readouterr().out == "distance: 1.0000 ft\n"  # places in metres are exact
+        kept = read_marks_file(beside).lengths
+        assert [each.name for each in kept] == ["L1", "L2"]
+        found = kept[0].measured(Scale())
+        assert found.value == pytest.approx(one, abs=1e-4) and found.uncertainty > 0
+        text = report.read_text()
+        assert found.words("ft") in text and "1.0000 ft" in text
+        assert report.with_suffix(".pdf").stat().st_size > 2000
+        assert cli.main([*words, "--report", str(report)]) == 2
+        assert "--overwrite" in capsys.readouterr().err
+    finally:
+        beside.unlink(missing_ok=True)
+
+
 @pytest.mark.parametrize(
     ("more", "sentence"),
     [
         ([], "nothing is to be measured"),
+        (["--keep"], "keeps what is measured"),
+        (["--report", "a.docx"], ".html or .pdf"),
+        (["--report", "a.html"], "nothing was measured yet"),
         (["--distance", "20,36"], "2 are wanted"),
         (["--angle", "1,2,3", "1,2,3"], "3 are wanted"),
         (["--distance", "0,0", "48,36"], "covers less than half"),

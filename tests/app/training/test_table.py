@@ -156,7 +156,7 @@ def test_without_a_file_the_column_is_absent_and_the_reason_is_told(balls, tmp_p
 
 
 def made(method: str, psnr: float, mb: float, seconds: float = 10.0) -> TableRow:
-    return TableRow(method, MEAN, psnr, psnr, 0.9, mb, seconds, 100, 5, 4)
+    return TableRow(method, MEAN, psnr, psnr, 0.9, mb, seconds, 1.0, 100, 5, 4)
 
 
 def test_the_verdict_is_arithmetic():
@@ -175,12 +175,15 @@ def test_the_mean_counts_one_file_once(tmp_path):
     (tmp_path / "a").write_bytes(b"x" * 2_000_000)
     (tmp_path / "b").write_bytes(b"x" * 500_000)
     rows = [
-        VggRow("splats", "RGB", 30.0, 31.0, 0.8, 2.0, 7.0, 70, 1000, 3, 0.1),
-        VggRow("splats", "Thermal", 35.0, 34.0, 0.9, 0.5, 3.0, 30, 501, 5, 0.3),
+        VggRow("splats", "RGB", 30.0, 31.0, 0.8, 2.0, 7.0, 2.5, 70, 1000, 3, 0.1),
+        VggRow("splats", "Thermal", 35.0, 34.0, 0.9, 0.5, 3.0, 0.5, 30, 501, 5, 0.3),
     ]
-    runs = [TrainedFile(tmp_path / "a", 7.0, 70), TrainedFile(tmp_path / "b", 3.0, 30)]
+    runs = [
+        TrainedFile(tmp_path / "a", 7.0, 70, 2.5),
+        TrainedFile(tmp_path / "b", 3.0, 30, 0.5),
+    ]
     mean = mean_row(rows, runs)
-    assert mean == VggRow("splats", MEAN, 32.5, 32.5, 0.85, 2.5, 10.0, 100, 750, 8, 0.2)
+    assert mean == VggRow("splats", MEAN, 32.5, 32.5, 0.85, 2.5, 10.0, 3.0, 100, 750, 8, 0.2)
     assert mean_row(rows, runs[:1]).mb == 2.0
 
 
@@ -188,7 +191,8 @@ def test_a_model_of_all_modalities_tells_its_size_once():
     rows = [replace(made("joint", 30, 0.5), modality="RGB"), made("joint", 30, 0.5)]
     _, lines = cells([*rows, made("splats", 31, 9)])
     assert [line[0] for line in lines] == ["shape-shifting", "", "3DGS splats"]
-    assert [line[-3:-1] for line in lines] == [["", ""], ["0.50", "100"], ["9.00", "100"]]
+    assert [line[-4:-2] for line in lines] == [["", ""], ["0.50", "100"], ["9.00", "100"]]
+    assert [line[-2:] for line in lines] == [["", ""], ["10.0", "1.0"], ["10.0", "1.0"]]
 
 
 def test_options_go_to_the_methods_that_have_them(tmp_path):

@@ -13,7 +13,11 @@ from shapeshift.training.first_anchors import initial, triangulation
 from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import initial_points
 from shapeshift.training.first_anchors.triangulation import (
+    EFFORTS,
+    SHARE,
+    choose_effort,
     choose_pairs,
+    cost_s,
     thinned,
     triangulated_points,
 )
@@ -218,3 +222,26 @@ def test_masks_give_a_hull_beside_the_points(monkeypatch):
     assert both.points.tobytes() == found(masked).tobytes()
     start = first_anchors(both, 100, masked, None)
     assert len(start.anchors) == int(initial.ON_HULL * 100) + min(len(both.points), 70)
+
+
+def test_a_small_budget_takes_a_cheaper_look(photos):
+    """What costs no more than the share at each threshold exactly; no clock has a say in it."""
+    many = photos * 12  # each look is cheaper than the one before
+    costs = [cost_s(many, effort) for effort in EFFORTS]
+    assert costs == sorted(costs, reverse=True) and len(set(costs)) == len(costs)
+    assert choose_effort(many, None) == EFFORTS[0] == choose_effort(many, 1e9)
+    assert EFFORTS[0] == triangulation.Effort(-1, triangulation.NEIGHBOURS, 120)  # as without one
+    for effort, cost, less in zip(EFFORTS, costs, [*EFFORTS[1:], EFFORTS[-1]], strict=True):
+        assert choose_effort(many, np.nextafter(cost / SHARE, np.inf)) == effort
+        assert choose_effort(many, 0.999 * cost / SHARE) == less
+    assert choose_effort(many, 0.1) == EFFORTS[-1]
+
+
+def test_what_a_cheaper_look_finds_is_as_right(photos):
+    """Fewer points, from photos that are not doubled, whose features are placed to a pixel, not to
+    half of one: a pixel's error is 2 cm of depth."""
+    seconds = 1.001 * cost_s(photos, EFFORTS[2]) / SHARE
+    assert choose_effort(photos, seconds) == EFFORTS[2]
+    points = triangulated_points(photos, None, lambda stage, done, of: None, seconds)
+    assert 10 < len(points) < len(found(photos))
+    assert np.median(off_surface(points)) < 0.02 and np.percentile(off_surface(points), 90) < 0.05
