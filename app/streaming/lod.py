@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL
+from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
 from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
@@ -22,7 +23,7 @@ PACKAGE_LEVELS = ".lod"  # as level_files.py has it, which is loaded when it is 
 
 
 @dataclass(frozen=True)
-class Options(ReadingOptions):
+class Options(ClusterOptions, ReadingOptions):
     """Write levels of detail.  Of splats, each with half of the splats of the one before, made by
     merging neighbours: a folder in PlayCanvas's streamed SOG, with the errors that its engine
     spends its budget by; this program reads the finest level that --max-splats allows.  Of a
@@ -35,6 +36,8 @@ class Options(ReadingOptions):
     out: Path
     """The folder to write: NAME.lod of a package, which stays one; without an ending streamed SOG,
     with lod-meta.json in it."""
+    more: Annotated[tuple[Path, ...], Opt(positional=True, metavar="MORE")] = ()
+    """More of them: each becomes a folder of its name in --out.  Default: none."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
     stop, and in a scene file what it says for each object."""
@@ -52,11 +55,14 @@ class Options(ReadingOptions):
 def run(options: Options) -> int:
     from shapeshift.app.commands.exported import check_output
     from shapeshift.app.errors import UsageError
+    from shapeshift.app.streaming.lod_files import write_several
 
     if not LEAST_LEAF <= options.leaf <= MOST_LEAF:
         raise UsageError(f"--leaf is {options.leaf}, expected {LEAST_LEAF} to {MOST_LEAF}.")
     if not 0 <= options.sh_degree <= 3:
         raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
+    if options.more or options.cluster != NONE:
+        return write_several(options)
     if options.out.suffix.lower() == PACKAGE_LEVELS:
         return write_package_levels(options)
     if options.out.suffix:

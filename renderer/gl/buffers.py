@@ -25,6 +25,7 @@ Every class has release() and works with `with`; nothing is allocated after the 
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 
 import moderngl
 import numpy as np
@@ -62,10 +63,15 @@ class Arena:
     """The splats of all objects, and what a frame makes of them."""
 
     def __init__(
-        self, gpu: Gpu, counts: list[int], antialiased: tuple[bool, ...] | None = None
-    ) -> None:
-        """Room for objects of so many splats; antialiased: one an object, None: no object is."""
-        self.count = sum(counts)
+        self, gpu: Gpu, counts: list[int], antialiased: tuple[bool, ...] | None = None,
+        more: int = 0,
+    ) -> None:  # fmt: skip
+        """Room for objects of so many splats; antialiased: one an object, None: no object is.
+
+        more: rows behind those of the objects, whose owners `paged` tells.
+        """
+        self.count = sum(counts) + more
+        self.paged: list[tuple[int, int, int]] = []  # object, first row, last row + 1, of those
         if not self.count <= fitting_splats(gpu):
             raise too_many(self.count, fitting_splats(gpu), limit_of(gpu), "tiles")
         self.gpu = gpu
@@ -90,6 +96,12 @@ class Arena:
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
         self._pack = gpu.compute("pack.comp")
         self._heats: dict[int, moderngl.Buffer] = {}  # set -> heat that goes with its colours
+
+    @property
+    def runs(self) -> list[tuple[int, int, int]]:
+        """(object, first row, last row + 1) of all rows."""
+        own = ((i, *ends) for i, ends in enumerate(pairwise(self.starts)))
+        return [*(run for run in own if run[2] > run[1]), *self.paged]
 
     def heat_of(self, which: int) -> moderngl.Buffer:
         """What thermal stops have in a set of colours; made, all zero, when first asked for."""

@@ -38,7 +38,7 @@ class Decoder:
         for model in models:
             if id(model) in made:
                 continue
-            if isinstance(model, SplatLayers) and only_fades(model):
+            if isinstance(model, SplatLayers) and only_fades(model) and model.leaves is None:
                 made[id(model)] = Layers(gpu, model)
             elif mlps == "gl" and isinstance(model, BlockModel):
                 made[id(model)] = GlBlocks(gpu, model)

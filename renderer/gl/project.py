@@ -1,7 +1,6 @@
 """project: splats -> screen ellipses and keys to sort by; the only culling gate."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import moderngl
 import numpy as np
@@ -86,12 +85,11 @@ class Projector:
             )  # fmt: skip
             if len(views) > 1:
                 set_uniforms(program, count=arena.count)
-        for i, (first, last) in enumerate(pairwise(arena.starts)):
-            if last > first:
-                program = programs[arena.antialiased[i]]
-                set_uniforms(program, first=first, last=last)
-                program["frames"].write(rows[i])
-                program.run(groups_for(last - first, layout.WORKGROUP))
+        for i, first, last in arena.runs:
+            program = programs[arena.antialiased[i]]
+            set_uniforms(program, first=first, last=last)
+            program["frames"].write(rows[i])
+            program.run(groups_for(last - first, layout.WORKGROUP))
         self._gpu.ctx.memory_barrier()
 
     def counts(self, arena: Arena, i: int = 0) -> dict[str, int]:

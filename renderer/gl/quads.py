@@ -29,6 +29,7 @@ from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, StereoPairSplatte
 from shapeshift.renderer.gl.surface import DepthPictures, draw_surface
 from shapeshift.renderer.gl.target import brightest, choose_target, warn_once
 from shapeshift.renderer.layout import MOST_VIEWS
+from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy, sort_frames
 from shapeshift.renderer.surface import Surface
@@ -75,13 +76,14 @@ class QuadsDrawing(Drawing):
         """How many buffers and textures were ever made."""
         return self._gpu.allocations
 
-    def allocate(self, models: list[Model]) -> None:
+    def allocate(self, models: list[Model], more: int = 0) -> None:
+        """more: rows behind those of the objects."""
         self._release_arena()
         self._changed = True
         self._models, self._most = models, []
         self._grades = {}
-        counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
-        self.arena = Arena(self._gpu, counts, antialiased)
+        counts, antialiased = list(map(arena_rows, models)), tuple(map(is_antialiased, models))
+        self.arena = Arena(self._gpu, counts, antialiased, more)
         self._decoder = Decoder(self._gpu, self.arena, models, self._mlps)
         self._allocated = [self.arena, self._decoder]
         if any(map(has_heat, models)):

@@ -90,6 +90,8 @@ def together(parts: Sequence[Filled]) -> tuple[np.ndarray, LeafSplats]:
         return np.concatenate([getattr(part.splats, name) for part in parts])
 
     sh = [np.pad(p.splats.sh, ((0, 0), (0, most - p.splats.sh.shape[1]), (0, 0))) for p in parts]
-    names = ("leaves", "levels", "counts", "means", "scales", "wxyz", "opacity")
-    splats = LeafSplats(*map(column, names), np.concatenate(sh))
+    splats = LeafSplats(
+        column("leaves"), column("levels"), column("counts"), column("means"), column("scales"),
+        column("wxyz"), column("opacity"), np.concatenate(sh),
+    )  # fmt: skip
     return np.concatenate([part.owner for part in parts]), splats

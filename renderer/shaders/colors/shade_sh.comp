@@ -16,10 +16,22 @@ uniform uint start;         // arena row of the first
 uniform uint coefficients;  // 1, 4, 9 or 16
 uniform vec3 eye;           // metres in the object
 
+#ifndef PAGE
+#define PAGE 0  // above 0: sh is (pages, coefficients * 3, PAGE), from page first_page on
+#endif
+#if PAGE
+uniform uint first_page;
+#endif
+
 vec3 coefficient(uint i, uint k) {
+#if PAGE
+    uint at = ((first_page + i / PAGE) * 3u * coefficients + 3u * k) * PAGE + i % PAGE;
+    return vec3(sh[at], sh[at + PAGE], sh[at + 2u * PAGE]);
+#else
     // A stream a coefficient and channel: neighbouring invocations read neighbouring floats.
     uint at = 3u * k * count + i;
     return vec3(sh[at], sh[at + count], sh[at + 2u * count]);
+#endif
 }
 
 void main() {

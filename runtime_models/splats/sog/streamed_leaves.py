@@ -27,6 +27,7 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
     read_tree,
 )
 from shapeshift.runtime_models.splats.sog.sog_chunk import SogChunk
+from shapeshift.runtime_models.splats.sog.sog_files import META
 
 AT_ONCE = 1 << 16  # splats that are converted together: some 100 bytes each for a moment
 FARTHEST = 1e12  # metres of a box; as of a scene
@@ -43,7 +44,7 @@ class StreamedLeaves:
         self.problem = ""
         self.cache, self._reading = reading.leaves.cache, reading
         self._ours = ours_from_file(reading.up or COLMAP_UP, reading.flip)
-        self._origin, self._antialiased = (0.0, 0.0, 0.0), False
+        self._origin, self._antialiased, self._format = (0.0, 0.0, 0.0), False, "SOG"
         files = [*streamed.files]
         environment = streamed.environment
         if environment is not None:
@@ -107,14 +108,21 @@ class StreamedLeaves:
         counts = [int(n) for n in self.levels.counts.sum(axis=0)]
         last = int(coarsest.max())
         provenance = {
-            "format": "SOG v2", "files": [TREE], "level": last, "level_splats": counts,
-            "leaves": len(leaves),
+            "format": self._format, "files": self._file_names(), "level": last,
+            "level_splats": counts, "leaves": len(leaves),
         }  # fmt: skip
         return SplatLayers(
             means, scales, wxyz, opacity, sh, np.zeros(len(sh), np.int32),
             (Stop(name, 0.0, "layer"),), provenance=provenance, origin=self._origin,
             antialiased=self._antialiased, findings=tuple(findings), leaves=self,
         )  # fmt: skip
+
+    def _file_names(self) -> list[str]:
+        """All files that belong to the scene, from its folder."""
+        every = [self._folder / TREE]
+        for path in self._files:
+            every += filter(Path.is_file, path.parent.iterdir()) if path.name == META else [path]
+        return [path.relative_to(self._folder).as_posix() for path in every]
 
     def at_hand(self) -> np.ndarray:
         return np.array([(*self._key, n) in self.cache for n in range(len(self._files))])
@@ -172,7 +180,7 @@ class StreamedLeaves:
             raise BadFile(self.problem)
         within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         raw = chunk.rows(np.repeat(first, counts) + within)
-        self._antialiased = raw.antialiased
+        self._antialiased, self._format = raw.antialiased, raw.format
         raw.extra = {"leaf": np.repeat(np.arange(len(leaves)), counts)}
         odd, filed = activate(raw, self._ours)
         findings = [*raw.findings, *repair_rows(raw, odd, filed)]

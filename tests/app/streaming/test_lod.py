@@ -61,3 +61,26 @@ def test_refusals_are_one_sentence(scene, tmp_path, monkeypatch, capsys, words, 
     assert said in text and "Traceback" not in text
     assert (tmp_path / "there" / "own.txt").read_text() == "kept"
     assert not (tmp_path / "b").exists()
+
+
+def test_several_scenes_are_the_folders_of_each(scene, tmp_path, capsys):
+    """Each in a process of its own; the same bytes as alone, and nothing left beside them."""
+    write_ply(some_splats(300, 4, opacities=(0.3, 0.9)), tmp_path / "other.ply")
+    scenes = [str(scene), str(tmp_path / "other.ply")]
+    for name in ("a", "other"):
+        path = str(tmp_path / f"{name}.ply")
+        assert cli.main(["lod", path, "--leaf", "100", "--out", str(tmp_path / f"{name}1")]) == 0
+    many = ["lod", *scenes, "--leaf", "100", "--out", str(tmp_path / "many")]
+    assert cli.main(many) == 0
+    for name in ("a", "other"):
+        one, other = tmp_path / f"{name}1", tmp_path / "many" / name
+        files = sorted(p.relative_to(one) for p in one.rglob("*") if p.is_file())
+        assert files == sorted(p.relative_to(other) for p in other.rglob("*") if p.is_file())
+        assert all((one / file).read_bytes() == (other / file).read_bytes() for file in files)
+    assert not (tmp_path / "many.tasks").exists()
+    capsys.readouterr()
+    assert cli.main(many) == 2 and "--overwrite replaces it" in capsys.readouterr().err
+    assert cli.main(["lod", scenes[0], scenes[0], "--out", str(tmp_path / "b")]) == 2
+    assert "two scenes are called a" in capsys.readouterr().err
+    assert cli.main(["lod", scenes[0], "no.ply", "--out", str(tmp_path / "b")]) == 2
+    assert "no.ply: there is no such file" in capsys.readouterr().err

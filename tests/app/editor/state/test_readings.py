@@ -1,6 +1,7 @@
 """What the viewer tells about speed and likeness: the last second, exact or not, the budget."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ class KnownRenderer:
     def __init__(self, drawing: str = "tiles (test)") -> None:
         self.settings, self.backends = RenderSettings(), {"drawing": drawing}
         self.drawn, self.presents, self.updates = [], 0, 0
+        self.streaming = SimpleNamespace(due=False)  # nothing comes by and by
         self._image = np.zeros((6, 8, 3))
 
     def update(self, scene) -> None:

@@ -58,6 +58,8 @@ def test_boxes_hold_the_splats_and_errors_rise_with_the_level(folder):
     assert (np.diff(levels.errors, axis=1) >= 0).all() and (levels.errors[:, 0] == 0).all()
     facts = describe(model, folder)
     assert facts["leaves"] == len(levels.low) == describe(read_model(folder), folder)["leaves"]
+    files = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    assert facts["bytes"] == files
     assert facts["levels"] == dict(enumerate(levels.counts.sum(axis=0).tolist()))
 
 
