@@ -73,9 +73,10 @@ class Options(MachineOptions, ClusterOptions):
     it."""
     cut: Annotated[Path | None, EXPERT] = None
     """One part of --blocks by hand: cut the run of the whole whose package this is; --out is a
-    folder with a start for each block."""
+    folder with a start for each block.  Default: nothing is cut."""
     block: Annotated[Path | None, EXPERT] = None
-    """One part of --blocks by hand: train the block that begins with this file, N.start.npz."""
+    """One part of --blocks by hand: train the block that begins with this file, N.start.npz.
+    Default: none."""
     separate: Annotated[bool, EXPERT] = False
     """Train one anchor model for each modality, to compare with; --out is a folder of packages, and
     the modalities share the budget."""

@@ -5,10 +5,11 @@
 Each level as `launch.py lod` makes it ("learned"), its anchors before they learn ("averaged"), and
 plain splats in as many bytes, baked at the stops and half-way between them, merged, and faded into
 each other ("baked").  Rows: PSNR against the package over four views of 640x360 at the stops, at
-half-way (where baked splats are exact but for merging) and at a quarter (where they fade), the mean
-change of the model's own pixels at the stops, of 255, at the size where the level begins and at
-about 1, 2, 4 and 8 times the distance that shows all of it; then the processor time of a frame
-whose x has changed, networks included, over that of level 0, in turns in one run.
+half-way (where baked splats are exact but for merging) and at a quarter (where they fade), at the
+stops also over the model's own pixels alone (that either picture covers by 2 %), and their mean
+change, of 255; at the size where the level begins and at about 1, 2, 4 and 8 times the distance
+that shows all of it; then the processor time of a frame whose x has changed, networks included,
+over that of level 0, in turns in one run.
 """
 
 import argparse
@@ -18,11 +19,13 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
 from shapeshift.app.commands.exported import ExportLook, Part, bake_part  # noqa: E402
-from shapeshift.app.streaming.level_errors import LevelMeter, change_of, psnr_of  # noqa: E402
+from shapeshift.app.streaming.level_errors import COVERED, LevelMeter, change_of, psnr_of  # noqa: E402
 from shapeshift.app.streaming.package_levels import (  # noqa: E402
     SHARES,
     make_levels,
@@ -42,7 +45,7 @@ FRAMES = 24
 QUARTERS = (0.25, 0.75)
 HEAD = (
     "scene,level,form,anchors_or_splats,bytes,of_package,cpu_s_learning,pixels,db_stops,db_halfway,"
-    "db_quarter,change_255,frame_ratio"
+    "db_quarter,db_own_pixels,change_255,frame_ratio"
 )
 
 
@@ -61,6 +64,15 @@ def at_quarters(meter: LevelMeter) -> None:
     stops = meter.xs["stops"]
     pairs = list(pairwise(stops))
     meter.xs["quarter"] = [a + part * (b - a) for a, b in pairs for part in QUARTERS]
+
+
+def own_psnr(one: list, other: list) -> float:
+    """dB over the pixels that either of two pictures covers, the mean of squares over pictures."""
+    squares = []
+    for (a, alpha), (b, beta) in zip(one, other, strict=True):
+        covered = np.maximum(alpha, beta) >= COVERED
+        squares.append(np.square(a - b, dtype=np.float64)[covered].mean())
+    return float(-10 * np.log10(np.mean(squares)))
 
 
 def frame_ratio(whole: AnchorModel, other: Model, meter: LevelMeter, pixels: float) -> float:
@@ -105,6 +117,7 @@ def rows_of(path: Path, seconds: float) -> list[str]:
                 for pixels in (begins, *SIZES_PX):
                     mine = meter.pictures(other, pixels)
                     db = [psnr_of(mine[at], truth[pixels][at]) for at in mine]
+                    db.append(own_psnr(mine["stops"], truth[pixels]["stops"]))
                     change = change_of(mine["stops"], truth[pixels]["stops"])
                     ratio = frame_ratio(meter.model, other, meter, pixels)
                     values = ",".join(f"{value:.2f}" for value in db)
