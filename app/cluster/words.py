@@ -11,7 +11,8 @@ from shapeshift.app.paths import full
 def words_for(command: str, options: Any) -> tuple[str, ...]:
     """A command with its options, so that `parse` of them gives the same; paths are absolute."""
     places, rest = [], []
-    for each in arguments_of(type(options)):
+    kind: type = type(options)
+    for each in arguments_of(kind):
         given, value = _value_of(options, each)
         if not given:
             continue

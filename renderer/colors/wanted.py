@@ -14,7 +14,7 @@ from shapeshift.renderer.colors.eye_colors import EyeColors, shared_is_enough
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.model import ScaffoldModel
+from shapeshift.runtime_models.model import ScaffoldModel, SplatLayers
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
 
@@ -24,6 +24,7 @@ def wanted_anchors(
     colored: ColorCache, stale: bool, views: list[View],
 ) -> np.ndarray | None:  # fmt: skip
     """(A,) bool: the anchors that views see and whose colours are stale; None: all."""
+    assert not isinstance(obj.model, SplatLayers), "splats are asked for by wanted_splats"
     if not settings.skip_unseen:
         return wanted_splats(colored, stale, None)
     if not stale and colored.anchors is None:

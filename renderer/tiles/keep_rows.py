@@ -1,18 +1,18 @@
 """Rows of one arena of the tiles in another: what stays decoded where other objects change."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from shapeshift.rasterizer.device import Device
 from shapeshift.renderer.tiles.slot import Slot
 
 if TYPE_CHECKING:
-    pass
+    from pyopencl.array import Array
 
-Tables = "list[Array | None]"  # with a row a splat
+    Tables: TypeAlias = "list[Array | None]"  # with a row a splat
 
 
 def keep_rows(
-    device: Device, before: list[Slot], after: list[Slot], tables: list[tuple[Tables, Tables]]
+    device: Device, before: list[Slot], after: list[Slot], tables: "list[tuple[Tables, Tables]]"
 ) -> list[bool]:
     """Copies what objects of the same model have decoded, and puts their slots in place of new
     ones; which objects these are.  tables: pairs of the same, of the arena before and after.

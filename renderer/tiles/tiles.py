@@ -84,6 +84,8 @@ class TilesDrawing(Drawing):
         self.draws_heat = False  # in addition to the colours, from the next frame on
         self._heat_images: dict[int, np.ndarray] = {}
         self._depths: dict[int, np.ndarray] = {}
+        self._colors: list = []  # rows of four of each splat: one for all views, or one a view
+        self._heats: list = []  # of the same splats, (N, 4) once an object has any
 
     def exchange(self, models: list[Model]) -> list[bool]:
         arena, slots, self._known = self._tables(), self._slots, self._decodings
@@ -109,9 +111,9 @@ class TilesDrawing(Drawing):
         self._splats_moved()
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
-        self._colors: list = [device.zeros((self.splats, 4))]  # for all views, or one a view
+        self._colors = [device.zeros((self.splats, 4))]
         self._color, self._set = self._colors[0], 0  # that decoding writes into
-        self._heats: list = [None]  # of the same splats, (N, 4) once an object has any
+        self._heats = [None]
         self._antialiased = tuple(map(is_antialiased, models))
         index = np.repeat(np.arange(len(models), dtype=np.int32), counts)
         self._object_index = device.upload(np.pad(index, (0, more)))
@@ -234,9 +236,9 @@ class TilesDrawing(Drawing):
                 self._heat_images.update(zip(numbers, heats, strict=False))
         if settings.depth_scale > 0:
             with timer.time("depth", on_gpu=False):
-                scene = (self._arena, self._world_from_objects)
-                given = (self._projected, tiles, views, settings.depth_scale)
-                made = depth_pictures(self.device, *scene, *given)
+                scene = (self.device, self._arena, self._world_from_objects)
+                scale = settings.depth_scale
+                made = depth_pictures(*scene, self._projected, tiles, views, scale)
                 self._depths.update(enumerate(made, first))
 
     @property

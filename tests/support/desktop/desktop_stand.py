@@ -44,6 +44,7 @@ class PlainRenderer:
         self.settings = RenderSettings()
         self.backends = {"drawing": "none", "mlps": "none", "sort": "none"}
         self.drawing = SimpleNamespace(draws_heat=False)
+        self.streaming = SimpleNamespace(due=False, stats=None, converges=True)
         self.updates = self.draws = self.presents = 0
         self.view, self.drawn_at = None, self.settings
 
