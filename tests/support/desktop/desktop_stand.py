@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -45,6 +46,7 @@ class PlainRenderer:
         self.backends = {"drawing": "none", "mlps": "none", "sort": "none"}
         self.drawing = SimpleNamespace(draws_heat=False)
         self.streaming = SimpleNamespace(due=False, stats=None, converges=True)
+        self.levels = SimpleNamespace(all_whole=nullcontext)
         self.updates = self.draws = self.presents = 0
         self.view, self.drawn_at = None, self.settings
 
