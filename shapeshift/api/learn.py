@@ -72,12 +72,12 @@ def train(
     processor time of all threads, the start among them; on a GPU by the clock.  The same iterations
     give the same bits on one device.  out: a package, NAME.shift or a folder, that is written with
     its checkpoint beside it, also every minute and when Ctrl-C ends the run; resume goes on from
-    there.  calibrate: a modality whose cameras all sit a little beside their stated poses, as on a
-    rig.  pace: measure how evenly the slider moves, a second a pair of stops.  photo_mb: MB of
-    memory that photos may take; what does not fit is read when its step comes, and the scene is the
-    same to the bit; None is half of what files may take.  progress: called after every step with
-    (iteration, fraction, loss, anchors); False from it ends the run with what there is.  settings:
-    any field of `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
+    there.  calibrate: a modality whose cameras all sit beside their stated poses, as on a rig.
+    pace: measure how evenly the slider moves, a second a pair of stops.  photo_mb: MB of memory
+    that photos may take; what does not fit is read when its step comes, to the same bits; None:
+    half of what files may take.  progress: called after every step with (iteration, fraction, loss,
+    anchors); False from it ends the run with what there is.  settings: any field of
+    `shapeshift.training.settings.TrainSettings`.
 
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
