@@ -77,7 +77,7 @@ def train(
     that photos may take; what does not fit is read when its step comes, to the same bits; None:
     half of what files may take.  progress: called after every step with (iteration, fraction, loss,
     anchors); False from it ends the run with what there is.  settings: any field of
-    `shapeshift.training.settings.TrainSettings`.
+    `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
 
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
@@ -109,8 +109,6 @@ def train(
         offset = calibrate_cameras(on, found, wished, calibrate, report=lambda what, part: None)
         wished = replace(wished, rig=rig_json(calibrate, offset))
     trainer = trainer_of(on, found, wished, before, room)
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
     run(trainer, path, progress)
     return finished(trainer, path, pace)
 
@@ -162,6 +160,8 @@ def run(
     from shapeshift.app.training.saving import memory_errors, save, save_checkpoint
     from shapeshift.training.checkpoint import checkpoint_path
 
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
     saved = time.monotonic()
     ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, BadFile, *memory_errors())
     try:
@@ -254,8 +254,6 @@ def update(
     with memory_for_training():
         base = base_of(given.model, region)
         trainer = begin_update(open_device(device), base, photos, wished, before)
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
     run(trainer, path, progress)
     return finished(trainer, path, pace=False)
 
