@@ -1,10 +1,13 @@
-"""launch.py fit --only: one training of one trial, as a command of its own."""
+"""launch.py fit --only: one training of one trial, as a command of its own.
+
+`options` are those of fit.py, which imports this.
+"""
 
 import json
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.cluster.task import is_task
 from shapeshift.app.errors import UsageError
@@ -15,7 +18,6 @@ from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED, READING, describe, train
 
 if TYPE_CHECKING:
-    from shapeshift.app.training.fit import Options
     from shapeshift.training.settings import TrainSettings
 
 MEANT = ("capture", "out", "only", "resume", "device", "memory")  # options that it has
@@ -26,7 +28,7 @@ def trained_path(out: Path) -> Path:
     return out.with_suffix(".trained.json")
 
 
-def run_trial(options: "Options") -> int:
+def run_trial(options: Any) -> int:
     """Trains the settings of the file at --only into --out.  Raises UsageError, BadFile."""
     from shapeshift.app.training.saving import (
         check_writable,
@@ -71,7 +73,7 @@ def run_trial(options: "Options") -> int:
     return 0
 
 
-def refuse_others(options: "Options") -> None:
+def refuse_others(options: Any) -> None:
     """The file says it all: no other option may say something else.  Raises UsageError."""
     from dataclasses import MISSING
 

@@ -1,10 +1,13 @@
-"""The trainings of fit as tasks of a cluster, in a folder beside the package that it writes."""
+"""The trainings of fit as tasks of a cluster, in a folder beside the package that it writes.
+
+`options` are those of fit.py, which imports this.
+"""
 
 import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.cluster.open_cluster import NONE, Cluster
 from shapeshift.app.cluster.task import Task, digest_of
@@ -15,7 +18,6 @@ from shapeshift.app.terminal import say
 from shapeshift.app.training.trials.run_trial import trained_path
 
 if TYPE_CHECKING:
-    from shapeshift.app.training.fit import Options
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.fit.fit import TrainedSeed
     from shapeshift.training.settings import TrainSettings
@@ -28,7 +30,7 @@ def trials_folder(out: Path) -> Path:
     return out.with_name(out.name + ".trials")
 
 
-def check_places(options: "Options") -> None:
+def check_places(options: Any) -> None:
     """Raises UsageError where trainings cannot write, or would change what the next one reads."""
     from shapeshift.app.training.saving import check_writable
 
@@ -46,7 +48,7 @@ def check_places(options: "Options") -> None:
 
 
 def calibrated_once(
-    device, capture: "Capture", settings: "TrainSettings", options: "Options"
+    device, capture: "Capture", settings: "TrainSettings", options: Any
 ) -> "TrainSettings":
     """The settings with the offset of --calibrate, looked for unless an earlier start has."""
     from shapeshift.app.charts.chart_rows import write_text
@@ -70,7 +72,7 @@ def calibrated_once(
 class Trials:
     """Trains what fit asks for, what an earlier start has trained not again."""
 
-    def __init__(self, cluster: Cluster, options: "Options") -> None:
+    def __init__(self, cluster: Cluster, options: Any) -> None:
         self.cluster, self.options = cluster, options
         self.folder = trials_folder(options.out)
 
@@ -115,7 +117,7 @@ def trained_by(task: Task) -> "TrainedSeed":
     return TrainedSeed(read_package(package), size, noted.number("seconds", low=0))
 
 
-def say_of_clock(options: "Options") -> None:
+def say_of_clock(options: Any) -> None:
     """What makes two starts differ, where it does."""
     if options.cluster != NONE and (options.seconds, options.final_seconds) != (None, None):
         say("With --seconds a faster worker gets further; --iterations gives the same bytes.")
