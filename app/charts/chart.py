@@ -3,19 +3,23 @@
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, say
 
+if TYPE_CHECKING:
+    from shapeshift.app.charts.chart_scene import ChartScene, Walk
+
 MOST_FRAMES = 1000
 
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    """Price at least 24 settings: frame time and image error compared with the exact one.
+    """Price at least 24 settings: frame time and image error compared with the exact one.  Scenes
+    in levels of detail (launch.py lod, streamed SOG) have rows of budgets of splats besides.
 
     Writes rows.csv, chart.svg and chart.png.  Rows that are there are kept: Ctrl-C loses nothing.
     """
@@ -73,9 +77,34 @@ def read_subjects(options: Options) -> list:
     from shapeshift.app.document import open_document
 
     known = {path: open_document(path, options) for path in dict.fromkeys(options.scenes)}
+    return subjects_of(options, known)
+
+
+def subjects_of(options: Options, known: dict) -> list:
+    """What was opened, in the order of the command line, where --x has it."""
     if options.x:
         known = {path: subject.placed(options.x) for path, subject in known.items()}
     return [known[path] for path in options.scenes]
+
+
+def leaf_scene(
+    options: Options, subjects: list, x: float | None, size: tuple[int, int], walk: "Walk"
+) -> "ChartScene | None":
+    """The same with leaves to choose from; None where nothing has any, or --max-splats reads one
+    level of them.
+    """
+    from shapeshift.app.charts.chart_scene import make_chart_scene
+    from shapeshift.app.charts.leaf_rows import by_leaves, has_levels
+
+    if options.max_splats or not any(map(has_levels, subjects)):
+        return None
+    known = dict(zip(options.scenes, subjects, strict=True))
+    anew = {
+        path: by_leaves(path, options) if has_levels(subject) else subject
+        for path, subject in known.items()
+    }
+    found = subjects_of(options, anew)
+    return make_chart_scene(found, x, size, walk, read_views(options, found[0], size))
 
 
 def read_views(options: Options, subject, size: tuple[int, int]) -> list:
@@ -97,6 +126,7 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     from shapeshift.app.charts.chart_rows import RowsFile
     from shapeshift.app.charts.chart_scene import QUICK, Walk, digest, make_chart_scene
     from shapeshift.app.charts.chart_settings import settings_of
+    from shapeshift.app.charts.leaf_rows import budgets_of
     from shapeshift.app.measure import machine_line
 
     x = None
@@ -107,15 +137,21 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     chart_scene = make_chart_scene(subjects, x, size, walk, cameras)
     contents = [s.scene if s.file else s.scene.objects[0].model for s in subjects]
     scene_words = scene_line(options, chart_scene, digest(contents, cameras))
+    leaves = leaf_scene(options, subjects, x, size, walk)
+    pictures = not options.quick
     with open_pair(options.context, options.drawing) as (renderers, ctx):
         pricing = Pricing(renderers, ctx, chart_scene, subjects[0].background)
         on_cpu = draws_on_cpu(pricing.drawing, ctx)
         head = (command_line(options), machine_line(ctx), f"{scene_words}; {pricing.drawing}")
         file = RowsFile(options.out / "rows.csv", ChartRow, head)
-        measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
+        measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), pictures)
         if len(subjects) == 1 and not (options.quick or cameras):
             drawn = ChartSubject(subjects[0], x, size)
             keep_chart(pricing, renderers[0], ctx, drawn, file.rows)  # for --target-ms
+        if leaves is not None:
+            by_budget = Pricing(renderers, ctx, leaves, subjects[0].background)
+            rows = budgets_of(leaves.scene, pricing.drawing, options.quick)
+            measure_rows(by_budget, file, rows, pictures)
     title = f"{scene_words.split(';')[0]}, {options.size}, {pricing.drawing}"
     front = draw_chart(file.rows, title, options.out, on_cpu)
     print_front(front, len(file.rows), options.out)

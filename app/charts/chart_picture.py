@@ -21,6 +21,7 @@ FAMILIES = {  # name -> (colour, fields that belong to it)
                           "fade")),
     "colour": ("#009e73", ("recolor_degrees", "skip_unseen", "stereo_colors")),
     "pixels": ("#cc79a7", ("target", "render_scale", "min_transmittance")),
+    "budget": ("#56b4e9", ("budget", "target")),
     "several of them": ("#56564f", ()),
 }  # fmt: skip
 INK, PALE, FRONT = "#222222", "#e4e4e0", "#a8a49a"

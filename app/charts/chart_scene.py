@@ -9,6 +9,7 @@ import numpy as np
 from shapeshift.app.charts.chart_settings import Distances
 from shapeshift.app.charts.quick_chart import turned
 from shapeshift.app.document import Document
+from shapeshift.runtime_models.splats.sog.streamed_leaves import StreamedLeaves
 from shapeshift.scene.cameras.framing import (
     distances_from,
     frame_points,
@@ -130,6 +131,8 @@ def _feed(hasher, value: object) -> None:
         for each in fields(value):
             if each.name != "provenance":  # where it came from draws nothing
                 _feed(hasher, getattr(value, each.name))
+    elif isinstance(value, StreamedLeaves):  # its files are read as they are seen
+        _feed(hasher, (value.levels, value.part, value.budget))
     elif isinstance(value, np.ndarray):
         hasher.update(f"{value.dtype}{value.shape}".encode())
         hasher.update(np.ascontiguousarray(value).tobytes())

@@ -1,11 +1,14 @@
 """launch.py fit: the smallest scene that shows a capture as well as the largest, and why."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from shapeshift.app.command_line import MODALITY, POSITIONAL, FieldsOf
+from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf, Opt
 from shapeshift.app.terminal import open_console, print_json, say
 from shapeshift.app.training.train_options import Asked, MachineOptions
 from shapeshift.training.left_options import LEFT
@@ -13,7 +16,7 @@ from shapeshift.training.settings import TrainSettings
 
 if TYPE_CHECKING:
     from shapeshift.training.fit.ablation import Ablation, Trial
-    from shapeshift.training.fit.fit import FitReport
+    from shapeshift.training.fit.fit import FitReport, ReportProgress, TrainSeeds
 
 
 USUAL = ("max_anchors", "downscale", "masks", "background")
@@ -23,7 +26,7 @@ EXPERTS = (  # as of train
 
 
 @dataclass(frozen=True)
-class Options(MachineOptions):
+class Options(ClusterOptions, MachineOptions):
     """Take away what a scene does not need: train without one part after the other, and compare
     the held-out photos.  The options say how large a model it starts from.
     """
@@ -51,6 +54,11 @@ class Options(MachineOptions):
     """Train the chosen model again for this long.  Default: the trial's model is written."""
     calibrate: Annotated[str | None, MODALITY] = None
     """A modality whose cameras' offset is found first, as of train.  Default: none."""
+    only: Annotated[Path | None, Opt(expert=True, metavar="SETTINGS")] = None
+    """Do one training by hand: of the settings in this file, as --cluster writes them; --out is the
+    package that it leaves.  Default: the whole search."""
+    resume: Annotated[bool, EXPERT] = False
+    """With --only: go on where an earlier attempt at it was interrupted."""
 
 
 TRIAL = 600  # steps
@@ -58,38 +66,50 @@ CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.commands.bench import write_json
     from shapeshift.app.errors import UsageError
     from shapeshift.app.opening import open_capture
     from shapeshift.app.pace import with_pace
     from shapeshift.app.paths import full
-    from shapeshift.app.progress import progress_bar
     from shapeshift.app.training.run_loop import calibrated
     from shapeshift.app.training.train_options import settings_of
+    from shapeshift.app.training.trials.run_trial import run_trial
+    from shapeshift.app.training.trials.run_trials import (
+        calibrated_once,
+        check_places,
+        say_of_clock,
+    )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.fit.fit import Fit
 
+    if options.only is not None:
+        return run_trial(options)
+    if options.resume:
+        raise UsageError("--resume goes on with one training; add --only, or leave it out.")
     if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
         raise UsageError("--seeds has to be 1 or more, and --tolerance-db 0 or more.")
+    check_cluster(options)
+    if options.cluster != NONE:
+        check_places(options)
     refuse_foreign(options.out)  # now, not after the trials
     settings = settings_of(options.asked | budget(options.iterations, options.seconds))
     longer = options.final_iterations, options.final_seconds
     last = None if longer == (None, None) else settings_of(options.asked | budget(*longer))
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     if options.calibrate is not None:
-        settings = calibrated(device, capture, settings, options.calibrate)
+        if options.cluster == NONE:
+            settings = calibrated(device, capture, settings, options.calibrate)
+        else:
+            settings = calibrated_once(device, capture, settings, options)
         capture = with_extrinsics(capture, settings.rig)
-    with progress_bar() as bar:
-        task = bar.add_task("compiling kernels", total=1.0)
-
-        def show_progress(what: str, done: float) -> None:
-            bar.update(task, description=what, completed=done)
-
+    say_of_clock(options)
+    with trainings(options) as (show_progress, train_seeds):
         fit = Fit(
             device, capture, settings, options.tolerance_db, options.seeds, show_progress,
-            last=last,
+            last=last, train_seeds=train_seeds,
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]
@@ -105,6 +125,26 @@ def run(options: Options) -> int:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")
     return 0
+
+
+@contextmanager
+def trainings(options: Options) -> "Iterator[tuple[ReportProgress, TrainSeeds | None]]":
+    """How progress is shown and who trains, as Fit takes them."""
+    from shapeshift.app.cluster.open_cluster import open_cluster
+    from shapeshift.app.progress import progress_bar
+    from shapeshift.app.training.trials.run_trials import Trials
+
+    if options.cluster != NONE:  # whose tasks have a bar of their own
+        with open_cluster(options.cluster, options.certificates, options.gpus) as cluster:
+            yield lambda what, done: say(f"{what} ..."), Trials(cluster, options).train_seeds
+        return
+    with progress_bar() as bar:
+        task = bar.add_task("compiling kernels", total=1.0)
+
+        def show_progress(what: str, done: float) -> None:
+            bar.update(task, description=what, completed=done)
+
+        yield show_progress, None
 
 
 def budget(iterations: int | None, seconds: float | None) -> Asked:

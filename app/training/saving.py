@@ -49,14 +49,16 @@ def memory_for_training() -> Iterator[None]:
         raise UsageError(f"there is not enough memory to begin; {LESS}.") from None
 
 
-def room_of(out: Path, megabytes: float | None) -> "PhotoRoom":
-    """Where the photos may lie; megabytes: --photo-mb.  Raises UsageError."""
+def room_of(out: Path | None, megabytes: float | None, said: str = "--photo-mb") -> "PhotoRoom":
+    """Where the photos may lie; megabytes: --photo-mb.  out: None where no package is written, then
+    they lie in the user's cache.  Raises UsageError that begins with `said`.
+    """
     from shapeshift.training.photo_store.open_photos import PhotoRoom
 
     if megabytes is not None and not 0 < megabytes < float("inf"):
-        raise UsageError(f"--photo-mb is {megabytes}, expected MB above 0.")
+        raise UsageError(f"{said} is {megabytes}, expected MB above 0.")
     most = None if megabytes is None else int(megabytes * 1e6)
-    return PhotoRoom(most, photos_path(out))
+    return PhotoRoom(most, None if out is None else photos_path(out))
 
 
 @contextmanager

@@ -18,10 +18,15 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile
 if TYPE_CHECKING:
     from shapeshift.decomposition.poses.pose_report import PoseReport
     from shapeshift.scene.captures.capture import Capture
+    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.run import Progress
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
 
+BLOCKS = (
+    "blocks are trained by the command, `launch.py train CAPTURE --out NAME.blocks --blocks "
+    "{blocks}`; ss.load opens what it writes."
+)
 NO_OUT = "resume goes on from the checkpoint beside out; give out, too."
 SAVE_EVERY_S = 60.0  # between checkpoints
 Kind = Literal["cpu", "gpu"]
@@ -57,26 +62,29 @@ def train(
     device: Kind | None = None,
     calibrate: str | None = None,
     pace: bool = True,
+    photo_mb: float | None = None,
     progress: "Callable[[Progress], object] | None" = None,
     **settings: Any,
 ) -> TrainedScene:
     """Trains a shape-shifting scene of posed photos of one or several modalities (docs/capture.md).
 
     seconds or iterations: how long; without either 2,000 iterations.  Seconds are of one core, the
-    processor time of all threads; on a GPU by the clock.  The same iterations give the same bits on
-    one device.  out: a package, NAME.shift or a folder, that is written with its checkpoint beside
-    it, also every minute and when Ctrl-C ends the run; resume goes on from there.  calibrate: a
-    modality whose cameras all sit a little beside their stated poses, as on a rig.  pace: measure
-    how evenly the slider moves, a second a pair of stops.  progress: called after every step with
-    (iteration, fraction, loss, anchors); False from it ends the run with what there is.  settings:
-    any field of `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
+    processor time of all threads, the start among them; on a GPU by the clock.  The same iterations
+    give the same bits on one device.  out: a package, NAME.shift or a folder, that is written with
+    its checkpoint beside it, also every minute and when Ctrl-C ends the run; resume goes on from
+    there.  calibrate: a modality whose cameras all sit beside their stated poses, as on a rig.
+    pace: measure how evenly the slider moves, a second a pair of stops.  photo_mb: MB of memory
+    that photos may take; what does not fit is read when its step comes, to the same bits; None:
+    half of what files may take.  progress: called after every step with (iteration, fraction, loss,
+    anchors); False from it ends the run with what there is.  settings: any field of
+    `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
 
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
         model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
-    from shapeshift.app.training.saving import check_writable
+    from shapeshift.app.training.saving import check_writable, room_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.scene.captures.read_capture import read_capture
@@ -90,6 +98,7 @@ def train(
         refuse_foreign(path)
     elif resume:
         raise UsageError(NO_OUT)
+    room = room_of(path, photo_mb, "photo_mb")
     before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
     settings |= {"iterations": iterations, "seconds": seconds}
     wished = settings_of(settings, before[1]["settings"] if before else None)
@@ -99,23 +108,19 @@ def train(
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
         offset = calibrate_cameras(on, found, wished, calibrate, report=lambda what, part: None)
         wished = replace(wished, rig=rig_json(calibrate, offset))
-    trainer = trainer_of(on, found, wished, before, path)
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    trainer = trainer_of(on, found, wished, before, room)
     run(trainer, path, progress)
     return finished(trainer, path, pace)
 
 
 def trainer_of(
-    device, capture: "Capture", wished: "TrainSettings", before: tuple | None, path: Path | None
+    device, capture: "Capture", wished: "TrainSettings", before: tuple | None, room: "PhotoRoom"
 ) -> "Trainer":
-    """The run before its first step; photos that do not fit into memory lie beside `path`."""
-    from shapeshift.app.training.saving import memory_for_training, photos_path
+    """The run before its first step; photos that do not fit into memory lie in `room`."""
+    from shapeshift.app.training.saving import memory_for_training
     from shapeshift.training.calibration.extrinsics import with_extrinsics
-    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.train import Trainer
 
-    room = PhotoRoom(folder=None if path is None else photos_path(path))
     with memory_for_training():
         return Trainer(device, with_extrinsics(capture, wished.rig), wished, before, room=room)
 
@@ -133,6 +138,8 @@ def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
     known = [field.name for field in fields(TrainSettings)]
     for name in asked:
         if name not in known:
+            if name == "blocks":
+                raise UsageError(BLOCKS.format(blocks=asked[name]))
             if now := left_setting(name):
                 raise UsageError(f"{name} left the program: {now}.")
             meant = nearest(name, known)
@@ -153,6 +160,8 @@ def run(
     from shapeshift.app.training.saving import memory_errors, save, save_checkpoint
     from shapeshift.training.checkpoint import checkpoint_path
 
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
     saved = time.monotonic()
     ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, BadFile, *memory_errors())
     try:
@@ -245,8 +254,6 @@ def update(
     with memory_for_training():
         base = base_of(given.model, region)
         trainer = begin_update(open_device(device), base, photos, wished, before)
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
     run(trainer, path, progress)
     return finished(trainer, path, pace=False)
 

@@ -195,6 +195,29 @@ def test_a_run_goes_on_from_its_checkpoint_and_ends_when_told(capture, tmp_path)
         ss.train(capture, resume=True)
 
 
+def test_photos_that_do_not_fit_into_memory_give_the_same_bits(capture, tmp_path, monkeypatch):
+    """Pixels of sixteen photos of 32x24 are 37 kB at three bytes each; 20 kB hold some of them."""
+    from shapeshift.training.photo_store import open_photos
+
+    stores, store = [], open_photos.PhotoStore
+    monkeypatch.setattr(
+        open_photos, "PhotoStore", lambda *given: stores.append(given[-1]) or store(*given)
+    )
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))  # of a run without out
+    how = {"iterations": 6, "max_anchors": 60, "points": "random", "device": "cpu", "pace": False}
+    whole = ss.train(capture, **how).model
+    for out in (None, tmp_path / "a.shift"):
+        model = ss.train(capture, out, photo_mb=0.02, **how).model
+        np.testing.assert_array_equal(model.anchors, whole.anchors)
+        np.testing.assert_array_equal(model.features, whole.features)
+    assert stores == [20_000, 20_000]  # the first run holds all photos
+    assert not (tmp_path / "a.shift.photos").exists()
+    assert not [path for path in tmp_path.rglob("cache/**/*photos*") if path.is_file()]
+    for wrong in (0, -1, float("nan"), float("inf")):
+        with pytest.raises(ss.UsageError, match=r"^photo_mb is .*, expected MB above 0"):
+            ss.train(capture, photo_mb=wrong, **how)
+
+
 def test_ctrl_c_loses_nothing(capture, tmp_path):
     def interrupt(step) -> None:
         if step.iteration == 5:
@@ -211,6 +234,8 @@ def test_ctrl_c_loses_nothing(capture, tmp_path):
 def test_what_a_training_does_not_know_is_refused(capture, tmp_path):
     with pytest.raises(ss.UsageError, match="no setting 'anchor' of a training; did you mean"):
         ss.train(capture, anchor=60)
+    with pytest.raises(ss.UsageError, match=r"^blocks are trained by the command.* --blocks 2x2`"):
+        ss.train(capture, tmp_path / "a.blocks", blocks="2x2")
     with pytest.raises(ss.UsageError, match="iterations is 0"):
         ss.train(capture, iterations=0)
     with pytest.raises(ss.BadFile, match="does not exist"):

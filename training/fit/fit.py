@@ -28,6 +28,19 @@ DECODES = 6  # the fastest counts
 
 
 @dataclass(frozen=True)
+class TrainedSeed:
+    """What one training of a trial left: its model as a package of it gives it back."""
+
+    model: AnchorModel
+    bytes: int  # of that package, features as FEATURES[0]
+    seconds: float  # as Trainer.elapsed
+
+
+# Trains settings by name, which of a trial differ in their seed; gives what each left, in order.
+TrainSeeds = Callable[[dict[str, TrainSettings]], list[TrainedSeed]]
+
+
+@dataclass(frozen=True)
 class FitReport:
     """What a capture needs, and how that was found."""
 
@@ -64,8 +77,11 @@ class Fit:
         report: ReportProgress,
         components: tuple[Component, ...] = COMPONENTS,
         last: TrainSettings | None = None,
+        *,
+        train_seeds: TrainSeeds | None = None,
     ) -> None:
-        """last: settings whose iterations and seconds the chosen model is trained for once more.
+        """last: settings whose iterations and seconds the chosen model is trained for once more;
+        train_seeds: who does the trainings, None: this process.
 
         Raises BadFile where the held-out photos could not report how sure a difference is.
         """
@@ -86,6 +102,7 @@ class Fit:
                     + (" or give --seeds 2." if count else ".")
                 )
         self.settings, self.components, self.last = settings, components, last
+        self.train_seeds = train_seeds or self.train_here
 
     def run(self) -> FitReport:
         full = self.full = self.current = self.trained(self.settings, "the largest")
@@ -117,34 +134,38 @@ class Fit:
 
     def trained(self, settings: TrainSettings, name: str) -> Trial:
         """A trial: settings trained once a seed.  Raises BadFile where a run ends unsettled."""
-        models, seconds = [], []
+        asked = {}
         for seed in range(self.seeds):
             what = name if self.seeds == 1 else f"{name}, seed {seed + 1} of {self.seeds}"
-            trainer = Trainer(
-                self.device, self.capture, replace(settings, seed=settings.seed + seed),
-                loaded=self.loaded,
-            )  # fmt: skip
+            asked[what] = replace(settings, seed=settings.seed + seed)
+        runs = self.train_seeds(asked)
+        seconds = float(np.mean([run.seconds for run in runs]))
+        models = [run.model for run in runs]
+        return self.compared(models, FEATURES[0], runs[0].bytes, seconds)
+
+    def train_here(self, asked: dict[str, TrainSettings]) -> list[TrainedSeed]:
+        """TrainSeeds of this process."""
+        runs = []
+        for what, settings in asked.items():
+            trainer = Trainer(self.device, self.capture, settings, loaded=self.loaded)
             for now in trainer.steps():
                 self.report(what, min(now.fraction, 1.0))
-            if not trainer.settled:
-                raise BadFile(
-                    f"A trial of {trainer.iteration} steps ends while new anchors still settle; "
-                    "give more --iterations."
-                )
-            models.append(trainer.model())
-            seconds.append(trainer.elapsed)
-        return self.measured(models, FEATURES[0], float(np.mean(seconds)))
+            refuse_unsettled(trainer)
+            runs.append(TrainedSeed(*packed(trainer.model(), FEATURES[0]), trainer.elapsed))
+        return runs
 
     def measured(self, models: list[AnchorModel], storage: str, train_s: float) -> Trial:
         """How alike the held-out photos are to what packages of the models show."""
-        files = [package_files(model, storage) for model in models]
-        back = [read_files(f.__getitem__, "the fitted scene") for f in files]
+        back = [packed(model, storage) for model in models]
+        return self.compared([model for model, _ in back], storage, back[0][1], train_s)
+
+    def compared(self, back: list[AnchorModel], storage: str, size: int, train_s: float) -> Trial:
+        """The same of models as their packages give them back; size: bytes of the first."""
         found = [
             view_psnr(self.device, model, self.held_out, self.stops, self.background)
             for model in back
         ]
         psnr = {s.name: np.stack([f[s.name] for f in found]) for s in self.stops}
-        size = len(zip_files(files[0]))
         return Trial(psnr, tuple(back), storage, size, shift_ms(back[0]), train_s)
 
     def prune_models(self) -> None:
@@ -175,6 +196,21 @@ class Fit:
         """The model without anchors that make up fewer pixels in every photo."""
         most = largest_contribution(self.device, model, [*self.photos, *self.held_out], self.stops)
         return drop_unused(model, np.repeat(most[:, None] >= pixels, model.splats_per_anchor, 1))[0]
+
+
+def packed(model: AnchorModel, storage: str) -> tuple[AnchorModel, int]:
+    """The model as its package gives it back, and the bytes of that."""
+    files = package_files(model, storage)
+    return read_files(files.__getitem__, "the fitted scene"), len(zip_files(files))
+
+
+def refuse_unsettled(trainer: Trainer) -> None:
+    """Raises BadFile where a trial's run has ended with anchors that nobody can judge yet."""
+    if not trainer.settled:
+        raise BadFile(
+            f"A trial of {trainer.iteration} steps ends while new anchors still settle; "
+            "give more --iterations."
+        )
 
 
 def weights_of(model: AnchorModel) -> int:

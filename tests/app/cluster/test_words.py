@@ -8,6 +8,7 @@ import pytest
 from shapeshift.app.cluster.words import words_for
 from shapeshift.app.command_line import parse
 from shapeshift.app.film.film import Options as FilmOptions
+from shapeshift.app.training.fit import Options as FitOptions
 from shapeshift.app.training.table import Options as TableOptions
 from shapeshift.app.training.train import Options as TrainOptions
 
@@ -22,7 +23,10 @@ TABLE = TableOptions(Path("/capture"), Path("/out"))
             background=(0.0, 1e-7, 1.0), save_path=Path("/p.film.json")),
     replace(TABLE, asked={"max_anchors": 400, "background": "black", "seed": 0}, iterations=20,
             splats={"sh_degree": 1}, methods=("joint", "splats"), vgg=Path("/-v.onnx")),
-    TrainOptions(Path("/capture"), Path("/out.shift"), {"iterations": 9, "fixed": "-"}, {}, True),
+    FitOptions(Path("/capture"), Path("/o.shift"), only=Path("/a/b c.json"), device="cpu",
+               memory=0.1 + 0.2),
+    TrainOptions(Path("/capture"), Path("/out.shift"), {"iterations": 9, "fixed": "-"},
+                 separate=True),
 ])  # fmt: skip
 def test_options_come_back_out_of_their_words(options):
     command, *words = words_for("cluster", options)
