@@ -43,6 +43,7 @@ from shapeshift.renderer.levels import LevelChoice, decoded_objects, exchange_le
 from shapeshift.renderer.resample import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
 from shapeshift.renderer.streaming.follow import Streaming
+from shapeshift.renderer.streaming.stream import has_leaves
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_control
@@ -100,22 +101,7 @@ class Renderer:
         """Takes over poses and control values; decodes only what is new or has another x."""
         self._given = scene
         self.levels.begin(scene)
-        self._take_over(self.levels.shown(scene))
-
-    def _look_from(self, views: list[View]) -> None:
-        """Objects with levels of detail at those that these views ask for.  Raises BadFile."""
-        if self.levels.choose(self._given, self._scaled(views)):
-            scene = self.levels.shown(self._given)
-            if self.streaming.stream is None:  # else all is made anew
-                before, self._decoded, self._false_key = self._decoded, [], None
-                self._decoded = exchange_levels(self.drawing, before, scene)
-            self._take_over(scene)
-        self.streaming.follow(self._scene, self._decoded, views, self._timer)
-
-    def _scaled(self, views: Sequence[View]) -> list[View]:
-        return [scaled(view, self.settings.render_scale) for view in views]
-
-    def _take_over(self, scene: Scene) -> None:
+        scene = self.levels.shown(scene)
         with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
             models = [id(decoded.model) for decoded in self._decoded]
             other = self.streaming.differs(self.settings.budget)
@@ -130,7 +116,8 @@ class Renderer:
                     x = control_of(obj)
                     # What follows the eye is decoded with the colours, once the eye is known.
                     follows = first or shape_follows_control(obj.model)
-                    if follows and not follows_eye(obj.model):
+                    # What has leaves comes with the stream.
+                    if follows and not follows_eye(obj.model) and not has_leaves(obj.model):
                         restore_shapes(self.drawing, i, decoded)
                         self.drawing.decode_geometry(i, x)
                         self._geometry_runs += 1
@@ -142,6 +129,19 @@ class Renderer:
         poses = [o.world_from_object.matrix() if o.seen else HIDDEN for o in scene.objects]
         self.drawing.set_poses(poses)
         self._scene = scene
+
+    def _look_from(self, views: list[View]) -> None:
+        """Objects with levels of detail at those that these views ask for.  Raises BadFile."""
+        if self.levels.choose(self._given, self._scaled(views)):
+            if self.streaming.stream is None:  # else all is made anew
+                before, self._decoded, self._false_key = self._decoded, [], None
+                scene = self.levels.shown(self._given)
+                self._decoded = exchange_levels(self.drawing, before, scene)
+            self.update(self._given)
+        self.streaming.follow(self._scene, self._decoded, views, self._timer)
+
+    def _scaled(self, views: Sequence[View]) -> list[View]:
+        return [scaled(view, self.settings.render_scale) for view in views]
 
     def _choose_false_colors(self, scene: Scene) -> None:
         """Which colours are decoded, and where palettes belong, as the controls ask for."""

@@ -63,14 +63,9 @@ class ModelHeads:
             light=model.light,
         )  # fmt: skip
 
-    def shapes_into(
-        self, mean_opacity: "Array", covariance: "Array", start: int, x: Controls,
-        shapes: bool = True,
-    ) -> None:  # fmt: skip
-        """Rows start... of mean_opacity (N, 4) and covariance (N, 8) at one control, object frame;
-        where not `shapes`, of the opacities alone.
-        """
-        self.anchors.decode_shapes(self.folded(x), start, mean_opacity, covariance, shapes)
+    def parts(self) -> "list[tuple[int, ModelHeads]]":
+        """What decodes the model's splats, and the first of them that each decodes."""
+        return [(0, self)]
 
     def color_into(
         self, color: "Array", start: int, x: Controls, eye: np.ndarray,
@@ -104,13 +99,8 @@ class BlockHeads:
         self._parts = [(run, ModelHeads(device, run.model)) for run in model.runs]
         self.shapes_follow = any(heads.shapes_follow for _, heads in self._parts)
 
-    def shapes_into(
-        self, mean_opacity: "Array", covariance: "Array", start: int, x: Controls,
-        shapes: bool = True,
-    ) -> None:  # fmt: skip
-        for run, heads in self._parts:
-            at = start + run.splats.start
-            heads.shapes_into(mean_opacity, covariance, at, x, shapes)
+    def parts(self) -> list[tuple[int, ModelHeads]]:
+        return [(run.splats.start, heads) for run, heads in self._parts]
 
     def color_into(
         self, color: "Array", start: int, x: Controls, eye: np.ndarray,

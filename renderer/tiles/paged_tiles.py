@@ -12,7 +12,6 @@ from shapeshift.renderer.tiles.paged import PagedRows
 from shapeshift.renderer.tiles.tiles import TilesDrawing
 from shapeshift.runtime_models.leaf_levels import LeafSplats
 from shapeshift.runtime_models.model import Model
-from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import View
 
@@ -55,13 +54,6 @@ class PagedTiles(TilesDrawing):
     def _pages(self) -> PagedRows:
         assert self._paged is not None, "allocate_pages has made them"
         return self._paged
-
-    def decode_geometry(
-        self, i: int, x: Controls, eye_object: np.ndarray | None = None,
-        seen: np.ndarray | None = None,
-    ) -> None:  # fmt: skip
-        if not self._is_paged[i]:
-            super().decode_geometry(i, x, eye_object, seen)
 
     def decode_color(
         self, i: int, shade: Shade, eye_object: np.ndarray, seen: np.ndarray | None = None,

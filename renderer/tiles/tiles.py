@@ -125,13 +125,13 @@ class TilesDrawing(Drawing):
         self, i: int, x: Controls, eye_object: np.ndarray | None = None,
         seen: np.ndarray | None = None,
     ) -> None:  # fmt: skip
-        slot = self._slots[i]
+        slot, arena = self._slots[i], (self._mean_opacity, self._covariance)
         heads, evaluator = slot.decoding.heads, slot.decoding.evaluator
-        arena = (self._mean_opacity, self._covariance)
         self._splats_moved()
         if heads is not None and not is_each(x):  # one control an anchor: onnxruntime's
             shapes = heads.shapes_follow or not slot.placed
-            heads.shapes_into(*arena, slot.start, x, shapes)
+            for first, part in heads.parts():
+                part.anchors.decode_shapes(part.folded(x), slot.start + first, *arena, shapes)
             slot.placed = True
             return
         splats = evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)

@@ -16,7 +16,6 @@ from shapeshift.renderer.limits import arena_rows
 from shapeshift.runtime_models.leaf_levels import LeafSplats
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.rotation import covariance
-from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.appearance import Appearance
 
 NO_EYE = np.zeros(3)  # for colours that look alike from everywhere
@@ -108,13 +107,6 @@ class PagedQuads(QuadsDrawing):
                 program, groups_for(count, layout.WORKGROUP), count=count, first_page=first,
                 start=self._first + PAGE * first, coefficients=self._coefficients,
             )  # fmt: skip
-
-    def decode_geometry(
-        self, i: int, x: Controls, eye_object: np.ndarray | None = None,
-        seen: np.ndarray | None = None,
-    ) -> None:  # fmt: skip
-        if not self._is_paged[i]:
-            super().decode_geometry(i, x, eye_object, seen)
 
     def decode_color(
         self, i: int, shade: Shade, eye_object: np.ndarray, seen: np.ndarray | None = None,
