@@ -141,4 +141,4 @@ def test_every_long_command_tells(package, tmp_path, monkeypatch, capsys, comman
 
 
 def test_what_lasts_as_long_as_somebody_looks_tells_no_lines():
-    assert set(cli.OPEN_ENDED) == {"view", "vr", "serve"}
+    assert set(cli.OPEN_ENDED) == {"view", "vr", "serve", "cluster"}

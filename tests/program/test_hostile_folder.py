@@ -125,6 +125,7 @@ HEAVY = [
     ("view", "a.ply", "--screenshot", "heavy/window.png", "--frames", "1"),
     ("vr", "--help"),  # without a runtime it only says so; tests/xr has one
     ("serve", "--help"),  # it ends by Ctrl-C alone; tests/web starts it
+    ("cluster", "--help"),  # tests/app/cluster starts its schedulers and workers
     ("poses", "--help"),  # tests/decomposition/poses finds some
     ("segment", "--help"),  # tests/app/decomposition cuts some
     (),
@@ -218,5 +219,5 @@ def test_every_python_that_is_started_leaves_the_current_folder_out():
                     checked += 1
             if isinstance(node, ast.Attribute) and ast.unparse(node) in ("os.system", "os.popen"):
                 pytest.fail(f"{path}:{node.lineno} starts a shell")
-    # launch.py, first_start.py, CoACD, LAZ, USD, COLMAP, the work beside the window
-    assert checked == 7
+    # launch.py, first_start.py, CoACD, LAZ, USD, COLMAP, the work beside the window, a cluster's
+    assert checked == 8

@@ -131,6 +131,8 @@ def distill(
         grads = pupil.step.gradients(drawing, loss, pictures[key], min_opacity_share=0)
         pupil.step.update(grads, rate * 0.05**done)
         steps += 1
+        if steps == 1:
+            start = process_time()  # the first step compiles kernels where no cache has them
         done = (process_time() - start) / seconds
         if progress is not None and steps % CHECK_EVERY == 0:
             progress(min(done, 1.0))

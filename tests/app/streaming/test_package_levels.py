@@ -43,7 +43,14 @@ def test_a_package_gets_levels(clumps, tmp_path, capsys, form):
         source = tmp_path / "folder"
         write_package(read_package(clumps), source)
     out = tmp_path / "it.lod"
-    words = ["lod", str(source), "--out", str(out), "--distill", "0.5"]
+    words = [
+        "lod",
+        str(source),
+        "--out",
+        str(out),
+        "--distill",
+        "2",
+    ]  # four times the steps that it takes
     assert cli.main(words) == 0
     said = capsys.readouterr().err
     assert "dB at stops" in said and "s of processor time" in said

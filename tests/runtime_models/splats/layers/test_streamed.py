@@ -164,7 +164,7 @@ def lod(meta: dict, node: int = 0, level: str = "0") -> dict:
         (lambda m: lod(m).update(offset=2.5), "file, offset and count"),
         (lambda m: lod(m).update(count=268), "names others or some twice"),
         (lambda m: lod(m).update(offset=134), "names others or some twice"),
-        (lambda m: lod(m).update(count=10**18), "names others or some twice"),
+        (lambda m: lod(m).update(count=10**18), "names row 1,000,000,000,000,000,133 of a file"),
         (lambda m: lod(m, 1).update(count=400), "names others or some twice"),
         (lambda m: m["tree"].update(lods={"-1": lod(m)}), "level '-1'"),
         (lambda m: m["tree"].update(lods={"¹": lod(m)}), "level '¹'"),
