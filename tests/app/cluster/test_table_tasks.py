@@ -12,7 +12,7 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.synthetic.balls import make_balls
 
 SMALL = {"asked": {"max_anchors": 200}, "splats": {"max_splats": 400, "sh_degree": 1}}
-TIMES = ("seconds",)
+TIMES = ("seconds", "start_s")
 
 
 @pytest.fixture(scope="module")
