@@ -83,6 +83,16 @@ def settle(viewer) -> None:
     assert viewer.inspecting.is_current
 
 
+def rest(viewer) -> None:
+    """Frames until the picture at rest has been compared with the exact one, once."""
+    end = time.monotonic() + PATIENCE_S
+    while viewer.readings.error_is_old and time.monotonic() < end:
+        time.sleep(0.05)
+        run_frames(viewer, 1)
+    run_frames(viewer, 2)  # what was drawn for that is replaced
+    assert not viewer.readings.error_is_old
+
+
 def on_wall(viewer, x: float, y: float = 0.0) -> tuple[float, float]:
     """Logical pixels of a place of the wall, metres."""
     return place_of(viewer, (x, y, 0.0))
@@ -137,6 +147,7 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
     assert tool.readings["Li1"].mean == pytest.approx(before, abs=NEAR_C)
 
     # A still window measures nothing and draws no splats.
+    rest(viewer)
     frames = renderer.update
     calls: list[object] = []
     monkeypatch.setattr(renderer, "update", lambda scene: calls.append(scene) or frames(scene))
