@@ -76,8 +76,8 @@ def resized_records(
 
 
 def surface_arena(
-    device: Device, mean_opacity, covariance, object_index, pages: PageMap | None,
-    world_from_object, camera: Camera, projected: Projected,
+    device: Device, mean_opacity, covariance, object_index, world_from_object, camera: Camera,
+    projected: Projected, pages: PageMap | None = None,
 ) -> "Array":  # fmt: skip
     """(N, 8) float32 of an arena as project_arena takes it; the records' colours become normals.
 

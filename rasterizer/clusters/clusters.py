@@ -37,7 +37,7 @@ def clusters_of(count: int) -> int:
 
 def bound_clusters(
     device: Device, mean_opacity: "Array", covariance: "Array", object_index: "Array",
-    pages: PageMap | None, min_alpha: float,
+    min_alpha: float, pages: PageMap | None = None,
 ) -> Clusters:  # fmt: skip
     """The boxes of an arena as project_arena takes it."""
     count = object_index.shape[0]

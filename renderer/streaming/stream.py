@@ -6,6 +6,7 @@ The file to read first in streaming/.  Of each frame: sight (which leaves are in
 
 import logging
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -178,7 +179,9 @@ class Stream:
         self, poses: list[np.ndarray], shown: list[bool], views: Sequence[View]
     ) -> LeafSight:
         """Of all leaves, one object after the other."""
-        each = [sight_of(s.levels, p, views) for s, p in zip(self._sources, poses, strict=True)]
+        each: list[LeafSight] = []
+        for source, run in groupby(zip(self._sources, poses, strict=True), lambda pair: pair[0]):
+            each.append(sight_of(source.levels, np.array([pose for _, pose in run]), views))
         held, wide, cover, distance = (
             np.concatenate([getattr(one, name) for one in each])
             for name in ("held", "wide", "cover", "distance")
@@ -193,7 +196,7 @@ class Stream:
         pages = [table.free(gone)]
         due = np.flatnonzero(wanted != table.level)
         if not self.converges:
-            at_hand = [source.at_hand() for source in self._sources]
+            at_hand = self._at_hand()
             missing = self._missing(wanted, worth, at_hand)
             self._fetcher.want([*missing, *self._ahead(at_hand)])
             self._decoded = sum(int(np.count_nonzero(there)) for there in at_hand)
@@ -240,12 +243,18 @@ class Stream:
         wanted, worth = choose(self._steps, weight, self._left)
         return self._missing(wanted, worth, at_hand)
 
+    def _at_hand(self) -> list[np.ndarray]:
+        """What each object's source has decoded."""
+        once = {id(source): source for source in self._sources}
+        found = {number: source.at_hand() for number, source in once.items()}
+        return [found[id(source)] for source in self._sources]
+
     @property
     def due(self) -> bool:
         """Whether another frame of the same views would show more."""
         if not self.stats.pending:
             return False
-        decoded = sum(int(np.count_nonzero(source.at_hand())) for source in self._sources)
+        decoded = sum(int(np.count_nonzero(there)) for there in self._at_hand())
         return self.stats.changed > 0 or decoded != self._decoded
 
     def _first_of(

@@ -55,7 +55,7 @@ class Culling:
         self._rested += 1
         due = self._clusters is None and self._rested > RESTS
         if due and arena[2].shape[0] >= LEAST_SPLATS:
-            self._clusters = bound_clusters(device, *arena, least)
+            self._clusters = bound_clusters(device, *arena[:3], least, arena[3])
 
     def note(self, device: Device, unseen: "Array | None") -> None:
         """What a projection left out, (C,) as find_unseen.cl has it."""

@@ -30,7 +30,9 @@ def blend_depth(
 
     arena: mean_opacity, covariance, object_index, pages.
     """
-    surfaces = surface_arena(device, *arena, world_from_objects, camera_of(view), projected)
+    camera = camera_of(view)
+    given = (world_from_objects, camera, projected, arena[3])
+    surfaces = surface_arena(device, *arena[:3], *given)
     return rasterize_depth(device, projected, tiles, surfaces, view.size)
 
 
