@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shapeshift.app.cluster.open_cluster import NONE, Cluster
 from shapeshift.app.cluster.digests import digest_of, own_code
+from shapeshift.app.cluster.open_cluster import NONE, Cluster
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.cluster.words import words_for
 from shapeshift.app.errors import UsageError

@@ -113,7 +113,7 @@ def test_what_other_code_has_done_is_done_anew(counting, other_code):
     key = task.key()
     Path(task.writes[0]).unlink()
     code.write_text("a third")
-    with pytest.raises(TaskFailed, match="count: the program's code on .* is another than"):
+    with pytest.raises(TaskFailed, match=r"count: the program's code on .* is another than"):
         run_task(task, key, print)
     assert not Path(task.writes[0]).exists()
     # Changed while it runs: what it wrote is there, yet no later start takes it for done.
