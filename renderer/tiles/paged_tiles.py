@@ -23,12 +23,12 @@ class PagedTiles(TilesDrawing):
     """TilesDrawing, with pages where a scene has models that need them."""
 
     shares_pages = True
-    _paged: PagedRows | None = None
+    paged: PagedRows | None = None
     _is_paged: tuple[bool, ...] = ()  # of each object
 
     def allocate(self, models: list[Model], more: int = 0, stored: int | None = None) -> None:
         super().allocate(models, more, stored)
-        self._paged, self._is_paged, self._page_map = None, (False,) * len(models), None
+        self.paged, self._is_paged, self._page_map = None, (False,) * len(models), None
 
     def allocate_pages(
         self, models: list[Model], pages: int, coefficients: int, stored: int | None = None
@@ -37,7 +37,7 @@ class PagedTiles(TilesDrawing):
         fixed = sum(map(arena_rows, models))
         first = -(-fixed // PAGE) * PAGE
         self.allocate(models, first - fixed + PAGE * pages, first - fixed + PAGE * stored)
-        self._paged = PagedRows(self.device, first, pages, stored, coefficients)
+        self.paged = PagedRows(self.device, first, pages, stored, coefficients)
         self._is_paged = tuple(getattr(model, "leaves", None) is not None for model in models)
         self._pages_moved()
 
@@ -80,8 +80,8 @@ class PagedTiles(TilesDrawing):
 
     @property
     def _pages(self) -> PagedRows:
-        assert self._paged is not None, "allocate_pages has made them"
-        return self._paged
+        assert self.paged is not None, "allocate_pages has made them"
+        return self.paged
 
     def decode_color(
         self, i: int, shade: Shade, eye_object: np.ndarray, seen: np.ndarray | None = None,
@@ -142,21 +142,21 @@ class PagedTiles(TilesDrawing):
         return self.device.download(self._pages.read(pages, array)).reshape(-1, array.shape[1])
 
     def _median_distance(self, eye_from_world: np.ndarray) -> float:
-        if self._paged is None:
+        if self.paged is None:
             return super()._median_distance(eye_from_world)
         row = np.arange(0, self.splats, -(-self.splats // SAMPLE))
-        fixed, page = self._paged.first // PAGE, row // PAGE
-        drawn = np.concatenate([np.arange(fixed), self._paged.stored + fixed])
-        there = (page < fixed) | (self._paged.stored[np.maximum(page - fixed, 0)] >= 0)
+        fixed, page = self.paged.first // PAGE, row // PAGE
+        drawn = np.concatenate([np.arange(fixed), self.paged.stored + fixed])
+        there = (page < fixed) | (self.paged.stored[np.maximum(page - fixed, 0)] >= 0)
         row, page = row[there], page[there]
         mean_opacity = self.device.view(self._mean_opacity)[PAGE * drawn[page] + row % PAGE]
         owner = self.device.view(self._object_index)[row]
         return median_distance(eye_from_world @ self._world_from_objects, mean_opacity, owner)
 
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        if self._paged is None:
+        if self.paged is None:
             return super().splat_points()
-        first, stored = self._paged.first, self._paged.stored
+        first, stored = self.paged.first, self.paged.stored
         out = []
         for array in (self._mean_opacity, self._covariance):
             rows = np.zeros((len(stored), PAGE, array.shape[1]), np.float32)

@@ -134,7 +134,7 @@ def frames(renderer: Renderer, scene: Scene, step: float, parts: np.ndarray) -> 
 
 def memory_of(renderer: Renderer) -> dict:
     drawing = renderer.drawing
-    pages = drawing._paged
+    pages = drawing.paged
     arrays = (drawing._mean_opacity, drawing._covariance, pages._sh, *drawing._colors)
     return {
         "pages_drawn": int(np.count_nonzero(pages.stored >= 0)),
