@@ -1,9 +1,12 @@
 """Every number that a training run can be asked for: what `train` offers, and what a run keeps."""
 
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from shapeshift.training.heads.networks import HeadLayout
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Poses = Literal["stated", "refine"]
 Masks = Literal["object", "valid", "ignore"]
@@ -151,9 +154,10 @@ class TrainSettings:
 
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
+Kind = TypeVar("Kind", bound="DataclassInstance")  # TrainSettings, or PlainSettings
 
 
-def adjusted(settings: TrainSettings, asked: dict[str, Any]) -> TrainSettings:
+def adjusted(settings: Kind, asked: dict[str, Any]) -> Kind:
     """The settings with the values that were asked for, by name.
 
     A budget of one kind takes the place of the other.  Raises ValueError, one sentence.
@@ -164,13 +168,14 @@ def adjusted(settings: TrainSettings, asked: dict[str, Any]) -> TrainSettings:
     return replace(settings, **(asked | more))
 
 
-def resumed(before: dict[str, Any], asked: dict[str, Any], said: str = "") -> TrainSettings:
+def resumed(usual: Kind, before: dict[str, Any], asked: dict[str, Any], said: str = "") -> Kind:
     """A checkpoint's settings with another budget.  Raises ValueError for anything else, and for a
     checkpoint of another version.
 
-    said: what stands before a name where it is typed, as --.
+    usual: settings of the kind that it has to be of; said: what stands before a name where it is
+    typed, as --.
     """
-    if other := sorted(before.keys() ^ {field.name for field in fields(TrainSettings)}):
+    if other := sorted(before.keys() ^ {field.name for field in fields(usual)}):
         raise ValueError(
             f"{said}resume: the checkpoint was written by another version of this program, which "
             f"trains in another way ({other[0]}); train anew without {said}resume."
@@ -182,4 +187,4 @@ def resumed(before: dict[str, Any], asked: dict[str, Any], said: str = "") -> Tr
             f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
         )
     budget = {name: asked[name] for name in BUDGET if name in asked}
-    return adjusted(TrainSettings(**before), budget)
+    return adjusted(replace(usual, **before), budget)

@@ -95,7 +95,7 @@ def settings_of(asked: Asked, before: dict[str, Any] | None = None) -> TrainSett
         asked = asked | {"points": str(plain(asked["points"]))}
     try:
         if before is not None:
-            return resumed(before, asked, "--")
+            return resumed(TrainSettings(), before, asked, "--")
         return adjusted(TrainSettings(), asked)
     except ValueError as error:
         raise UsageError(str(error)) from None
