@@ -24,8 +24,8 @@ from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.training.depth_photos import depth_error, depth_loss_reference, depth_photo
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
-from tests.training.test_depth_training import depth_error, depth_loss_reference, depth_photo
 
 SHARE = 0.7
 TURNED = 0.25  # how much of a normal is chance
