@@ -32,6 +32,7 @@ class Drawing(ABC):
     order_age: int
     draws_heat: bool  # in addition to the colours, from the next frame on
     shares_pages = False  # copies of an object may draw the same pages
+    weighs_pages = False  # pages may be drawn as a part of themselves
 
     @abstractmethod
     def allocate(self, models: list[Model]) -> None:
@@ -66,6 +67,12 @@ class Drawing(ABC):
         objects is changed later, it has splats of its own from then on.
         """
         raise TypeError("this drawing shares no pages.")
+
+    def weigh_pages(self, pages: np.ndarray, part: float) -> None:
+        """Draws pages (n,) as a part of themselves from now on, until they are cleared;
+        1 is as they are.
+        """
+        raise TypeError("this drawing weighs no pages.")
 
     def clear_pages(self, pages: np.ndarray) -> None:
         """Nothing is in these pages any more."""

@@ -26,7 +26,7 @@ class PageMap:
     """
 
     sources: "Array"  # (pages,) int32: the arena's page; -1: nothing is drawn
-    weights: "Array"  # (pages,) float32: of the optical depth of its splats; 1: all
+    weights: "Array"  # (pages,) float32: the part of its splats that is drawn; 1: all
 
     @property
     def arrays(self) -> tuple["Array", "Array"]:

@@ -16,7 +16,8 @@ class PageTable:
     """Pages that are free, and what the others hold."""
 
     def __init__(self, pages: int, leaves: int) -> None:
-        self.leaf_of = np.full(pages, -1, np.int64)  # of each page; -1: it is free
+        self.leaf_of = np.full(pages, -1, np.int64)  # of each page; -1: it is free, or leaving
+        self.left = np.full(pages, -1, np.int64)  # the leaf that a page is leaving; -1: none
         self.level = np.full(leaves, NOT_DRAWN)  # at which each leaf is there
         self.splats = np.zeros(leaves, np.int64)  # of each leaf there
 
@@ -29,13 +30,36 @@ class PageTable:
         self.level[leaves], self.splats[leaves] = NOT_DRAWN, 0
         return pages
 
+    def retire(self, leaves: np.ndarray) -> None:
+        """The pages of leaves (n,) stay until they are released; the leaves may get others."""
+        pages = self.pages_of(leaves)
+        self.left[pages], self.leaf_of[pages] = self.leaf_of[pages], -1
+        self.level[leaves], self.splats[leaves] = NOT_DRAWN, 0
+
+    def leaving(self, leaves: np.ndarray) -> np.ndarray:
+        """The pages that leaves (n,) had before."""
+        gone = np.zeros(len(self.level), bool)
+        gone[leaves] = True
+        return np.flatnonzero((self.left >= 0) & gone[np.maximum(self.left, 0)])
+
+    def release(self, leaves: np.ndarray) -> np.ndarray:
+        """Frees these; which they were."""
+        pages = self.leaving(leaves)
+        self.left[pages] = -1
+        return pages
+
+    @property
+    def is_free(self) -> np.ndarray:
+        """(P,) bool"""
+        return (self.leaf_of < 0) & (self.left < 0)
+
     def reserve(self, leaves: np.ndarray, levels: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """Pages for so many splats of each leaf (n,), one leaf after the other.
 
         ValueError where there are not as many free.
         """
         needed = -(-counts // PAGE)
-        free = np.flatnonzero(self.leaf_of < 0)
+        free = np.flatnonzero(self.is_free)
         if not needed.sum() <= len(free):
             raise ValueError(f"{needed.sum()} pages are wanted, {len(free)} are free.")
         pages = free[: needed.sum()]
@@ -55,7 +79,7 @@ class PageTable:
     @property
     def room(self) -> int:
         """Pages that are free."""
-        return int(np.count_nonzero(self.leaf_of < 0))
+        return int(np.count_nonzero(self.is_free))
 
 
 def pages_needed(counts: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import StreamStats
 from shapeshift.renderer.streaming.ahead import views_ahead
 from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, steps_of
+from shapeshift.renderer.streaming.fade import Fades
 from shapeshift.renderer.streaming.fetch import Fetcher
 from shapeshift.renderer.streaming.pages import (
     ROOM,
@@ -83,6 +84,7 @@ class Stream:
         drawing.allocate_pages(list(models), self._pages, coefficients, stored)
         self.follows_eye = coefficients > 1  # then its colours are decoded a frame
         self.table = PageTable(self._pages, int(self.first[-1]))
+        self._fades = Fades(drawing, self.table)
         self._uploader = Uploader(drawing, self.table, self.objects, self._models, self.first)
         self.weights = Weights(int(self.first[-1]), self._look())
         self._fetcher = Fetcher()
@@ -119,12 +121,12 @@ class Stream:
         sight = self.find_sight(poses, shown, views)
         weight = self.weights.of(sight, views, poses, shown, fresh=self.converges)
         wanted, worth = self._choose(weight, sight)
-        changed = self._change(wanted, worth)
+        changed, moved = self._change(wanted, worth)
         self._last = now
         splats = int(self.table.splats[changed].sum())
-        pending = bool((wanted != self.table.level).any())
+        pending = bool((wanted != self.table.level).any() or self._fades.leaves.any())
         self.stats = self._stats(splats, pending, int(self._finest[sight.held].sum()))
-        return sorted({self.objects[i] for i in np.unique(self._object[changed])})
+        return sorted({self.objects[i] for i in np.unique(self._object[moved])})
 
     @property
     def placed(self) -> np.ndarray:
@@ -189,10 +191,14 @@ class Stream:
         there = np.array(shown)[self._object]
         return LeafSight(held & there, wide & there, cover, distance)
 
-    def _change(self, wanted: np.ndarray, worth: np.ndarray) -> np.ndarray:
-        """Brings the arena nearer to the wanted levels; the leaves that changed."""
-        table, level = self.table, wanted
+    def _change(self, wanted: np.ndarray, worth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Brings the arena nearer to the wanted levels; the leaves with other levels, and all that
+        have other pages.
+        """
+        table, fades, level = self.table, self._fades, wanted
         gone = np.flatnonzero((wanted == NOT_DRAWN) & (table.level != NOT_DRAWN))
+        over = [fades.end(np.flatnonzero(fades.leaves) if self.converges else gone)]
+        over.append(fades.advance())
         pages = [table.free(gone)]
         due = np.flatnonzero(wanted != table.level)
         if not self.converges:
@@ -203,13 +209,28 @@ class Stream:
             level = self._finest_of(wanted, at_hand)
             now = table.level
             level = np.where((now != NOT_DRAWN) & (level != wanted) & (level > now), now, level)
+            level = np.where(fades.leaves, now, level)  # one change after the other
             due, level = self._first_of(np.flatnonzero(level != now), level, worth)
-        pages.append(table.free(due))
+        fading = self._fading(due, level)
+        table.retire(fading)
+        pages.append(table.free(np.setdiff1d(due, fading)))
         self._drawing.clear_pages(np.concatenate(pages))
-        self._uploader.upload(due, level[due])
+        self._upload(due, level[due], fading)
+        changed = np.concatenate([gone, due])
+        return changed, np.concatenate([changed, *over])
+
+    def _fading(self, due: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """Which of the leaves due (n,) keep old pages for some frames: where all find room."""
+        needed = pages_needed(self._counts(level)[due]).sum()
+        if self.converges or not self._drawing.weighs_pages or not needed <= self.table.room:
+            return due[:0]
+        return due[self.table.level[due] != NOT_DRAWN]
+
+    def _upload(self, leaves: np.ndarray, levels: np.ndarray, fading: np.ndarray) -> None:
+        self._uploader.upload(leaves, levels)
         if not self.follows_eye:
             self._drawing.shade_pages(self.placed)
-        return np.concatenate([gone, due])
+        self._fades.begin(fading)
 
     def _missing(
         self, wanted: np.ndarray, worth: np.ndarray, at_hand: Sequence[np.ndarray]
@@ -255,7 +276,8 @@ class Stream:
         if not self.stats.pending:
             return False
         decoded = sum(int(np.count_nonzero(there)) for there in self._at_hand())
-        return self.stats.changed > 0 or decoded != self._decoded
+        fades = bool(self._fades.leaves.any())
+        return fades or self.stats.changed > 0 or decoded != self._decoded
 
     def _first_of(
         self, due: np.ndarray, level: np.ndarray, worth: np.ndarray

@@ -35,7 +35,7 @@ class PagedRows:
         self._device, self.first, self.pages = device, first, pages
         self.owner = np.full(pages, -1, np.int32)  # object of each page that is drawn
         self.stored = np.full(pages, -1)  # where its splats are
-        self.weight = np.ones(pages, np.float32)  # part of their optical depth
+        self.weight = np.ones(pages, np.float32)  # the part of each that is drawn
         self.uses = np.zeros(stored, int)  # of each stored page: how many are drawn from it
         self._sh = device.zeros((PAGE // 8 * stored, 3 * coefficients, 8))
         self._coefficients = coefficients
@@ -108,8 +108,8 @@ class PagedRows:
         self.owner[pages] = self.stored[pages] = -1
         self._remap()
 
-    def weigh(self, pages: np.ndarray, weight: np.ndarray) -> None:
-        """Pages (n,) are drawn with parts (n,) of their optical depth, until they are cleared."""
+    def weigh(self, pages: np.ndarray, weight: float) -> None:
+        """Pages (n,) are drawn as a part of themselves, until they are cleared."""
         self.weight[pages] = weight
         self._remap()
 

@@ -22,7 +22,7 @@ NO_EYE = np.zeros(3)  # for colours that look alike from everywhere
 class PagedTiles(TilesDrawing):
     """TilesDrawing, with pages where a scene has models that need them."""
 
-    shares_pages = True
+    shares_pages = weighs_pages = True
     paged: PagedRows | None = None
     _is_paged: tuple[bool, ...] = ()  # of each object
 
@@ -53,6 +53,11 @@ class PagedTiles(TilesDrawing):
     def share_pages(self, pages: np.ndarray, owner: np.ndarray, like: np.ndarray) -> None:
         self._pages.share(pages, owner, like, self._object_index)
         self._pages_moved()
+
+    def weigh_pages(self, pages: np.ndarray, part: float) -> None:
+        if len(pages):
+            self._pages.weigh(pages, part)
+            self._pages_moved()
 
     def _make_room(self, pages: int) -> None:
         """For so many more stored pages."""

@@ -100,13 +100,13 @@ def test_frames_in_motion_share_too(folder):
             drawn, stored = pages_in_use(one)
             table, pages = one.streaming.stream.table, one.drawing.paged
             # Copies at the same level draw the same rows.
-            counts = np.unique(pages.stored[pages.stored >= 0])
+            counts = np.unique(pages.stored[(pages.stored >= 0) & (table.left < 0)])
             levels = table.level.reshape(4, -1)
             shown = [set(column[column >= 0]) for column in levels.T]
-            assert len(counts) == stored <= drawn
+            assert stored <= drawn
             sources = shared.objects[0].model.leaves.levels.counts
             most = sum(-(-sources[i, k] // 32) for i, each in enumerate(shown) for k in each)
-            assert stored <= most
+            assert 0 < len(counts) <= most
 
 
 def test_a_hundred_copies_lie_in_the_pages_of_one(folder):

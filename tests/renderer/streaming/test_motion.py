@@ -105,7 +105,7 @@ def test_what_is_in_the_arena_is_what_the_table_says(moving, folder):
     table, drawing = moving.streaming.stream.table, moving.drawing
     mean_opacity, _, _ = drawing.splat_points()
     rows = mean_opacity.reshape(-1, 32, 4)
-    assert not rows[table.leaf_of < 0][..., 3].any()
+    assert not rows[table.is_free][..., 3].any()
     for leaf in np.flatnonzero(table.level >= 0)[::5]:
         (part,) = model.leaves.read(np.array([leaf]), table.level[[leaf]])
         mine = rows[np.flatnonzero(table.leaf_of == leaf)].reshape(-1, 4)[: len(part.means)]
