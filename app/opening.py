@@ -73,7 +73,8 @@ class DrawingOptions(ReadingOptions):
     as 2M, finer where more pixels show it; auto: what suits this machine.  Default: one level for
     the whole scene."""
     cache_mb: Annotated[int, EXPERT] = 2048
-    """MB of such a scene's files that are kept decoded, those used last."""
+    """MB of memory for such a scene: what is drawn of it, and its decoded files, those used last,
+    as far as there is room; 64 at least for them."""
 
     def reading(self) -> Reading:
         """The same for readers.  Raises UsageError."""

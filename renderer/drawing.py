@@ -74,6 +74,12 @@ class Drawing(ABC):
         """
         raise TypeError("this drawing weighs no pages.")
 
+    def trim(self) -> int:
+        """Gives back what passes of other sizes left behind; bytes of main memory that all arrays
+        have then, 0 where they lie elsewhere.
+        """
+        return 0
+
     def clear_pages(self, pages: np.ndarray) -> None:
         """Nothing is in these pages any more."""
         raise TypeError("this drawing has no pages.")

@@ -52,6 +52,9 @@ class LeafSource(Protocol):
     budget: int  # splats that the scene may draw; 0: as many as suit the machine
     problem: str  # one sentence: what could not be read; "" = nothing
 
+    def share_memory(self, taken: int) -> None:
+        """So many bytes of what the scene may keep in memory are not decoded parts."""
+
     def at_hand(self) -> np.ndarray:
         """(parts,) bool: what is decoded already."""
 

@@ -1,5 +1,7 @@
 """Reads parts of scenes in a thread, those that are wanted most first."""
 
+import ctypes
+import sys
 import threading
 from collections.abc import Sequence
 
@@ -49,6 +51,7 @@ class Fetcher:
                 source.load(part)
             except (BadFile, MemoryError):
                 pass  # the source says so, and asks no more for it
+            return_heap()
 
     def close(self) -> None:
         with self._wake:
@@ -56,3 +59,11 @@ class Fetcher:
             self._wake.notify()
         if self._thread is not None:
             self._thread.join(PATIENCE_S)
+
+
+def return_heap() -> None:
+    """Gives pages that decoding has freed back to the system.  glibc keeps them, for each thread,
+    75 MB beside a scene of 13 million splats; other C libraries have no such call.
+    """
+    if sys.platform == "linux" and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):
+        trim(0)

@@ -69,7 +69,10 @@ class PageTable:
 
     def pages_of(self, leaves: np.ndarray) -> np.ndarray:
         """All pages of leaves (n,), one leaf after the other, in the order of their splats."""
-        order = np.argsort(self.leaf_of, kind="stable")
+        wanted = np.zeros(len(self.level), bool)
+        wanted[leaves] = True
+        order = np.flatnonzero((self.leaf_of >= 0) & wanted[np.maximum(self.leaf_of, 0)])
+        order = order[np.argsort(self.leaf_of[order], kind="stable")]
         of = self.leaf_of[order]
         first, last = np.searchsorted(of, leaves, "left"), np.searchsorted(of, leaves, "right")
         counts = last - first

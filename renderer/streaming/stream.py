@@ -33,7 +33,7 @@ from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
-CHANGED = 0.05  # of the budget: what a frame in motion may upload, in splats
+CHANGED = 0.025  # of the budget: what a frame in motion may upload, in splats
 EACH = 8  # frames, one in so many looks ahead
 BESIDE = 1e-6  # pixels that a leaf beside the picture counts: last, and the coarsest of all
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
@@ -116,6 +116,9 @@ class Stream:
         if now == self._last and not self.stats.pending:
             self.stats = self._stats(0, False, self.stats.in_sight)
             return []
+        taken = self._drawing.trim()
+        for source in self._sources:
+            source.share_memory(taken)
         self._views = (self._views[1], views)
         self._poses, self._shown = poses, shown
         sight = self.find_sight(poses, shown, views)

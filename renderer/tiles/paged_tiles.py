@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.paging.pages import PAGE, PageMap
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.drawing import SAMPLE, median_distance
 from shapeshift.renderer.limits import arena_rows
@@ -16,6 +16,7 @@ from shapeshift.runtime_models.model import Model
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import View
 
+HELD = 64 << 20  # bytes that passes may leave for the next frame
 NO_EYE = np.zeros(3)  # for colours that look alike from everywhere
 
 
@@ -28,7 +29,7 @@ class PagedTiles(TilesDrawing):
 
     def allocate(self, models: list[Model], more: int = 0, stored: int | None = None) -> None:
         super().allocate(models, more, stored)
-        self.paged, self._is_paged, self._page_map = None, (False,) * len(models), None
+        self.paged, self._is_paged = None, (False,) * len(models)
 
     def allocate_pages(
         self, models: list[Model], pages: int, coefficients: int, stored: int | None = None
@@ -39,25 +40,30 @@ class PagedTiles(TilesDrawing):
         self.allocate(models, first - fixed + PAGE * pages, first - fixed + PAGE * stored)
         self.paged = PagedRows(self.device, first, pages, stored, coefficients)
         self._is_paged = tuple(getattr(model, "leaves", None) is not None for model in models)
-        self._pages_moved()
 
-    def _pages_moved(self) -> None:
-        self._page_map = self._pages.map
-        self._splats_moved()
+    @property
+    def _page_map(self) -> PageMap | None:
+        return self.paged.map if self.paged is not None else None
 
     def place_pages(self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats) -> None:
         self._make_room(len(pages))
         self._pages.place(pages, owner, given, self._arena)
-        self._pages_moved()
+        self._splats_moved()
 
     def share_pages(self, pages: np.ndarray, owner: np.ndarray, like: np.ndarray) -> None:
         self._pages.share(pages, owner, like, self._object_index)
-        self._pages_moved()
+        self._splats_moved()
 
     def weigh_pages(self, pages: np.ndarray, part: float) -> None:
         if len(pages):
             self._pages.weigh(pages, part)
-            self._pages_moved()
+            self._splats_moved()
+
+    def trim(self) -> int:
+        pool = self.device.pool
+        if pool.managed_bytes - pool.active_bytes > HELD:
+            pool.free_held()
+        return pool.managed_bytes if self.device.kind == "cpu" else 0
 
     def _make_room(self, pages: int) -> None:
         """For so many more stored pages."""
@@ -77,7 +83,7 @@ class PagedTiles(TilesDrawing):
     def clear_pages(self, pages: np.ndarray) -> None:
         if len(pages):
             self._pages.clear(pages)
-            self._pages_moved()
+            self._splats_moved()
 
     def shade_pages(self, pages: np.ndarray) -> None:
         for color in self._colors:
@@ -124,7 +130,7 @@ class PagedTiles(TilesDrawing):
         self._pages.write(stored, mean_opacity, self._mean_opacity)
         if covariance is not None:
             self._pages.write(stored, covariance, self._covariance)
-        self._pages_moved()
+        self._splats_moved()
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
         if not self._is_paged[i]:

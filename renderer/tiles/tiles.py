@@ -61,7 +61,6 @@ class TilesDrawing(Drawing):
     """
 
     decodes_on_gpu = False
-    _page_map: PageMap | None = None  # where rows that are drawn lie; None: where they are drawn
 
     def __init__(self, device: Device | None = None, mlps: str = "opencl") -> None:
         self.device, self._mlps = device or open_device(), mlps
@@ -110,9 +109,8 @@ class TilesDrawing(Drawing):
         self._splats_moved()
         rows = self.splats if stored is None else sum(counts) + stored
         self._mean_opacity, self._covariance = device.zeros((rows, 4)), device.zeros((rows, 8))
-        self._colors = [device.zeros((self.splats, 4))]
+        self._colors, self._heats = [device.zeros((self.splats, 4))], [None]
         self._color, self._set = self._colors[0], 0  # that decoding writes into
-        self._heats = [None]
         self._antialiased = tuple(map(is_antialiased, models))
         index = np.repeat(np.arange(len(models), dtype=np.int32), counts)
         self._object_index = device.upload(np.pad(index, (0, more)))
@@ -236,9 +234,12 @@ class TilesDrawing(Drawing):
         if settings.depth_scale > 0:
             with timer.time("depth", on_gpu=False):
                 scene = (self.device, self._arena, self._world_from_objects)
-                scale = settings.depth_scale
-                made = depth_pictures(*scene, self._projected, tiles, views, scale)
+                made = depth_pictures(*scene, self._projected, tiles, views, settings.depth_scale)
                 self._depths.update(enumerate(made, first))
+
+    @property
+    def _page_map(self) -> PageMap | None:
+        return None  # where rows that are drawn lie; None: where they are drawn
 
     @property
     def _arena(self) -> "tuple[Array, Array, Array, PageMap | None]":

@@ -5,6 +5,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Generic, Protocol, TypeVar
 
+LEAST = 64 << 20  # bytes that are never lent
+
 
 class CachedPart(Protocol):
     """What is kept."""
@@ -26,6 +28,7 @@ class PartCache(Generic[P]):
 
     def __init__(self, most: int) -> None:
         self.most, self.taken = most, 0  # bytes
+        self._lent = 0  # of them, to others
         self.decoded = 0  # how often a part was made
         self._parts: OrderedDict[Hashable, P] = OrderedDict()
         self._lock = threading.Lock()
@@ -56,14 +59,29 @@ class PartCache(Generic[P]):
             self._keep(key, part)
             return part
 
+    def lend(self, size: int) -> None:
+        """Others have so many bytes of the bound: what was used longest ago goes for them, until
+        LEAST are left.
+        """
+        with self._lock:
+            self._lent = size
+            gone = self._make_room(0)
+        for old in gone:
+            old.release()
+
+    def _make_room(self, size: int) -> list[P]:
+        """Takes out what has to go for so many more bytes."""
+        most, gone = max(self.most - self._lent, min(self.most, LEAST)), []
+        while self._parts and self.taken + size > most:
+            _, old = self._parts.popitem(last=False)
+            self.taken -= old.size
+            gone.append(old)
+        return gone
+
     def _keep(self, key: Hashable, part: P) -> None:
         with self._lock:
             self.decoded += 1
-            gone = []
-            while self._parts and self.taken + part.size > self.most:
-                _, old = self._parts.popitem(last=False)
-                self.taken -= old.size
-                gone.append(old)
+            gone = self._make_room(part.size)
             if part.size <= self.most:
                 self._parts[key] = part
                 self.taken += part.size

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def rotator(rotation: np.ndarray, count: int) -> Callable[..., None]:
     if np.array_equal(rotation, np.eye(3)):
         return lambda means, wxyz, sh: None
     if np.array_equal(np.abs(rotation), np.eye(3)):
-        return half_turn_rotator(rotation.diagonal(), count)
+        return half_turn_rotator(tuple(rotation.diagonal()), count)
     harmonics = rotate_harmonics(rotation, count)
 
     def rotate_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
@@ -67,11 +68,13 @@ def rotator(rotation: np.ndarray, count: int) -> Callable[..., None]:
     return rotate_rows
 
 
-def half_turn_rotator(signs: np.ndarray, count: int) -> Callable[..., None]:
-    """rotator() of half a turn about the axis whose sign (3,) is +1: nothing but signs.
+@cache  # parts of a file are turned one by one
+def half_turn_rotator(diagonal: tuple[float, float, float], count: int) -> Callable[..., None]:
+    """rotator() of half a turn about the axis whose sign is +1: nothing but signs.
 
     A quaternion times that of the half turn is itself in another order, with signs.
     """
+    signs = np.array(diagonal)
     axis = 1 + int(signs.argmax())
     other = [i for i in (1, 2, 3) if i != axis]
     order = np.array([axis, *(0 if i == axis else 6 - axis - i for i in (1, 2, 3))])

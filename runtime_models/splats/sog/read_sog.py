@@ -91,6 +91,7 @@ class Sog:
     version: int
     count: int
     findings: list[Finding] = field(default_factory=list)
+    known: dict[tuple[str, str], np.ndarray] = field(default_factory=dict)  # numbers, checked once
 
     def names(self, part: str) -> list[str]:
         """The files of a part; [] where there is none, which only harmonics may be."""
@@ -106,7 +107,9 @@ class Sog:
         return [name for part in PICTURES for name in self.names(part)]
 
     def numbers(self, part: str, key: str, least: int, most: int) -> np.ndarray:
-        """(n,) float32, `least` to `most` of them.  Raises BadFile."""
+        """(n,) float32, `least` to `most` of them; read only.  Raises BadFile."""
+        if (kept := self.known.get((part, key))) is not None and least <= len(kept) <= most:
+            return kept
         found = self.meta.object(part).data.get(key)
         found = found if isinstance(found, list) else [found]
         if key == "codebook" and len(found) == 256 and found[0] is None:
@@ -116,7 +119,9 @@ class Sog:
             raise self.bad(f"{part} needs {least} to {most} numbers as its {key}")
         if not all(abs(number) < LARGEST_NUMBER for number in found):  # False for NaN
             raise self.bad(f"the {key} of {part} is not finite")
-        return np.array(found, np.float32)
+        self.known[part, key] = np.array(found, np.float32)
+        self.known[part, key].flags.writeable = False
+        return self.known[part, key]
 
     def pixels(self, part: str, number: int = 0) -> np.ndarray:
         """(N, 4) uint8: of each splat the pixel of one of a part's pictures."""

@@ -127,6 +127,9 @@ class StreamedLeaves:
     def at_hand(self) -> np.ndarray:
         return np.array([(*self._key, n) in self.cache for n in range(len(self._files))])
 
+    def share_memory(self, taken: int) -> None:
+        self.cache.lend(taken)
+
     def broken(self) -> np.ndarray:
         return self._broken
 
