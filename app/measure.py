@@ -5,7 +5,7 @@ import os
 import platform
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from itertools import pairwise
 
@@ -15,6 +15,7 @@ from shapeshift.app.document import Document
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
+from shapeshift.renderer.streaming.stream import has_leaves
 from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.cameras.framing import distances_from, orbit_path
@@ -43,6 +44,11 @@ class Measure:
         self.x = subject.x if x is None else x
         self.centre, self.radius = subject.bounds()
 
+    @property
+    def by_budget(self) -> bool:
+        """Whether a budget says which splats are drawn."""
+        return any(has_leaves(obj.model) for obj in self.subject.scene.objects)
+
     def scene(self, x: Control | None) -> Scene:
         return self.subject.at(x)
 
@@ -58,7 +64,8 @@ class Measure:
         mono, stereo, passes, sorts, stats = self.orbit(frames)
         progress(f"{sweep} frames from x = 0 to 1")
         sweep_ms = self.sweep(sweep)
-        progress("pictures of the float64 reference")
+        against = "all splats" if self.by_budget else "the float64 reference"
+        progress(f"pictures of {against}")
         errors = self.errors(quality_size)
         drawing = sum(passes[name]["p50"] for name in DRAW_PASSES if name in passes)
         return {
@@ -69,6 +76,9 @@ class Measure:
             "passes": passes,
             "stereo_over_mono": float(np.median(stereo) / np.median(mono)),
             "psnr_db": worst(errors),
+            "psnr_against": against,
+            "budget": stats.streaming.budget if stats.streaming else None,
+            "in_pages": stats.streaming.shown if stats.streaming else None,
             "sweep_worst_ms": max(sweep_ms),
             "splats": self.subject.scene.splat_count,
             "drawn": stats.drawn,
@@ -150,7 +160,8 @@ class Measure:
         return times
 
     def errors(self, size: tuple[int, int]) -> list[float]:
-        """PSNR in dB of small pictures against the float64 reference, at the same settings.
+        """PSNR in dB of small pictures against the float64 reference, at the same settings; of a
+        scene that is drawn by a budget against all of its splats in the same renderer.
 
         From several sides at the orbit's x, then from the first side at every stop and half way
         between: speed at one x says nothing about the picture at another.
@@ -158,9 +169,24 @@ class Measure:
         stops = self.subject.stops
         views = orbit_path(QUALITY_VIEWS, self.centre, self.radius, size)
         others = sorted({*stops, *((a + b) / 2 for a, b in pairwise(stops))} - {self.x})
-        return [self.error(self.x, view) for view in views] + [
-            self.error(x, views[0]) for x in others
-        ]
+        pairs = [*((self.x, view) for view in views), *((x, views[0]) for x in others)]
+        if self.by_budget:
+            return self.errors_of_budget(pairs)
+        return [self.error(*pair) for pair in pairs]
+
+    def errors_of_budget(self, pairs: list[tuple[Control | None, View]]) -> list[float]:
+        """PSNR in dB of the pictures of controls and views, with the budget and with all splats."""
+        renderer, pictures = self.renderer, []
+        settings = renderer.settings
+        for budget in (settings.budget, self.subject.scene.splat_count):
+            renderer.settings = replace(settings, budget=budget)
+            for x, view in pairs:
+                renderer.update(self.scene(x))
+                renderer.draw([view])
+                pictures.append(renderer.image(0).copy())
+        renderer.settings = settings
+        drawn, whole = pictures[: len(pairs)], pictures[len(pairs) :]
+        return [min(psnr(*pair), MOST_DB) for pair in zip(drawn, whole, strict=True)]
 
     def error(self, x: Control | None, view: View) -> float:
         """PSNR in dB of the premultiplied colours and the alpha of one picture, as it was drawn."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
-from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.opening import DrawingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, print_json, say
 
@@ -22,7 +22,7 @@ LARGEST_RESULT = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
-class Options(ReadingOptions):
+class Options(DrawingOptions):
     """Time frames on an orbit and an x sweep, and measure the image error with them."""
 
     scene: Annotated[Path, POSITIONAL]
@@ -192,9 +192,9 @@ def print_table(result: dict) -> None:
     db = result["psnr_db"]
     quality = "NaN in a picture" if db is None else f"{db:.1f} dB"
     caption = (
-        f"PSNR to the float64 reference {quality} at {result['quality_size']} "
+        f"PSNR to {result['psnr_against']} {quality} at {result['quality_size']} "
         f"(worst of {result['quality_images']}), {result['drawn']:,} of {result['splats']:,} "
-        f"splats drawn, stereo/mono {result['stereo_over_mono']:.2f}, "
+        f"splats drawn{by_budget(result)}, stereo/mono {result['stereo_over_mono']:.2f}, "
         f"worst frame of the x sweep {result['sweep_worst_ms']:.1f} ms{frame_over_draw(result)}; "
         f"{result['frames']} frames after {result['warm_up']} that do not count"
     )
@@ -203,6 +203,13 @@ def print_table(result: dict) -> None:
     console.print(title, markup=False)  # a scene's name may hold brackets
     console.print(table)
     console.print(caption, markup=False)
+
+
+def by_budget(result: dict) -> str:
+    """How many splats the budget put into the arena, in words; nothing without one."""
+    if result["budget"] is None:
+        return ""
+    return f" (budget {result['budget']:,}, {result['in_pages']:,} at hand)"
 
 
 def frame_over_draw(result: dict) -> str:
