@@ -115,6 +115,8 @@ class Options(DrawingOptions):
     machine, which is measured once, in seconds, and kept.  Default: no limit, the exact picture."""
     floor_db: Annotated[float | None, EXPERT] = None
     """PSNR in dB against the exact picture below which --target-ms never goes.  Default: 35."""
+    draft: bool = False
+    """With --budget: draw the coarsest levels alone, which are there at once."""
     overwrite: bool = False
     """Replace pictures of the same name."""
 
@@ -148,6 +150,8 @@ def run(options: Options) -> int:
     check_one_of(options, budget)
     check_output(options)
     check_show(options)
+    if options.draft and not options.budget:
+        raise UsageError("--draft is of scenes in levels of detail; add --budget, such as 2M.")
     # What needs no scene comes before it: large ones take a while to open.
     cameras = choose_cameras(options, size)
     count = len(cameras.views) if cameras else None
@@ -162,6 +166,7 @@ def run(options: Options) -> int:
     ]
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
+        renderer.streaming.reads = not options.draft
         background = backdrop or document.background
         renderer.settings = replace(
             settings, target=renderer.settings.target, background=background

@@ -24,6 +24,7 @@ class Streaming:
         self._drawing = drawing
         self.stream: Stream | None = None
         self.converges = True  # a frame waits for all that it wants; False: it is one of many
+        self.reads = True  # levels that are not at hand; False: the coarsest, and what is at hand
 
     def allocate(self, models: list[Model], budget: int) -> None:
         """Room for these objects in the drawing, none where they do not fit.  budget: 0 for the
@@ -61,7 +62,8 @@ class Streaming:
     ) -> None:  # fmt: skip
         """What the views want is there afterwards, or on its way.  Raises BadFile."""
         if self.stream is not None:
-            self.stream.converges = self.converges
+            self.stream.converges = self.converges and self.reads
+            self.stream.reads = self.reads
             with timer.time("stream", on_gpu=False):
                 follow(self._drawing, self.stream, scene, decoded, views)
 

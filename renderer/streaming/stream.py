@@ -94,6 +94,7 @@ class Stream:
         self._shown: list[bool] = []
         self._frame = self._decoded = 0  # frames; parts that were at hand in the last
         self.stats = StreamStats(self.budget, 0, 0, int(self._finest.sum()), 0, False, "")
+        self.reads = True  # what is wanted and not at hand
         self.converges = True  # each frame gets all that it wants, and forgets the one before
 
     def _look(self) -> CoarseLook | None:
@@ -206,8 +207,9 @@ class Stream:
         due = np.flatnonzero(wanted != table.level)
         if not self.converges:
             at_hand = self._at_hand()
-            missing = self._missing(wanted, worth, at_hand)
-            self._fetcher.want([*missing, *self._ahead(at_hand)])
+            if self.reads:
+                missing = self._missing(wanted, worth, at_hand)
+                self._fetcher.want([*missing, *self._ahead(at_hand)])
             self._decoded = sum(int(np.count_nonzero(there)) for there in at_hand)
             level = self._finest_of(wanted, at_hand)
             now = table.level

@@ -6,7 +6,9 @@ FOLDER is streamed SOG, as launch.py lod writes it.  Each row is measured in a p
 "budget" draws one view after the other, "one level" what --max-splats reads, "walk" 120 frames of a
 metre and 30 degrees with what frames in motion do, "four" 2 x 2 copies side by side.  dB are
 against all splats of the same folder, drawn by the same tiles; first_cpu_ms is the frame that
-reads, frame_cpu_ms the median of still ones (of a walk: of its frames), both of all threads.
+reads, frame_cpu_ms the median of still ones (of a walk: of its frames), both of all threads;
+still_cpu_ms and still_p95_cpu_ms are of a walk's frames drawn once more each, in turns, without
+anything that streams.
 """
 
 import argparse
@@ -26,6 +28,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.files.part_cache import PartCache
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
@@ -41,7 +44,7 @@ COMPARED = 6  # of them, with all splats
 BUDGETS = (500_000, 1_000_000, 2_000_000, 4_000_000)
 COLUMNS = (
     "scene", "view", "way", "budget", "splats", "psnr_db", "first_cpu_ms", "frame_cpu_ms",
-    "p95_cpu_ms", "looks", "peak_mb",
+    "p95_cpu_ms", "still_cpu_ms", "still_p95_cpu_ms", "looks", "peak_mb",
 )  # fmt: skip
 
 
@@ -193,11 +196,12 @@ def walk(renderer: Renderer, view: View, picture: Path) -> dict:
             break
         time.sleep(0.02)  # for the thread that reads
         stats = renderer.draw([path[0]])
-    times, scores, most = [], [], 0
+    times, stills, scores, most = [], [], [], 0
     for n, each in enumerate(path):
         begun = time.process_time()
         stats = renderer.draw([each])
         times.append(time.process_time() - begun)
+        stills.append(draw_still(renderer, each))
         assert stats.streaming is not None
         most = max(most, stats.streaming.shown)
         if n in compared(path):
@@ -205,11 +209,20 @@ def walk(renderer: Renderer, view: View, picture: Path) -> dict:
             scores.append(psnr(image, np.load(f"{picture}_{n}.npy")))
     assert streaming.stream is not None
     p50, p95 = np.percentile(times, (50, 95))
+    still = np.percentile(stills, (50, 95))
     return {
         "splats": most, "psnr_db": round(float(np.mean(scores)), 2),
         "first_cpu_ms": round(1e3 * first), "frame_cpu_ms": round(1e3 * p50),
         "p95_cpu_ms": round(1e3 * p95), "looks": streaming.stream.weights.looks,
+        "still_cpu_ms": round(1e3 * still[0]), "still_p95_cpu_ms": round(1e3 * still[1]),
     }  # fmt: skip
+
+
+def draw_still(renderer: Renderer, view: View) -> float:
+    """Seconds of the passes alone, of what lies in the arena."""
+    begun = time.process_time()
+    renderer.drawing.draw([view], renderer.settings, PassTimer(None))
+    return time.process_time() - begun
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from PIL import Image
 
 import shapeshift as ss
 from shapeshift.app import cli
+from shapeshift.app.commands import render
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import read_splat_budget
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -104,3 +105,19 @@ def test_bench_takes_a_budget_and_compares_with_all_splats(folder, tmp_path, cap
     assert [row["budget"] for row in rows] == [3000, 1000]
     assert full["psnr_db"] > 90 > 45 > part["psnr_db"] > 15
     assert part["drawn"] <= part["in_pages"] <= 1000 < full["in_pages"] <= full["splats"] == 3000
+
+
+def test_a_draft_is_the_coarsest_levels_and_reads_no_other_file(tmp_path, capsys):
+    """Files of finer levels may be missing: nothing is read of them."""
+    folder = write_levels(shell(3000), tmp_path / "levels")
+    words = ["render", str(folder), "--size", "96x64", "--drawing", "tiles", "--out"]
+    assert cli.main([*words, str(tmp_path / "whole"), "--budget", "3k"]) == 0
+    (folder / "0_0" / "means_l.webp").unlink()
+    assert cli.main([*words, str(tmp_path / "draft"), "--budget", "3k", "--draft"]) == 0
+    whole, draft = (
+        np.asarray(Image.open(next((tmp_path / name).glob("*.png")))) / 255.0
+        for name in ("whole", "draft")
+    )
+    assert 12 < -10 * np.log10(((whole - draft) ** 2).mean()) < 40
+    with pytest.raises(UsageError, match="add --budget"):
+        render.run(render.Options(scene=folder, out=tmp_path / "no", draft=True))
