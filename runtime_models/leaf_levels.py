@@ -1,6 +1,6 @@
 """Leaves of a scene that each come in levels of detail: what a budget of splats chooses from."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -61,8 +61,10 @@ class LeafSource(Protocol):
     def broken(self) -> np.ndarray:
         """(parts,) bool: what can never be read."""
 
-    def load(self, part: int) -> None:
-        """Decodes a part, so that it is at hand; any thread.  Raises BadFile."""
+    def load(self, part: int, pace: Callable[[], None] = lambda: None) -> None:
+        """Decodes a part, so that it is at hand; any thread.  pace is called between pieces of the
+        work, and may wait.  Raises BadFile.
+        """
 
     def read(self, leaves: np.ndarray, levels: np.ndarray) -> Iterator[LeafSplats]:
         """Leaves (n,) at levels (n,), part by part.  Raises BadFile."""

@@ -10,6 +10,7 @@ from shapeshift.runtime_models.model import BadFile
 
 MOST_WAITING = 16  # parts: those of later frames are asked for then
 THREAD = "leaves"  # its name
+PACE_S = 0.1  # longest wait for the next frame, between pictures of a part
 PATIENCE_S = 5.0  # longest wait at the end for a part that is being read
 
 
@@ -20,7 +21,7 @@ class Fetcher:
         self._wanted: list[tuple[LeafSource, int]] = []
         self._wake = threading.Condition()
         self._thread: threading.Thread | None = None
-        self._ended = False
+        self._ended, self._frames, self._moving = False, 0, False
         self.busy = False  # a part is being read
 
     def want(self, parts: Sequence[tuple[LeafSource, int]]) -> None:
@@ -31,6 +32,19 @@ class Fetcher:
                 self._thread = threading.Thread(target=self._run, name=THREAD, daemon=True)
                 self._thread.start()
             self._wake.notify()
+
+    def tick(self, moving: bool) -> None:
+        """A frame begins.  moving: of an eye that moves: then each frame bears one picture of a
+        part, since all of them at once would hold a frame up.
+        """
+        with self._wake:
+            self._frames, self._moving = self._frames + 1, moving
+            self._wake.notify()
+
+    def _pace(self) -> None:
+        with self._wake:
+            if self._moving and not self._ended:
+                self._wake.wait_for(lambda now=self._frames: self._frames != now, PACE_S)
 
     @property
     def waiting(self) -> bool:
@@ -48,7 +62,7 @@ class Fetcher:
                 source, part = self._wanted.pop(0)
                 self.busy = True
             try:
-                source.load(part)
+                source.load(part, self._pace)
             except (BadFile, MemoryError):
                 pass  # the source says so, and asks no more for it
             return_heap()

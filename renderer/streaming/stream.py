@@ -117,6 +117,8 @@ class Stream:
         if now == self._last and not self.stats.pending:
             self.stats = self._stats(0, False, self.stats.in_sight)
             return []
+        moving = not self.converges and now[: len(views)] != self._last[: len(views)]
+        self._fetcher.tick(moving)
         taken = self._drawing.trim()
         for source in self._sources:
             source.share_memory(taken)
@@ -298,7 +300,7 @@ class Stream:
         downs = due[level[due] > now[due]]
         downs = np.setdiff1d(downs, new)
         downs = downs[np.argsort(worth[downs], kind="stable")]
-        room = int(CHANGED * self.budget)
+        room = int(CHANGED * self.budget / (2 if self.weights.looked else 1))
         freed = np.cumsum(there[downs] - counts[downs])
         total = int(there.sum())
         needed = total + int(base[new].sum()) - self._left

@@ -22,7 +22,7 @@ class Weights:
     def __init__(self, leaves: int, look: CoarseLook | None) -> None:
         self.pixels = np.zeros(leaves)
         self._look = look
-        self.looks = 0
+        self.looks, self.looked = 0, False  # in this frame
         self._looked: list[View] = []
         self._known = np.zeros(leaves, bool)  # what the last look held
         self._distance = math.inf  # metres: of half of what it saw
@@ -41,6 +41,7 @@ class Weights:
             return np.where(sight.held, np.maximum(sight.cover, FLOOR), 0.0)
         if fresh or self._is_stale(views, poses):
             self._look_again(sight, views, poses, shown, fresh)
+        self.looked = self._age == 0
         self._age += 1
         pixels = np.where(self._known, self.pixels, self.guessed(sight))
         return np.where(sight.held, np.maximum(pixels, FLOOR), 0.0)

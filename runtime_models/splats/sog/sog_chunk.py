@@ -1,5 +1,6 @@
 """A SOG kept as the bytes of its pictures, 17 a splat: any of its rows become splats when asked."""
 
+from collections.abc import Callable
 from copy import copy
 from pathlib import Path
 
@@ -21,8 +22,10 @@ CHANNELS = {"means": 3, "scales": 3, "quats": 4, "sh0": 4, "shN": 2}  # of the p
 class SogChunk:
     """Decoded pictures of one SOG; `size` bytes of them are charged until `release`."""
 
-    def __init__(self, path: Path, memory: Account) -> None:
-        """Raises BadFile."""
+    def __init__(
+        self, path: Path, memory: Account, pace: Callable[[], None] = lambda: None
+    ) -> None:
+        """pace is called after each picture.  Raises BadFile."""
         sog = open_sog(path, memory)
         self._sog, self._memory = sog, memory
         self.count = sog.count
@@ -37,6 +40,7 @@ class SogChunk:
                 del pixels
                 memory.release(sog.files.held)
                 sog.files.held = 0
+                pace()
         kept = [*self._pixels.values()] + ([] if self._palette is None else [self._palette])
         self.size = sum(array.nbytes for array in kept)  # bytes
         memory.charge(self.size, f"{sog.count:,} splats")

@@ -1,6 +1,6 @@
 """A streamed SOG leaf by leaf and level by level: what is to be drawn is decoded, nothing else."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -133,8 +133,8 @@ class StreamedLeaves:
     def broken(self) -> np.ndarray:
         return self._broken
 
-    def load(self, part: int) -> None:
-        self._chunk(part)
+    def load(self, part: int, pace: Callable[[], None] = lambda: None) -> None:
+        self._chunk(part, pace)
 
     def read(self, leaves: np.ndarray, levels: np.ndarray) -> Iterator[LeafSplats]:
         for run in self._runs(leaves, levels):
@@ -151,12 +151,12 @@ class StreamedLeaves:
             for rows in np.split(mine, np.flatnonzero(np.diff(block)) + 1):
                 yield int(file), leaves[rows], levels[rows]
 
-    def _chunk(self, file: int) -> SogChunk:
+    def _chunk(self, file: int, pace: Callable[[], None] = lambda: None) -> SogChunk:
         """A file's pictures.  Raises BadFile, then and ever after."""
         path = self._files[file]
 
         def decode() -> SogChunk:
-            return SogChunk(path, self._reading.account)
+            return SogChunk(path, self._reading.account, pace)
 
         try:
             return self.cache.get((*self._key, file), decode)
