@@ -8,7 +8,13 @@ from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.min_opacity import MIN_OPACITY, add_min_opacity_gradient
+from shapeshift.training.losses.min_opacity import (
+    MIN_OPACITY,
+    SHARE,
+    UNTIL,
+    add_min_opacity_gradient,
+    min_opacity_share,
+)
 from shapeshift.training.schedule import LEAST_RATE, WARM_UP_STEPS, LrWarmup
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
@@ -71,3 +77,12 @@ def test_a_capture_of_shapes_apart_is_turned_back_once_and_learned(device, apart
     assert resumed.lr_warmup == whole.lr_warmup
     for name, psnr in resumed.held_out_psnr(9).items():
         assert psnr > 20, (name, psnr)
+
+
+def test_the_loss_of_faint_splats_ends_where_stops_are_told_apart():
+    after = np.nextafter(UNTIL, 1)
+    assert [min_opacity_share(2, 0.0, done) for done in (0, UNTIL, after, 1)] == [SHARE] * 2 + [
+        0
+    ] * 2
+    for stops, blended in ((1, 0.0), (3, 0.1)):  # one shape; or shapes between stops are drawn
+        assert {min_opacity_share(stops, blended, done) for done in (0, UNTIL, after, 1)} == {SHARE}
