@@ -84,6 +84,7 @@ def run(options: Options) -> int:
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.fit.fit import Fit
+    from shapeshift.training.settings import suited
 
     if options.only is not None:
         return run_trial(options)
@@ -99,6 +100,7 @@ def run(options: Options) -> int:
     longer = options.final_iterations, options.final_seconds
     last = None if longer == (None, None) else settings_of(options.asked | budget(*longer))
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
+    settings = suited(settings, options.asked, len(capture.stops))
     if options.calibrate is not None:
         if options.cluster == NONE:
             settings = calibrated(device, capture, settings, options.calibrate)

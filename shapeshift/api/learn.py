@@ -91,6 +91,7 @@ def train(
     from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
     from shapeshift.training.calibration.extrinsics import rig_json
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.settings import suited
 
     path = None if out is None else plain(str(out))
     if path is not None:
@@ -103,6 +104,9 @@ def train(
     settings |= {"iterations": iterations, "seconds": seconds}
     wished = settings_of(settings, before[1]["settings"] if before else None)
     found, on = read_capture(plain(str(capture))), open_device(device)
+    if before is None:
+        given = [name for name, value in settings.items() if value is not None]
+        wished = suited(wished, given, len(found.stops))
     if calibrate is not None:
         if resume:
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
