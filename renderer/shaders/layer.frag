@@ -1,4 +1,4 @@
-// layer: a premultiplied layer, to be blended over a picture whose upper row comes first.
+// layer: a premultiplied layer, to be blended over a picture.
 // Reads:   layer, row 0 at the bottom, each texel as it is.
 // Writes:  shown, premultiplied.
 // Units:   display sRGB.

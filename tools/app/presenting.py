@@ -25,6 +25,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
+import moderngl  # noqa: E402
 import numpy as np  # noqa: E402
 from moderngl_window.integrations.imgui_bundle import ModernGLRenderer  # noqa: E402
 
@@ -36,6 +37,7 @@ from shapeshift.app.editor.window.viewer import Viewer  # noqa: E402
 from shapeshift.app.editor.window.window import Window  # noqa: E402
 from shapeshift.app.paths import DEMO  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.renderer.settings import FrameStats  # noqa: E402
 
 TURNS, FRAMES = 8, 8  # of each way
 BUTTONS = ((60.0, 130.0), (170.0, 130.0))  # where two of the panel are
@@ -81,12 +83,19 @@ def changes(viewer: Viewer) -> dict[str, Callable[[int], None]]:
 
     def picture(number: int) -> None:
         state.settings = replace(state.settings, background=(next(grays),) * 3)
+        viewer.shown.forget()
 
     def both(number: int) -> None:
         button(number)
         picture(number)
 
     return {"nothing": lambda number: None, "button": button, "picture": picture, "both": both}
+
+
+def present_alone(viewer: Viewer, target: moderngl.Framebuffer) -> FrameStats:
+    """The splats that there are as another picture: what a frame costs without drawing them."""
+    viewer.renderer.present(target)
+    return viewer.readings.stats
 
 
 def measure(viewer: Viewer) -> list[str]:
@@ -98,6 +107,8 @@ def measure(viewer: Viewer) -> list[str]:
     watch.over(viewer, "frame", "frame")
     watch.over(viewer, "draw_overlay", "widgets")
     watch.over(viewer.shown, "draw", "presenting")
+    viewer.renderer.update = lambda scene: None
+    viewer.renderer.draw = lambda views, target: present_alone(viewer, target)
     for way in ways.values():
         for name in ("keep_picture", "lay_over", "swap"):
             watch.over(way, name, "presenting")

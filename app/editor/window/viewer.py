@@ -317,7 +317,8 @@ class Viewer:
         force = self.options.screenshot is not None or self.frames < WARM_UP
         screen, presented = self.window.screen(), self.window.presented
         fresh = self.shown.draw(request, screen, force, presented.show_picture_again)
-        presented.keep_picture()
+        if not fresh:
+            presented.keep_picture()
         for draw in self.hooks.over:
             draw(request)
         if fresh:

@@ -18,6 +18,7 @@ class Layered:
         self._corners = gpu.ctx.buffer(reserve=4096, dynamic=True)
         self._boxes = gpu.ctx.vertex_array(self._program, [(self._corners, "2f4", "corner")])
         self._picture, self._whole = WindowBytes(gpu), WindowBytes(gpu)
+        self._holds = False  # the whole is the picture with the layer over it
 
     @property
     def works(self) -> bool:
@@ -27,6 +28,7 @@ class Layered:
     def keep(self, window: moderngl.Framebuffer) -> None:
         """The window has a picture, and nothing over it yet."""
         self._picture.take(window)
+        self._holds = False
 
     def show_picture(self, window: moderngl.Framebuffer) -> bool:
         """Puts the kept picture into the window; False where none of its size is kept."""
@@ -35,41 +37,54 @@ class Layered:
         self._picture.show(window)
         return True
 
-    def lay_over(
-        self, layer: moderngl.Texture, boxes: list[PixelBox], below: moderngl.Framebuffer | None
+    def lay_over_window(
+        self, window: moderngl.Framebuffer, layer: moderngl.Texture, boxes: list[PixelBox]
     ) -> None:
-        """Puts the layer, premultiplied, row 0 at the bottom, over the picture in these boxes, of
-        which no two share a pixel.
-
-        below: the window, where it holds another picture than before; None: what lies below is the
-        kept one, and outside of the boxes all is as it was.
+        """Puts the layer, premultiplied, row 0 at the bottom, over what the window has, in these
+        boxes, of which no two share a pixel.
         """
-        if below is not None:
-            self._whole.take(below)
+        self._whole.take(window)
+        self._blend(layer, boxes)
+        self._whole.show(window)
+        self._holds = False
+
+    def lay_over_picture(
+        self, window: moderngl.Framebuffer, layer: moderngl.Texture,
+        covered: list[PixelBox], changed: list[PixelBox],
+    ) -> None:  # fmt: skip
+        """The window gets the kept picture and the layer over it, which covers some boxes and has
+        changed in others since the last time; both as in lay_over_window.
+        """
+        whole = self._whole
+        if not self._holds:
+            width, height = self._picture.size
+            whole.lay_out((width, height))
+            whole.take_box(self._picture, (0, 0, width, height))
+            changed, self._holds = covered, True
         else:
-            for box in boxes:
-                self._whole.take_box(self._picture, box)
+            for box in changed:
+                whole.take_box(self._picture, box)
+        self._blend(layer, changed)
+        whole.show(window)
+
+    def _blend(self, layer: moderngl.Texture, boxes: list[PixelBox]) -> None:
+        """Into the whole and not into the window, for which llvmpipe takes three times as long."""
         if not boxes:
             return
-        corners = np.ascontiguousarray(
-            np.array(boxes, np.float32)[:, CORNERS]
-        )  # (B, 6, 2) pixels from the upper left
+        sides = np.array(boxes, np.float32)  # (B, 4)
+        corners = np.ascontiguousarray(sides[:, CORNERS])  # (B, 6, 2) pixels from the upper left
         if corners.nbytes > self._corners.size:
             self._corners.orphan(corners.nbytes)
         self._corners.write(corners)
         ctx, program = self._gpu.ctx, self._program
         layer.filter = (moderngl.NEAREST, moderngl.NEAREST)
         layer.use(0)
-        program["layer"].value, program["size"].value = 0, self._whole.size
+        program["layer"].value, program["size"].value = 0, layer.size
         with self._gpu.drawing_into(self._whole.framebuffer):
             ctx.enable_only(moderngl.BLEND)
             ctx.blend_equation = moderngl.FUNC_ADD
             ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
             self._boxes.render(moderngl.TRIANGLES, vertices=6 * len(boxes))
-
-    def show(self, window: moderngl.Framebuffer) -> None:
-        """Puts the picture with what lies over it into the window."""
-        self._whole.show(window)
 
     def release(self) -> None:
         for part in (self._boxes, self._corners, self._picture, self._whole):

@@ -35,8 +35,8 @@ class KeptOverlay(ModernGLRenderer):
         super().__init__(wnd=None, ctx=ctx, display_size=logical_size)
         self._gpu = Gpu(ctx)
         self._layer, self._layered = WindowBytes(self._gpu), Layered(self._gpu)
-        self._covered: list[PixelBox] = []
-        self._other_picture = True  # than what lies under the layer in what is shown
+        self._tiles: np.ndarray | None = None  # that the overlay covers
+        self._covered: list[PixelBox] = []  # these, as few boxes
 
     @property
     def works(self) -> bool:
@@ -57,23 +57,18 @@ class KeptOverlay(ModernGLRenderer):
         return self._layered.show_picture(window)
 
     def lay_over(
-        self, data: imgui.ImDrawData, window: moderngl.Framebuffer, other_picture: bool
+        self, data: imgui.ImDrawData, window: moderngl.Framebuffer, picture_kept: bool
     ) -> bool:
-        """The window gets what is kept of it with the overlay of now; True where that is another
-        picture than the last one.
+        """The overlay of now over what the window has; True where it differs from the last one.
 
-        other_picture: the window holds another one than it did the last time, or more of it.
+        picture_kept: that is the kept picture and nothing else.
         """
-        size = window.viewport[2:]
-        boxes = self._update_layer(data, size)
-        if other_picture or self._other_picture:
-            self._layered.lay_over(self._texture, self._covered, window)
-        elif boxes:
-            self._layered.lay_over(self._texture, boxes, None)
-        changed = bool(other_picture or self._other_picture or boxes)
-        self._other_picture = False
-        self._layered.show(window)
-        return changed
+        boxes = self._update_layer(data, window.viewport[2:])
+        if picture_kept:
+            self._layered.lay_over_picture(window, self._texture, self._covered, boxes)
+        else:
+            self._layered.lay_over_window(window, self._texture, self._covered)
+        return len(boxes) > 0
 
     @property
     def _texture(self) -> moderngl.Texture:
@@ -84,7 +79,7 @@ class KeptOverlay(ModernGLRenderer):
         """Boxes of the layer that were drawn anew."""
         if self._layer.size != size:
             self._layer.lay_out(size)
-            self._anew = self._other_picture = True
+            self._anew = True
         lists = read_lists(data, self._lists)
         if self._anew:
             boxes = [(0, 0, *size)]
@@ -92,8 +87,9 @@ class KeptOverlay(ModernGLRenderer):
             boxes = boxes_of(tiles_of(changed_boxes(self._lists, lists), size), size)
         if boxes:
             self._draw(lists, boxes)
-            covered = [each.tiles(size) for each in lists]
-            self._covered = boxes_of(np.logical_or.reduce(covered), size) if covered else []
+            tiles = np.logical_or.reduce([each.tiles(size) for each in lists])
+            if not np.array_equal(tiles, self._tiles):
+                self._tiles, self._covered = tiles, boxes_of(tiles, size) if lists else []
         self._lists, self._anew = lists, False
         return boxes
 

@@ -28,9 +28,9 @@ class Presented:
             self._kept.shutdown()
             self._kept = None
         self.renderer = self._kept or ModernGLRenderer(wnd=None, ctx=ctx, display_size=logical_size)
-        self._drawn_into = True  # the window, since its picture was kept or shown again
-        self._was_drawn_into = True  # so it was under the last overlay
-        self._new_picture = True  # was kept since the last overlay
+        self._other = True  # the window has not just the picture that is kept
+        self._kept_now, self._kept_before = False, False  # in this frame, in the last one
+        self._other_before = True
         self.due = True  # the window has something that is not on the screen yet
 
     @property
@@ -40,7 +40,7 @@ class Presented:
 
     def screen(self) -> moderngl.Framebuffer:
         """The window's framebuffer with the viewport on all of it, to draw into."""
-        self._drawn_into = True
+        self._other = True
         return self._whole_screen()
 
     def _whole_screen(self) -> moderngl.Framebuffer:
@@ -48,20 +48,21 @@ class Presented:
         return self._ctx.screen
 
     def keep_picture(self) -> None:
-        """The window has the picture, and nothing over it."""
-        if self._kept is not None and self._drawn_into:
+        """The window has the picture and nothing over it; worth it where the next frame is likely
+        to show it again.
+        """
+        if self._kept is not None and self._other:
             self._kept.keep_picture(self._whole_screen())
-            self._drawn_into, self._new_picture = False, True
+            self._other, self._kept_now, self.due = False, True, True
 
     def show_picture_again(self) -> bool:
-        """Puts the picture that was kept into the window; False where none is, or of another size.
-
-        Whoever draws over it takes screen().
+        """Puts the picture of the last frame into the window; False where it was not kept, or had
+        another size.  Whoever draws over it takes screen().
         """
-        if self._kept is None:
+        if self._kept is None or not self._kept_before:
             return False
         shown = self._kept.show_picture(self._whole_screen())
-        self._drawn_into = not shown
+        self._other, self._kept_now = not shown, shown
         return shown
 
     def lay_over(self, data: imgui.ImDrawData) -> None:
@@ -72,9 +73,9 @@ class Presented:
             self.renderer.render(data)
             self.due = True
             return
-        other = self._new_picture or self._drawn_into or self._was_drawn_into
-        self.due |= self._kept.lay_over(data, screen, other)
-        self._was_drawn_into, self._new_picture = self._drawn_into, False
+        changed = self._kept.lay_over(data, screen, not self._other)
+        self.due |= changed or self._other or self._other_before
+        self._other_before, self._kept_before, self._kept_now = self._other, self._kept_now, False
 
     def swap(self, handle) -> None:
         """Brings to the screen what is new, by GLFW's handle of the window."""

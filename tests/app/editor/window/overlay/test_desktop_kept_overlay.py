@@ -98,7 +98,7 @@ def test_drawn_in_parts_it_is_the_same_to_the_bit(viewer, kept, monkeypatch):
         run_frames(viewer, 1)
         parts = window.picture().copy()
         partly, wholes = partly + (len(drawn) > 0), wholes + (whole in drawn)
-        kept._anew = kept._other_picture = True
+        kept._anew = True
         viewer.renderer.present(window.screen())
         window.presented.keep_picture()
         window.presented.lay_over(imgui.get_draw_data())
