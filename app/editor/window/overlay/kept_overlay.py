@@ -88,7 +88,7 @@ class KeptOverlay(ModernGLRenderer):
         if boxes:
             self._draw(lists, boxes)
             tiles = np.logical_or.reduce([each.tiles(size) for each in lists])
-            if not np.array_equal(tiles, self._tiles):
+            if self._tiles is None or not np.array_equal(tiles, self._tiles):
                 self._tiles, self._covered = tiles, boxes_of(tiles, size) if lists else []
         self._lists, self._anew = lists, False
         return boxes
