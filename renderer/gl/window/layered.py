@@ -27,7 +27,7 @@ class Layered:
 
     def keep(self, window: moderngl.Framebuffer) -> None:
         """The window has a picture, and nothing over it yet."""
-        self._picture.take(window)
+        self._picture.copy_window(window)
         self._holds = False
 
     def show_picture(self, window: moderngl.Framebuffer) -> bool:
@@ -43,7 +43,7 @@ class Layered:
         """Puts the layer, premultiplied, row 0 at the bottom, over what the window has, in these
         boxes, of which no two share a pixel.
         """
-        self._whole.take(window)
+        self._whole.copy_window(window)
         self._blend(layer, boxes)
         self._whole.show(window)
         self._holds = False
@@ -59,11 +59,11 @@ class Layered:
         if not self._holds:
             width, height = self._picture.size
             whole.lay_out((width, height))
-            whole.take_box(self._picture, (0, 0, width, height))
+            whole.copy_box(self._picture, (0, 0, width, height))
             changed, self._holds = covered, True
         else:
             for box in changed:
-                whole.take_box(self._picture, box)
+                whole.copy_box(self._picture, box)
         self._blend(layer, changed)
         whole.show(window)
 

@@ -71,7 +71,7 @@ class WindowBytes:
         shown = (left, below + height, left + width, below)  # upside down
         self._blit(self.framebuffer, (0, 0, width, height), shown)
 
-    def take(self, framebuffer: moderngl.Framebuffer) -> None:
+    def copy_window(self, framebuffer: moderngl.Framebuffer) -> None:
         """Keeps what is in the viewport of a window's framebuffer."""
         left, below, width, height = framebuffer.viewport
         self.lay_out((width, height))
@@ -79,7 +79,7 @@ class WindowBytes:
             taken = (left, below + height, left + width, below)
             self._blit(framebuffer, taken, (0, 0, width, height))
 
-    def take_box(self, other: "WindowBytes", box: PixelBox) -> None:
+    def copy_box(self, other: "WindowBytes", box: PixelBox) -> None:
         """Copies a part of another one of this size to the same place."""
         with self._gpu.drawing_into(self.framebuffer):
             self._blit(other.framebuffer, box, box)
