@@ -69,7 +69,7 @@ def way_of_a_gpu(kept: Presented) -> Presented:
     """The same window, its overlay drawn in every frame."""
     plain, other = object.__new__(ModernGLRenderer), copy(kept)
     plain.__dict__.update(kept.renderer.__dict__)  # its program, buffers, and textures
-    other._kept, other.renderer = None, plain
+    other.kept, other.renderer = None, plain
     return other
 
 

@@ -296,8 +296,8 @@ class Window:
         glfw.set_scroll_callback(handle, self.on_scroll)
         # The annotations of glfw say (window, int, str); what comes is (window, list of paths).
         glfw.set_drop_callback(handle, self.on_drop)  # type: ignore[arg-type]
-        glfw.set_window_refresh_callback(handle, lambda _: self._expose())
-        glfw.set_framebuffer_size_callback(handle, lambda *_: self._expose())
+        glfw.set_window_refresh_callback(handle, lambda _: self.expose())
+        glfw.set_framebuffer_size_callback(handle, lambda *_: self.expose())
         glfw.set_window_content_scale_callback(handle, self._on_content_scale)
 
     def _note(self, event: Event | None = None) -> None:
@@ -305,7 +305,7 @@ class Window:
         if event is not None:
             self._raw.append(event)
 
-    def _expose(self) -> None:
+    def expose(self) -> None:
         """The screen has lost what the window showed."""
         self.presented.due = True
         self._note()

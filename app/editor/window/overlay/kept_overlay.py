@@ -43,6 +43,10 @@ class KeptOverlay(ModernGLRenderer):
         """Whether this context has what it needs."""
         return self._layered.works
 
+    def forget(self) -> None:
+        """Nothing of the layer holds: it is drawn whole next time."""
+        self._anew = True
+
     def register_texture(self, texture: moderngl.Texture) -> None:
         """A number of a texture that is gone may come back as another picture."""
         self._anew = True
@@ -86,14 +90,14 @@ class KeptOverlay(ModernGLRenderer):
         else:
             boxes = boxes_of(tiles_of(changed_boxes(self._lists, lists), size), size)
         if boxes:
-            self._draw(lists, boxes)
+            self.draw_boxes(lists, boxes)
             tiles = np.logical_or.reduce([each.tiles(size) for each in lists])
             if self._tiles is None or not np.array_equal(tiles, self._tiles):
                 self._tiles, self._covered = tiles, boxes_of(tiles, size) if lists else []
         self._lists, self._anew = lists, False
         return boxes
 
-    def _draw(self, lists: tuple[DrawList, ...], boxes: list[PixelBox]) -> None:
+    def draw_boxes(self, lists: tuple[DrawList, ...], boxes: list[PixelBox]) -> None:
         """What of the triangles lies in these boxes, on nothing."""
         layer, ctx = self._layer.framebuffer, self.ctx
         width, height = layer.size

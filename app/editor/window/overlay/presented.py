@@ -23,11 +23,11 @@ class Presented:
     ) -> None:  # fmt: skip
         """`size` tells that of the window's framebuffer, pixels."""
         self._ctx, self._size = ctx, size
-        self._kept = KeptOverlay(ctx, logical_size) if is_software(ctx) else None
-        if self._kept is not None and not self._kept.works:
-            self._kept.shutdown()
-            self._kept = None
-        self.renderer = self._kept or ModernGLRenderer(wnd=None, ctx=ctx, display_size=logical_size)
+        self.kept = KeptOverlay(ctx, logical_size) if is_software(ctx) else None
+        if self.kept is not None and not self.kept.works:
+            self.kept.shutdown()
+            self.kept = None
+        self.renderer = self.kept or ModernGLRenderer(wnd=None, ctx=ctx, display_size=logical_size)
         self._other = True  # the window has not just the picture that is kept
         self._kept_now, self._kept_before = False, False  # in this frame, in the last one
         self._other_before = True
@@ -36,7 +36,7 @@ class Presented:
     @property
     def keeps(self) -> bool:
         """Whether pictures are kept: a frame in which nothing changed shows the last one again."""
-        return self._kept is not None
+        return self.kept is not None
 
     def screen(self) -> moderngl.Framebuffer:
         """The window's framebuffer with the viewport on all of it, to draw into."""
@@ -51,29 +51,29 @@ class Presented:
         """The window has the picture and nothing over it; worth it where the next frame is likely
         to show it again.
         """
-        if self._kept is not None and self._other:
-            self._kept.keep_picture(self._whole_screen())
+        if self.kept is not None and self._other:
+            self.kept.keep_picture(self._whole_screen())
             self._other, self._kept_now, self.due = False, True, True
 
     def show_picture_again(self) -> bool:
         """Puts the picture of the last frame into the window; False where it was not kept, or had
         another size.  Whoever draws over it takes screen().
         """
-        if self._kept is None or not self._kept_before:
+        if self.kept is None or not self._kept_before:
             return False
-        shown = self._kept.show_picture(self._whole_screen())
+        shown = self.kept.show_picture(self._whole_screen())
         self._other, self._kept_now = not shown, shown
         return shown
 
     def lay_over(self, data: imgui.ImDrawData) -> None:
         """The overlay over what the window has."""
         screen = self._whole_screen()
-        if self._kept is None:
+        if self.kept is None:
             screen.use()
             self.renderer.render(data)
             self.due = True
             return
-        changed = self._kept.lay_over(data, screen, not self._other)
+        changed = self.kept.lay_over(data, screen, not self._other)
         self.due |= changed or self._other or self._other_before
         self._other_before, self._kept_before, self._kept_now = self._other, self._kept_now, False
 

@@ -17,7 +17,7 @@ def kept(viewer):
     presented = viewer.window.presented
     if not presented.keeps:
         pytest.skip("GL runs on a GPU here, which keeps no picture")
-    return presented._kept
+    return presented.kept
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def overlay_drawn_at_once(viewer) -> np.ndarray:
     window = viewer.window
     screen = window.screen()
     viewer.renderer.present(screen)
-    kept, plain = window.presented._kept, object.__new__(ModernGLRenderer)
+    kept, plain = window.presented.kept, object.__new__(ModernGLRenderer)
     plain.__dict__.update(kept.__dict__)  # its program, buffers, and textures
     screen.use()
     plain.render(imgui.get_draw_data())
@@ -77,9 +77,9 @@ def test_drawn_in_parts_it_is_the_same_to_the_bit(viewer, kept, monkeypatch):
     stripes(viewer, monkeypatch)
     window, rng = viewer.window, np.random.default_rng(3)
     handle, drawn, partly, wholes = window.handle, [], 0, 0
-    draw = kept._draw
+    draw = kept.draw_boxes
     monkeypatch.setattr(
-        kept, "_draw", lambda lists, boxes: (drawn.append(boxes), draw(lists, boxes))
+        kept, "draw_boxes", lambda lists, boxes: (drawn.append(boxes), draw(lists, boxes))
     )
     whole = [(0, 0, *window.size)]
     for step in range(30):
@@ -98,7 +98,7 @@ def test_drawn_in_parts_it_is_the_same_to_the_bit(viewer, kept, monkeypatch):
         run_frames(viewer, 1)
         parts = window.picture().copy()
         partly, wholes = partly + (len(drawn) > 0), wholes + (whole in drawn)
-        kept._anew = True
+        kept.forget()
         viewer.renderer.present(window.screen())
         window.presented.keep_picture()
         window.presented.lay_over(imgui.get_draw_data())
@@ -116,7 +116,7 @@ def test_what_stays_as_it_is_does_not_come_to_the_screen_again(viewer, kept, swa
     run_frames(viewer, 3)
     assert not swaps and viewer.renderer.presents == before
     np.testing.assert_array_equal(viewer.window.picture(), picture)
-    viewer.window._expose()
+    viewer.window.expose()
     run_frames(viewer, 1)
     assert len(swaps) == 1, "another window was over it"
     viewer.state.say("something new")
