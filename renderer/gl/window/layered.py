@@ -14,7 +14,7 @@ class Layered:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._program = gpu.program("layer.vert", "layer.frag")
+        self._program = gpu.program("window/layer.vert", "window/layer.frag")
         self._corners = gpu.ctx.buffer(reserve=4096, dynamic=True)
         self._boxes = gpu.ctx.vertex_array(self._program, [(self._corners, "2f4", "corner")])
         self._picture, self._whole = WindowBytes(gpu), WindowBytes(gpu)
