@@ -1,8 +1,8 @@
 """What a frame of the window costs beside its splats, on software GL: CPU milliseconds.
 
-    xvfb-run -a -s "-screen 0 1920x1080x24" python3 tools/app/presenting.py > docs/bench/presenting.csv
+    python3 tools/app/presenting.py > docs/bench/presenting.csv
 
-The bundled demo with its panel; "kept" is the window's way on software GL, "each time" is the way
+Where there is no screen, after `xvfb-run -a -s "-screen 0 1920x1080x24"`.  The bundled demo with its panel; "kept" is the window's way on software GL, "each time" is the way
 of a GPU, the overlay drawn over the picture in every frame; eight frames each in turns, all in one
 run, medians.
 nothing: a frame that somebody asked for and in which nothing changes; button: the mouse goes to
@@ -10,7 +10,7 @@ another button; picture: other pixels under the same overlay, their splats not c
 presenting: the picture to the window, the overlay's drawing, and the swap; widgets: the panel's own
 code; frame: the whole function that the loop calls.  apart: the largest difference of a pixel
 between the two ways, of 255.
-"""  # noqa: E501  the command is one line
+"""
 
 import sys
 import time
