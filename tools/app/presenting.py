@@ -2,7 +2,9 @@
 
     python3 tools/app/presenting.py > docs/bench/presenting.csv
 
-Where there is no screen, after `xvfb-run -a -s "-screen 0 1920x1080x24"`.  The bundled demo with its panel; "kept" is the window's way on software GL, "each time" is the way
+Where there is no screen, after `xvfb-run -a -s "-screen 0 1920x1080x24"`.
+
+The bundled demo with its panel; "kept" is the window's way on software GL, "each time" is the way
 of a GPU, the overlay drawn over the picture in every frame; eight frames each in turns, all in one
 run, medians.
 nothing: a frame that somebody asked for and in which nothing changes; button: the mouse goes to
