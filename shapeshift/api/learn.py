@@ -91,7 +91,6 @@ def train(
     from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
     from shapeshift.training.calibration.extrinsics import rig_json
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
-    from shapeshift.training.settings import suited
 
     path = None if out is None else plain(str(out))
     if path is not None:
@@ -104,9 +103,7 @@ def train(
     settings |= {"iterations": iterations, "seconds": seconds}
     wished = settings_of(settings, before[1]["settings"] if before else None)
     found, on = read_capture(plain(str(capture))), open_device(device)
-    if before is None:
-        given = [name for name, value in settings.items() if value is not None]
-        wished = suited(wished, given, len(found.stops))
+    wished = wished if before else suited_to(found, wished, settings)
     if calibrate is not None:
         if resume:
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
@@ -115,6 +112,16 @@ def train(
     trainer = trainer_of(on, found, wished, before, room)
     run(trainer, path, progress)
     return finished(trainer, path, pace)
+
+
+def suited_to(
+    capture: "Capture", wished: "TrainSettings", asked: dict[str, Any]
+) -> "TrainSettings":
+    """New settings as they suit a capture; None stands for what was not asked."""
+    from shapeshift.training.settings import suited
+
+    given = [name for name, value in asked.items() if value is not None]
+    return suited(wished, given, len(capture.stops))
 
 
 def trainer_of(
