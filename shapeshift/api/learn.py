@@ -16,6 +16,7 @@ from shapeshift.app.paths import plain
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
+    from shapeshift.app.training.blocks.outcome import TrainOutcome
     from shapeshift.decomposition.poses.pose_report import PoseReport
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.photo_store.open_photos import PhotoRoom
@@ -23,10 +24,7 @@ if TYPE_CHECKING:
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
 
-BLOCKS = (
-    "blocks are trained by the command, `launch.py train CAPTURE --out NAME.blocks --blocks "
-    "{blocks}`; ss.load opens what it writes."
-)
+OF_BLOCKS = "{name} is of blocks; give blocks, or leave it out."
 NO_OUT = "resume goes on from the checkpoint beside out; give out, too."
 SAVE_EVERY_S = 60.0  # between checkpoints
 Kind = Literal["cpu", "gpu"]
@@ -41,15 +39,15 @@ class TrainedScene(Scene):
     model.psnr_db  # {"RGB": 31.2, "Thermal": 33.0}
     """
 
-    def __init__(self, model: AnchorModel, path: Path | None, trainer: "Trainer") -> None:
+    def __init__(self, model: AnchorModel, path: Path | None, outcome: "TrainOutcome") -> None:
         super().__init__(Document.of(model), path)
-        self.steps: int = trainer.iteration
-        self.seconds: float = trainer.seconds  # with ...
-        self.start_seconds: float = trainer.start_s  # ... what went by before the first step
-        self.anchors: int = trainer.anchors_count
+        self.steps: int = outcome.steps
+        self.seconds: float = outcome.seconds  # with ...
+        self.start_seconds: float = outcome.start_seconds  # ... what passed before the first step
+        self.anchors: int = outcome.anchors
         # held-out photos: decibels of each modality, {} where none is held out
-        self.psnr_db: dict[str, float] = trainer.held_out_psnr(most=len(trainer.held_out))
-        self.warnings: tuple[str, ...] = tuple(trainer.warnings)  # about the capture, in sentences
+        self.psnr_db: dict[str, float] = outcome.psnr_db
+        self.warnings: tuple[str, ...] = outcome.warnings  # about the capture, in sentences
 
 
 def train(
@@ -63,7 +61,13 @@ def train(
     calibrate: str | None = None,
     pace: bool = True,
     photo_mb: float | None = None,
-    progress: "Callable[[Progress], object] | None" = None,
+    blocks: int | str = 1,
+    coarse_iterations: int | None = None,
+    block_photos: int | None = None,
+    cluster: str = "none",
+    certificates: PathText | None = None,
+    gpus: int = 0,
+    progress: "Callable[[Any], object] | None" = None,
     **settings: Any,
 ) -> TrainedScene:
     """Trains a shape-shifting scene of posed photos of one or several modalities (docs/capture.md).
@@ -79,11 +83,32 @@ def train(
     anchors); False from it ends the run with what there is.  settings: any field of
     `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
 
+    blocks: as --blocks of the command (docs/training.md, "Blocks"): a number, "auto" or a grid such
+    as "4x2"; out is a folder NAME.blocks, to the command's bytes, and after any end the same call
+    goes on.  coarse_iterations: of the run of the whole, each block has `iterations`; block_photos,
+    cluster, certificates, gpus: as the command's.  progress is called with sentences then (from
+    another thread where there is a cluster), settings are those of the command, and what the result
+    says is of all runs together.
+
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
         model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
+    of_blocks = {
+        "coarse_iterations": coarse_iterations, "block_photos": block_photos,
+        "certificates": None if certificates is None else plain(str(certificates)),
+        "cluster": None if cluster == "none" else cluster, "gpus": gpus or None,
+    }  # fmt: skip
+    given = {name: value for name, value in of_blocks.items() if value is not None}
+    if str(blocks).strip() != "1":
+        more = {"photo_mb": photo_mb, "device": device, "calibrate": calibrate}
+        budget = {"iterations": iterations, "seconds": seconds}
+        return train_in_blocks(
+            capture, out, str(blocks), settings | budget, given | more, pace, progress
+        )
+    for name in given:
+        raise UsageError(OF_BLOCKS.format(name=name))
     from shapeshift.app.training.saving import check_writable, room_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
@@ -113,6 +138,33 @@ def train(
     return finished(trainer, path, pace)
 
 
+def train_in_blocks(
+    capture: PathText, out: PathText | None, blocks: str, asked: dict[str, Any],
+    more: dict[str, Any], pace: bool, tell: "Callable[[Any], object] | None",
+) -> TrainedScene:  # fmt: skip
+    """As train --blocks.  asked: settings; more: other options of the command."""
+    from shapeshift.app.cluster.board import told
+    from shapeshift.app.training.blocks.outcome import outcome_of
+    from shapeshift.app.training.blocks.train_in_blocks import train_blocks
+    from shapeshift.app.training.train_options import EXPERTS, USUAL, Options
+
+    if out is None:
+        raise UsageError("blocks wants out, a folder NAME.blocks.")
+    asked = {name: value for name, value in asked.items() if value is not None}
+    settings_of(asked, None)  # refused now, not after the run of the whole
+    for name in asked:
+        if name not in (*USUAL, *EXPERTS):
+            raise UsageError(f"{name}: blocks are trained by commands, which have no such option.")
+    options = Options(plain(str(capture)), plain(str(out)), asked, blocks=blocks, **more)
+
+    def hear(*lines: str) -> None:
+        for line in lines if tell is not None else ():
+            tell(line)
+
+    found, model = train_blocks(options, hear, told(hear), "", pace)
+    return TrainedScene(model, options.out, outcome_of(options, found, model))
+
+
 def trainer_of(
     device, capture: "Capture", wished: "TrainSettings", before: tuple | None, room: "PhotoRoom"
 ) -> "Trainer":
@@ -138,8 +190,6 @@ def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
     known = [field.name for field in fields(TrainSettings)]
     for name in asked:
         if name not in known:
-            if name == "blocks":
-                raise UsageError(BLOCKS.format(blocks=asked[name]))
             if now := left_setting(name):
                 raise UsageError(f"{name} left the program: {now}.")
             meant = nearest(name, known)
@@ -180,6 +230,7 @@ def run(
 
 def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
     """The scene of a run that has ended, written where it was asked for."""
+    from shapeshift.app.training.blocks.outcome import TrainOutcome
     from shapeshift.app.training.saving import save
     from shapeshift.renderer.pace import measure_pace
     from shapeshift.runtime_models.package.write_package import write_package
@@ -193,7 +244,12 @@ def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
         model = replace(model, pace=measure_pace(model))
         if path is not None:
             write_package(model, path)
-    scene = TrainedScene(model, path, trainer)
+    psnr_db = trainer.held_out_psnr(most=len(trainer.held_out))
+    outcome = TrainOutcome(
+        trainer.iteration, trainer.seconds, trainer.start_s, trainer.anchors_count,
+        tuple(trainer.warnings), psnr_db,
+    )  # fmt: skip
+    scene = TrainedScene(model, path, outcome)
     trainer.photos.close()
     return scene
 

@@ -19,16 +19,16 @@ held-out photos, train_db of up to 8 of the photos that were learned from.  Ways
 """
 
 import argparse
-import csv
-import shlex
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+
+from sweep import add_sweep, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402
@@ -111,31 +111,27 @@ def fit_of(trainer: Trainer, photos: list[LoadedPhoto]) -> tuple[float, float]:
     return float(psnr_db), float(mean)
 
 
-def runs(options: argparse.Namespace, device) -> Iterator[dict]:
-    for folder, modality in zip(options.captures[::2], options.captures[1::2], strict=True):
-        whole = one_modality(read_capture(Path(folder)), modality)
-        for photos in options.photos:
-            part = part_of(whole, photos)
-            for seed in options.seeds:
-                settings = TrainSettings(
-                    iterations=options.iterations, max_anchors=options.max_anchors, seed=seed,
-                    downscale=options.downscale or choose_downscale(whole.photos),
-                )  # fmt: skip
-                for way in options.ways:
-                    kind = type("", (ThinnedTrainer,), {"left_out": WAYS[way].get("left_out", 0)})
-                    kind = kind if "left_out" in WAYS[way] else Trainer
-                    trainer = kind(device, part, changed(settings, WAYS[way]))
-                    for _ in trainer.steps():
-                        pass
-                    psnr_db, likeness = fit_of(trainer, trainer.held_out)
-                    train_db, _ = fit_of(trainer, trainer.schedule.photos[modality][:LOOKED_AT])
-                    yield {
-                        "capture": Path(folder).name, "modality": modality, "photos": photos,
-                        "way": way, "seed": seed, "psnr_db": f"{psnr_db:.2f}",
-                        "ssim": f"{likeness:.4f}", "train_db": f"{train_db:.2f}",
-                        "steps": trainer.iteration, "anchors": trainer.anchors_count,
-                        "seconds": f"{trainer.elapsed:.1f}",
-                    }  # fmt: skip
+def measured(
+    folder: Path, options: argparse.Namespace, modality: str, photos: int, seed: int, way: str
+) -> list[dict]:
+    whole = one_modality(read_capture(folder), modality)
+    settings = TrainSettings(
+        iterations=options.iterations, max_anchors=options.max_anchors, seed=seed,
+        downscale=options.downscale or choose_downscale(whole.photos),
+    )  # fmt: skip
+    kind = type("", (ThinnedTrainer,), {"left_out": WAYS[way].get("left_out", 0)})
+    kind = kind if "left_out" in WAYS[way] else Trainer
+    trainer = kind(open_device(), part_of(whole, photos), changed(settings, WAYS[way]))
+    for _ in trainer.steps():
+        pass
+    psnr_db, likeness = fit_of(trainer, trainer.held_out)
+    train_db, _ = fit_of(trainer, trainer.schedule.photos[modality][:LOOKED_AT])
+    return [{
+        "capture": folder.name, "modality": modality, "photos": photos, "way": way, "seed": seed,
+        "psnr_db": f"{psnr_db:.2f}", "ssim": f"{likeness:.4f}", "train_db": f"{train_db:.2f}",
+        "steps": trainer.iteration, "anchors": trainer.anchors_count,
+        "seconds": f"{trainer.elapsed:.1f}",
+    }]  # fmt: skip
 
 
 def main() -> None:
@@ -148,16 +144,18 @@ def main() -> None:
     parser.add_argument("--downscale", type=int)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
-    options, device = parser.parse_args(), open_device()
-    words = [Path(w).name if Path(w).is_dir() else w for w in sys.argv[1:]]
-    with options.out.open("w", newline="") as file:
-        file.write(f"# python3 tools/training/sparse.py {shlex.join(words)}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        rows.writeheader()
-        for row in runs(options, device):
-            rows.writerow(row)
-            file.flush()
+    add_sweep(parser)
+    options = parser.parse_args()
+    pairs = list(zip(options.captures[::2], options.captures[1::2], strict=True))
+    runs = {}
+    for word, modality in pairs:
+        folder = Path(word).absolute()
+        for photos in options.photos:
+            for seed in options.seeds:
+                for way in options.ways:
+                    name = f"{folder.name} {modality} {photos} {seed} {way}"
+                    runs[name] = partial(measured, folder, options, modality, photos, seed, way)
+    sweep(options, COLUMNS, runs, {word: Path(word).absolute() for word, _ in pairs})
 
 
 if __name__ == "__main__":

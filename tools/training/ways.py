@@ -1,18 +1,16 @@
 """What tables of ways to train share: options, captures by name, and runs of which ways take turns.
 
-Imported by growth.py, blended_shapes.py and ../colors/light.py, which have put the project's folder
-on the path.
+Imported by growth.py, blended_shapes.py, ../colors/light.py and others, which have put the
+project's folder on the path.
 """
 
 import argparse
-import csv
-import shlex
-import sys
-import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+
+from sweep import Rows, add_sweep, captures_of, sweep
 
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.read_capture import read_capture
@@ -43,6 +41,7 @@ def parser_of(doc: str, ways: dict[str, dict]) -> argparse.ArgumentParser:
     parser.add_argument("--ways", nargs="+", choices=list(ways), default=list(ways))
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--size", type=int, default=200, help="pixels of the photos of balls")
+    add_sweep(parser)
     return parser
 
 
@@ -61,53 +60,34 @@ def settings_of(options: argparse.Namespace) -> TrainSettings:
     )  # fmt: skip
 
 
-def turns(
-    options: argparse.Namespace, settings: TrainSettings, ways: dict[str, dict]
-) -> Iterator[Turn]:
-    """Every capture with every seed with every way; the photos of a capture are read once."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name in options.captures:
-            capture = read_capture(made(name, Path(folder), options.size))
-            factor = options.downscale or choose_downscale(capture.photos)
-            photos = {
-                split: load_photos(capture, split, factor, settings.masks)
-                for split in ("train", "test")
-            }
-            for seed in options.seeds:
-                for way in options.ways:
-                    about = {"capture": Path(name).name, "way": way, "seed": seed}
-                    changed = replace(settings, seed=seed, **ways[way])
-                    yield Turn(about, capture, changed, photos)
+def measure_ways(
+    options: argparse.Namespace, columns: tuple[str, ...], settings: TrainSettings,
+    ways: dict[str, dict], rows_of: Callable[[Turn], Rows],
+) -> None:  # fmt: skip
+    """Rows of every capture with every seed with every way into --out, by who --cluster says."""
+    made = {
+        "balls": partial(make_balls, size=options.size), "workshop": make_workshop,
+        "rig": partial(make_balls, size=options.size, rig=True),
+    }  # fmt: skip
+    places, runs = captures_of(options, made), {}
+    for folder in places.values():
+        for seed in options.seeds:
+            for way in options.ways:
+                about = {"capture": folder.name, "way": way, "seed": seed}
+                changed = replace(settings, seed=seed, **ways[way])
+                runs[" ".join(map(str, about.values()))] = partial(
+                    rows_of_turn, about, folder, options.downscale, changed, rows_of
+                )
+    sweep(options, columns, runs, places)
 
 
-def made(name: str, folder: Path, size: int) -> Path:
-    """The folder of a capture, which is made first where the name is that of one of ours."""
-    if name == "balls":
-        make_balls(folder / name, size)
-    elif name == "rig":
-        make_balls(folder / name, size, rig=True)
-    elif name == "workshop":
-        make_workshop(folder / name)
-    else:
-        return Path(name)
-    return folder / name
-
-
-@contextmanager
-def table(
-    options: argparse.Namespace, columns: tuple[str, ...], device
-) -> Iterator[Callable[[Iterable[dict]], None]]:
-    """Rows into --out, a run at a time, below the command and the machine."""
-    with options.out.open("w", newline="") as file:
-        words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
-        program = Path(sys.argv[0]).resolve().relative_to(Path(__file__).resolve().parents[2])
-        file.write(f"# python3 {program} {shlex.join(words)}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, columns, lineterminator="\n")
-        rows.writeheader()
-
-        def add(found: Iterable[dict]) -> None:
-            rows.writerows(found)
-            file.flush()
-
-        yield add
+def rows_of_turn(
+    about: dict, folder: Path, downscale: int | None, settings: TrainSettings,
+    rows_of: Callable[[Turn], Rows],
+) -> Rows:  # fmt: skip
+    capture = read_capture(folder)
+    factor = downscale or choose_downscale(capture.photos)
+    photos = {
+        split: load_photos(capture, split, factor, settings.masks) for split in ("train", "test")
+    }
+    return rows_of(Turn(about, capture, settings, photos))
