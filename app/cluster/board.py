@@ -41,14 +41,14 @@ class Board:
 Shown = Callable[[int, int], AbstractContextManager[Board]]  # of so many tasks, some done already
 
 
-def told(tell: Callable[[str], object]) -> Shown:
+def board_of_words(hear: Callable[[str], None]) -> Shown:
     """Instead of a bar: words for a function, as they come."""
 
     def show(description: str, advance: int = 0) -> None:
         if description:
-            tell(description)
+            hear(description)
 
-    return lambda count, done: nullcontext(Board(show, tell))
+    return lambda count, done: nullcontext(Board(show, hear))
 
 
 @contextmanager

@@ -140,10 +140,10 @@ def train(
 
 def train_in_blocks(
     capture: PathText, out: PathText | None, blocks: str, asked: dict[str, Any],
-    more: dict[str, Any], pace: bool, tell: "Callable[[Any], object] | None",
+    more: dict[str, Any], pace: bool, progress: "Callable[[Any], object] | None",
 ) -> TrainedScene:  # fmt: skip
     """As train --blocks.  asked: settings; more: other options of the command."""
-    from shapeshift.app.cluster.board import told
+    from shapeshift.app.cluster.board import board_of_words
     from shapeshift.app.training.blocks.outcome import outcome_of
     from shapeshift.app.training.blocks.train_in_blocks import train_blocks
     from shapeshift.app.training.train_options import EXPERTS, USUAL, Options
@@ -158,10 +158,11 @@ def train_in_blocks(
     options = Options(plain(str(capture)), plain(str(out)), asked, blocks=blocks, **more)
 
     def hear(*lines: str) -> None:
-        for line in lines if tell is not None else ():
-            tell(line)
+        for line in lines:
+            if progress is not None:
+                progress(line)
 
-    found, model = train_blocks(options, hear, told(hear), "", pace)
+    found, model = train_blocks(options, hear, board_of_words(hear), "", pace)
     return TrainedScene(model, options.out, outcome_of(options, found, model))
 
 

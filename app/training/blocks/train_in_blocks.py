@@ -35,12 +35,12 @@ def run_blocks(options: Options) -> int:
 
 
 def train_blocks(
-    options: Options, tell: Callable[..., object], shown: "Shown | None" = None, said: str = "--",
+    options: Options, hear: Callable[..., object], shown: "Shown | None" = None, said: str = "--",
     pace: bool = True,
 ) -> "tuple[CutList, AnchorModel]":  # fmt: skip
     """The cut and the scene, which is written.  Raises UsageError, BadFile.
 
-    tell: hears what a person should know; shown: instead of a bar; said: what stands before the
+    hear: told what a person should know; shown: instead of a bar; said: what stands before the
     name of an option where it is typed; pace: measure how evenly the slider moves.
     """
     from shapeshift.app.cluster.open_cluster import open_cluster
@@ -62,7 +62,7 @@ def train_blocks(
         cluster.run([coarse_task(options, work)])
         cluster.run([cut_task(options, work)])
         found = read_cut(work / CUT)
-        tell(*describe_cut(found))
+        hear(*describe_cut(found))
         cluster.run([block_task(options, work, n, row) for n, row in trained(found)])
     return found, join(work, found, options.out, pace)
 
