@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
 
-OF_BLOCKS = "{name} is of blocks; give blocks, or leave it out."
 NO_OUT = "resume goes on from the checkpoint beside out; give out, too."
 SAVE_EVERY_S = 60.0  # between checkpoints
 Kind = Literal["cpu", "gpu"]
@@ -108,7 +107,7 @@ def train(
             capture, out, str(blocks), settings | budget, given | more, pace, progress
         )
     for name in given:
-        raise UsageError(OF_BLOCKS.format(name=name))
+        raise UsageError(f"{name} is of blocks; give blocks, or leave it out.")
     from shapeshift.app.training.saving import check_writable, room_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
