@@ -97,6 +97,8 @@ class TrainSettings:
     Default: none, all five see x."""
     depth_share: float = 0.3
     """Weight of the depth loss where photos have depth photos; 0: those are not used."""
+    normal_share: float = 0.1
+    """Weight of the loss of directions where photos have normal maps; 0: those are not used."""
     min_scale_px: float = 0.0
     """Splats are not made smaller than so many pixels (one sigma) of the photo that sees a place
     finest.  0.45 is for scenes that are looked at from closer than they were photographed;
@@ -122,7 +124,7 @@ class TrainSettings:
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
             "hidden": 1, "max_anchors": 1, "grow_every": 1, "downscale": 1, "depth_share": 0,
-            "max_mb": 1e-6, "blended_shapes": 0, "min_scale_px": 0,
+            "normal_share": 0, "max_mb": 1e-6, "blended_shapes": 0, "min_scale_px": 0,
         }  # fmt: skip
         check_numbers(self, least, ("blended_shapes",))
         self.layout(2)

@@ -188,7 +188,7 @@ class PlainTrainer(Run):
         before, known = self.adam.state(), self.statistics()
         background = self.schedule.background or BLACK
         photos = self.schedule.photos[self.stop.name]
-        for photo in {(p.view.size, p.has_depth): p for p in photos}.values():
+        for photo in {photo.kind: photo for photo in photos}.values():
             self.adam.step(self.photo_gradients(photo, background), 0.0)
             loss, visible = self.empty_loss(photo, background), self.visible()
             self.guard.observe(self.stop.name, loss, visible, 1.0)
@@ -204,7 +204,7 @@ class PlainTrainer(Run):
         return loss.value()
 
     def photo_gradients(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
-        depth = self.targets.depth_term(photo, self.settings.depth_share)
+        depth = self.targets.shape_term(photo, self.settings)
         self.drawing = self.step.draw(photo.view, background, depth is not None)
         target = self.target(photo, background)
         loss = self.targets.loss(photo)
