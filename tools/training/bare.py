@@ -20,7 +20,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from sweep import add_sweep, captures_of, sweep  # noqa: E402
+from ways import add_sweep, captures_of, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import BadFile  # noqa: E402

@@ -18,7 +18,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
-from sweep import add_cluster, write_rows  # noqa: E402
+from ways import add_cluster, write_rows  # noqa: E402
 
 from shapeshift.app.charts.chart_rows import RowsFile  # noqa: E402
 from shapeshift.app.training.table import Options, run  # noqa: E402

@@ -23,8 +23,7 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
-from sweep import captures_of, sweep  # noqa: E402
-from ways import asked, parser_of, settings_of  # noqa: E402
+from ways import asked, captures_of, parser_of, settings_of, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402

@@ -41,7 +41,7 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
-from sweep import add_sweep, sweep  # noqa: E402
+from ways import add_sweep, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402

@@ -24,7 +24,7 @@ from PIL import Image
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from sweep import add_sweep, sweep  # noqa: E402
+from ways import add_sweep, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, Stop  # noqa: E402
