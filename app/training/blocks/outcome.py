@@ -1,11 +1,14 @@
 """What a training in blocks has cost, and how its scene looks: what a run of the whole says."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.training.blocks.train_in_blocks import (
     COARSE,
     describe_cut,
+    train_blocks,
     trained,
     work_folder,
 )
@@ -26,6 +29,24 @@ class TrainOutcome:
     anchors: int
     warnings: tuple[str, ...]
     psnr_db: dict[str, float]  # of held-out photos, by modality; {} where none is held out
+
+
+def train_quietly(
+    options: Options, pace: bool, progress: Callable[[str], object] | None
+) -> tuple["AnchorModel", Path, TrainOutcome]:
+    """The scene, where it is, and how its training went, without a word on the terminal.
+
+    progress: hears what is under way.  Raises UsageError, BadFile, in the words of Python.
+    """
+    from shapeshift.app.cluster.board import board_of_words
+
+    def hear(*lines: str) -> None:
+        for line in lines:
+            if progress is not None:
+                progress(line)
+
+    found, model = train_blocks(options, hear, board_of_words(hear), "", pace)
+    return model, options.out, outcome_of(options, found, model)
 
 
 def outcome_of(options: Options, found: "CutList", model: "AnchorModel") -> TrainOutcome:
