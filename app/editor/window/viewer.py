@@ -315,7 +315,10 @@ class Viewer:
             self.state.measure_now = False
             self.shown.measure(request)
         force = self.options.screenshot is not None or self.frames < WARM_UP
-        fresh = self.shown.draw(request, self.window.screen(), force)
+        screen, presented = self.window.screen(), self.window.presented
+        fresh = self.shown.draw(request, screen, force, presented.show_picture_again)
+        if not fresh:
+            presented.keep_picture()
         for draw in self.hooks.over:
             draw(request)
         if fresh:
