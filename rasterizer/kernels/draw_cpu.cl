@@ -136,7 +136,7 @@ inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
     // are shifted so that a conversion, which cuts towards 0, rounds down and up: 4 + floor(right)
     // and 16 - ceil(left).  What the sums round, rounds to the next block's side.
     const int16 after = convert_int16(LEAST(MOST(right_x, zero - 1.0f), end - 1.0f) + SIDE) >> 2;
-    const int16 first = TILE - convert_int16(end - LEAST(MOST(left_x, zero), end)) >> 2;
+    const int16 first = (TILE - convert_int16(end - LEAST(MOST(left_x, zero), end))) >> 2;
     // Blocks before `after`, less those before `first`.
     const uint16 until = ((uint16)1 << as_uint16(after)) - 1u;
     const uint16 before = ((uint16)1 << as_uint16(first)) - 1u;
