@@ -126,17 +126,19 @@ inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
   const float16 zero = 0, end = TILE;
   for (int row = 0; row < SIDE; row++) {
     const float16 bottom = top + (SIDE - 1);
-    const float16 y_right = LEAST(MOST(y_extreme, top), bottom),
-        y_left = LEAST(MOST(-y_extreme, top), bottom);
+    const float16 y_right = MINIMUM(MAXIMUM(y_extreme, top), bottom),
+        y_left = MINIMUM(MAXIMUM(-y_extreme, top), bottom);
     const float16 right_x =
-        x + slope * y_right + sqrt(MOST(threshold - y_right * y_right * inv_yy, zero));
+        x + slope * y_right + sqrt(MAXIMUM(threshold - y_right * y_right * inv_yy, zero));
     const float16 left_x =
-        x + slope * y_left - sqrt(MOST(threshold - y_left * y_left * inv_yy, zero));
+        x + slope * y_left - sqrt(MAXIMUM(threshold - y_left * y_left * inv_yy, zero));
     // Clamped before the conversion, since an ellipse may be as wide as any; >> 2 is / SIDE.  Both
     // are shifted so that a conversion, which cuts towards 0, rounds down and up: 4 + floor(right)
     // and 16 - ceil(left).  What the sums round, rounds to the next block's side.
-    const int16 after = convert_int16(LEAST(MOST(right_x, zero - 1.0f), end - 1.0f) + SIDE) >> 2;
-    const int16 first = (TILE - convert_int16(end - LEAST(MOST(left_x, zero), end))) >> 2;
+    const float16 last_x = MINIMUM(MAXIMUM(right_x, zero - 1.0f), end - 1.0f),
+        first_x = MINIMUM(MAXIMUM(left_x, zero), end);
+    const int16 after = convert_int16(last_x + SIDE) >> 2;
+    const int16 first = (TILE - convert_int16(end - first_x)) >> 2;
     // Blocks before `after`, less those before `first`.
     const uint16 until = ((uint16)1 << as_uint16(after)) - 1u;
     const uint16 before = ((uint16)1 << as_uint16(first)) - 1u;
@@ -151,17 +153,16 @@ inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
 // Fills a batch from the list [p, end) and returns how many it got.
 inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
                  __global const float* record, Batch* batch) {
-  // The next batch's records are asked for now.
   const int n = min(BATCH, end - p), ahead = min(BATCH, end - p - n);
-  for (int j = 0; j < ahead; j++) {  // of the next batch: the drawing of this one hides the misses
-    __global const float* from = record + (size_t)RECORD * intersections[p + n + j];
-    PREFETCH(from);
-    PREFETCH(from + RECORD - 1);
-  }
   // Records go to the batch scaled for exp2, and their shapes to columns for the masks.
   Columns e;
   const float h = -HALF_LOG2E;
   for (int j = 0; j < n; j++) {
+    if (j < ahead) {  // of the next batch: the drawing of this one hides the misses
+      __global const float* next = record + (size_t)RECORD * intersections[p + n + j];
+      PREFETCH(next);
+      PREFETCH(next + RECORD - 1);
+    }
     __global const float* from = record + (size_t)RECORD * intersections[p + j];
     const float8 s = vload8(0, from);
     const float4 t = vload4(0, from + 8);

@@ -38,7 +38,7 @@ typedef struct {
 #define POSE (12 * BLOCKS_OF_POSE + ANTIALIASED)
 
 inline void load_poses(floatv* m, intv object, int* current, __global const float* poses) {
-  if (ALL(object == object.s0)) {
+  if (ALL_OF(object == object.s0)) {
     if (object.s0 != *current)
       for (int k = 0; k < POSE; k++) m[k] = poses[POSE * object.s0 + k];
     *current = object.s0;
@@ -77,7 +77,7 @@ inline void enter_keys(Keys* keys, int i, uintv key, intv member) {
   keys->max_key = max(keys->max_key, key & AS_UINT(member));
   uint low[LANES];
   VSTORE(key & (LOW_BINS - 1), 0, low);
-  if (ALL(member)) {
+  if (ALL_OF(member)) {
     store_all_pairs(AS_UINT(LANE_NUMBERS + i), key, keys->pairs + keys->next);
     for (int lane = 0; lane < LANES; lane++) keys->bins[low[lane]]++;
     keys->next += LANES;
@@ -118,8 +118,8 @@ IN_PLACE Ellipses project_lanes(const Splats* s, const floatv* m, floatv x, floa
   const floatv j00 = view[CAMERA_FX] * inv_z, j11 = view[CAMERA_FY] * inv_z;
   const floatv least_x = view[MIN_TAN_X], most_x = view[MAX_TAN_X];
   const floatv least_y = view[MIN_TAN_Y], most_y = view[MAX_TAN_Y];
-  const floatv j02 = -j00 * LEAST(MOST(tan_x, least_x), most_x);
-  const floatv j12 = -j11 * LEAST(MOST(tan_y, least_y), most_y);
+  const floatv j02 = -j00 * MINIMUM(MAXIMUM(tan_x, least_x), most_x);
+  const floatv j12 = -j11 * MINIMUM(MAXIMUM(tan_y, least_y), most_y);
   // Step 2, the rows u and v of J W, with W the rotation camera_from_object; J has two zeros.
   const floatv ux = j00 * m[0] + j02 * m[8], uy = j00 * m[1] + j02 * m[9];
   const floatv vx = j11 * m[4] + j12 * m[8], vy = j11 * m[5] + j12 * m[9];
@@ -137,7 +137,7 @@ IN_PLACE Ellipses project_lanes(const Splats* s, const floatv* m, floatv x, floa
   const floatv a = bare_a + low_pass, c = bare_c + low_pass;
   // Step 5, its determinant: that without the low pass, which float rounding may take below 0, plus
   // what the low pass adds.
-  const floatv bare = MOST(bare_a * bare_c - b * b, (floatv)(0));
+  const floatv bare = MAXIMUM(bare_a * bare_c - b * b, (floatv)(0));
   const floatv determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;
   const floatv per = 1.0f / determinant;
   floatv power_threshold = s->power_threshold, opacity = s->opacity;
@@ -270,7 +270,7 @@ __kernel void project_arena(
     // Gate 1, opacity: absent splats of other modalities end here, LANES at a time.
     const intv bright = valid & (s.opacity >= limits[MIN_ALPHA]) & (s.opacity < FLT_MAX);
     entered += bright;
-    if (!ANY(bright)) {
+    if (!ANY_OF(bright)) {
       for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], tile_bounds[v]);
       continue;
     }
@@ -295,14 +295,14 @@ __kernel void project_arena(
     }
     // Covariances and colours, the larger part of a splat, only where some view may see one of
     // them.
-    if (ANY(anywhere)) {
+    if (ANY_OF(anywhere)) {
       LOAD_ROWS(LOAD_COVARIANCES, s, covariance, 8)
       LOAD_ROWS(LOAD_COLORS, s, color, 4)
       s.power_threshold = fmax(2.0f * log(s.opacity * limits[PER_MIN_ALPHA]), 0.0f);
     }
     intv drawn_anywhere = 0;
     for (int v = 0; v < VIEWS; v++) {
-      if (!ANY(alive[v])) {
+      if (!ANY_OF(alive[v])) {
         leave_out(i, n, record[v], depth[v], tile_bounds[v]);
         continue;
       }
@@ -330,7 +330,7 @@ __kernel void project_arena(
       const floatv* to = m + 12 * (VIEWS + o);
       // An order that is kept while the views turn holds every splat that is there.
       const intv member = keep_outside ? bright : ORDERS == 1 ? drawn_anywhere : seen[o];
-      if (!ANY(member)) continue;
+      if (!ANY_OF(member)) continue;
       const floatv kz = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
       // Depth along the view, as 3DGS sorts: it changes while a head turns, and splats pop
       // (StopThePop, Radl et al. 2024).  The distance to the eye does not.

@@ -29,10 +29,10 @@ IN_PLACE TileBoundsV tile_bounds_of_lanes(const Ellipses* e, int tiles_x, int ti
   const floatv x = select(zero, e->x, e->seen), y = select(zero, e->y, e->seen);
   const floatv ex = select(zero, e->half_x, e->seen), ey = select(zero, e->half_y, e->seen);
   // Pixel centres lie at +0.5: the first and last pixels whose centre is inside the box.
-  const intv x0 = CONVERT_INT(ceil(MOST(x - ex, zero) - 0.5f)) >> 4;
-  const intv y0 = CONVERT_INT(ceil(MOST(y - ey, zero) - 0.5f)) >> 4;
-  const intv x1 = CONVERT_INT(floor(LEAST(x + ex, (floatv)(TILE * tiles_x)) - 0.5f)) >> 4;
-  const intv y1 = CONVERT_INT(floor(LEAST(y + ey, (floatv)(TILE * tiles_y)) - 0.5f)) >> 4;
+  const intv x0 = CONVERT_INT(ceil(MAXIMUM(x - ex, zero) - 0.5f)) >> 4;
+  const intv y0 = CONVERT_INT(ceil(MAXIMUM(y - ey, zero) - 0.5f)) >> 4;
+  const intv x1 = CONVERT_INT(floor(MINIMUM(x + ex, (floatv)(TILE * tiles_x)) - 0.5f)) >> 4;
+  const intv y1 = CONVERT_INT(floor(MINIMUM(y + ey, (floatv)(TILE * tiles_y)) - 0.5f)) >> 4;
   // >> 4 rounds down also below 0, unlike a division by TILE.
   const intv columns = x1 + 1 - x0, rows = y1 + 1 - y0;
   const intv present = e->seen & (columns > 0) & (rows > 0);
@@ -43,7 +43,7 @@ IN_PLACE TileBoundsV tile_bounds_of_lanes(const Ellipses* e, int tiles_x, int ti
   // x = slope y +- sqrt((T - y^2 / Sigma'_yy) / A), farthest to the right at y = y_extreme
   const floatv inv_a = 1.0f / e->a, slope = -e->b * inv_a;
   const floatv y_extreme = -e->b / e->c * ex;
-  const floatv inv_yy = e->power_threshold / MOST(ey * ey, (floatv)(FLT_MIN)),
+  const floatv inv_yy = e->power_threshold / MAXIMUM(ey * ey, (floatv)(FLT_MIN)),
       threshold = 1.0001f * e->power_threshold;
   // From the mean to the first pixel centre of the box.
   const floatv left = CONVERT_FLOAT(x0 * TILE) + 0.5f - x;
@@ -53,13 +53,13 @@ IN_PLACE TileBoundsV tile_bounds_of_lanes(const Ellipses* e, int tiles_x, int ti
   const int most_rows = max_ints(masked & rows);
   for (int row = 0; row < most_rows; row++) {
     const floatv bottom = top + (TILE - 1);
-    const floatv y_right = LEAST(MOST(y_extreme, top), bottom),
-        y_left = LEAST(MOST(-y_extreme, top), bottom);
+    const floatv y_right = MINIMUM(MAXIMUM(y_extreme, top), bottom),
+        y_left = MINIMUM(MAXIMUM(-y_extreme, top), bottom);
     // 1.0001: float rounding must not lose a pixel.
-    const floatv right_x =
-        slope * y_right + sqrt(MOST(threshold - y_right * y_right * inv_yy, zero) * inv_a) - left;
-    const floatv left_x =
-        slope * y_left - sqrt(MOST(threshold - y_left * y_left * inv_yy, zero) * inv_a) - left;
+    const floatv right_2 = MAXIMUM(threshold - y_right * y_right * inv_yy, zero);
+    const floatv right_x = slope * y_right + sqrt(right_2 * inv_a) - left;
+    const floatv left_2 = MAXIMUM(threshold - y_left * y_left * inv_yy, zero);
+    const floatv left_x = slope * y_left - sqrt(left_2 * inv_a) - left;
     const intv after = CONVERT_INT(floor(right_x * (1.0f / TILE))) + 1;
     const intv first = CONVERT_INT(ceil((left_x - (TILE - 1)) * (1.0f / TILE)));
     // A row that this lane does not have leaves its mask as it is: start = end = 0.

@@ -1,8 +1,8 @@
 // vector: the floats of a CPU's vector register at once: eight, or sixteen where LANES says so.
 // Reads:   LANES, 8 where it is not given.
-// Defines: floatv, intv, uintv and their loads, stores, conversions and lane numbers; MOST, LEAST,
-//          ANY, ALL; PREFETCH, PREFETCH_TO_WRITE, STREAM; HALF_LOG2E, max8, sum8, sums8, sum_ints,
-//          max_ints, min_ints, min_uints, max_uints.
+// Defines: floatv, intv, uintv and their loads, stores, conversions and lane numbers; MAXIMUM,
+//          MINIMUM, ANY_OF, ALL_OF; PREFETCH, PREFETCH_TO_WRITE, STREAM; HALF_LOG2E, max8, sum8,
+//          sums8, sum_ints, max_ints, min_ints, min_uints, max_uints.
 // Units:   none; exponents are of 2, since exp(-power / 2) = 2^(-power log2(e) / 2).
 #ifndef LANES
 #define LANES 8
@@ -19,8 +19,8 @@ typedef uint16 uintv;
 #define AS_INT as_int16
 #define AS_UINT as_uint16
 // Of masks: any() and all() ask one lane after the other, which takes longer where there are many.
-#define ANY(mask) (min_ints(mask) < 0)
-#define ALL(mask) (max_ints(mask) < 0)
+#define ANY_OF(mask) (min_ints(mask) < 0)
+#define ALL_OF(mask) (max_ints(mask) < 0)
 #else
 typedef float8 floatv;
 typedef int8 intv;
@@ -32,12 +32,12 @@ typedef uint8 uintv;
 #define CONVERT_FLOAT convert_float8
 #define AS_INT as_int8
 #define AS_UINT as_uint8
-#define ANY any
-#define ALL all
+#define ANY_OF any
+#define ALL_OF all
 #endif
 // One instruction, b where a is not a number; fmax and fmin, which look at b as well, take three.
-#define MOST(a, b) ((a) > (b) ? (a) : (b))
-#define LEAST(a, b) ((a) < (b) ? (a) : (b))
+#define MAXIMUM(a, b) ((a) > (b) ? (a) : (b))
+#define MINIMUM(a, b) ((a) < (b) ? (a) : (b))
 #define HALF_LOG2E 0.72134752044f  // log2(e) / 2: exponents of 2 out of halves of squares
 #ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
 #define PREFETCH(address) __builtin_prefetch(address)

@@ -166,7 +166,7 @@ inline floatn light_along(__global const float* light, const floatn* d) {
 }
 
 // Outputs of a head out of its units first to end of those that are awake.
-inline void second_layer(Head head, int first, int end, const int* live, const floatn* unit,
+__attribute__((noinline)) void second_layer(Head head, int first, int end, const int* live, const floatn* unit,
                          __global const float* weights, floatn* out) {
   // b2, one a tile's output.
   __global const float* biases = weights + head.last_at;
