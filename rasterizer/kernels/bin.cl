@@ -32,12 +32,8 @@ inline Chunk open_chunk(int first, __global uint2* tile_bounds, __global uint2* 
 
 // The status of a chunk: visible splats, intersections, least and largest key.
 inline uint4 close_chunk(const Chunk* chunk, int first) {
-  const int4 sum = chunk->intersections.lo + chunk->intersections.hi;
-  const uint4 min_key = min(chunk->min_key.lo, chunk->min_key.hi);
-  const uint4 max_key = max(chunk->max_key.lo, chunk->max_key.hi);
-  return (uint4)(chunk->next - first, sum.x + sum.y + sum.z + sum.w,
-                 min(min(min_key.x, min_key.y), min(min_key.z, min_key.w)),
-                 max(max(max_key.x, max_key.y), max(max_key.z, max_key.w)));
+  return (uint4)(chunk->next - first, sum_ints(chunk->intersections), min_uints(chunk->min_key),
+                 max_uints(chunk->max_key));
 }
 
 // Enters `n` splats from number i on; depth: their eight depths.
@@ -294,6 +290,7 @@ __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int tot
     const int ahead = min(i + SOON, last - 1);
     const uint2 soon = sorted_bounds[ahead];
     const int its_tile = BOUNDS_ROW(soon) * tiles_x + BOUNDS_COLUMN(soon);
+    // Of a splat that is no box the first record, which is there: no branch.
     __global const float* its_box = record + (soon.x & BOX ? (size_t)RECORD * order[ahead] : 0);
     PREFETCH(its_box);
     PREFETCH(its_box + RECORD - 1);

@@ -135,6 +135,7 @@ inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
     // Clamped before the conversion, since an ellipse may be as wide as any; >> 2 is / SIDE.  Both
     // are shifted so that a conversion, which cuts towards 0, rounds down and up: 4 + floor(right)
     // and 16 - ceil(left).  What the sums round, rounds to the next block's side.
+    // The pixels that the strip's ellipse reaches, of the tile's sixteen.
     const float16 last_x = MINIMUM(MAXIMUM(right_x, zero - 1.0f), end - 1.0f),
         first_x = MINIMUM(MAXIMUM(left_x, zero), end);
     const int16 after = convert_int16(last_x + SIDE) >> 2;

@@ -7,6 +7,7 @@
 // Needs:   VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
 // ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
 // OWN_COLORS = 1: the second view has colours of its own.
+// PAGED = 1: rows that are drawn lie in pages of the arena, see common/pages.cl.
 // Reads:   frame (limits, views, poses), mean_opacity (N, 4), covariance (N, 8), color (N, 4),
 //          object_index (N,); unseen (clusters,) where there is one: CLUSTER splats each that no
 //          view sees (clusters.py), of which nothing is read.
@@ -21,6 +22,7 @@
 #endif
 #include "common/camera.cl"
 #include "common/limits.cl"
+#include "common/pages.cl"
 #include "common/eight_rows.cl"
 #include "common/tile_bounds_of_lanes.cl"
 
@@ -94,6 +96,15 @@ inline void enter_keys(Keys* keys, int i, uintv key, intv member) {
   }
 }
 
+#if PAGED
+// Opacities with a part of their optical depth: those of two parts that add up to 1, one behind the
+// other, hide what the whole hides.  What is absent stays so.
+inline floatv weighed(floatv opacity, float weight) {
+  const floatv left = 1.0f - pow(fmax(1.0f - opacity, 0.0f), weight);
+  return select(opacity, left, opacity > 0.0f);
+}
+#endif
+
 inline floatv ramp(floatv room, float per) {  // per 0: there is no limit to fade at
   return per > 0 ? fmin(fmax(room * per, 0.0f), 1.0f) : (floatv)(1);
 }
@@ -116,6 +127,7 @@ IN_PLACE Ellipses project_lanes(const Splats* s, const floatv* m, floatv x, floa
   // them.
   const floatv inv_z = 1.0f / z, tan_x = x * inv_z, tan_y = y * inv_z;
   const floatv j00 = view[CAMERA_FX] * inv_z, j11 = view[CAMERA_FY] * inv_z;
+  // Vectors, since a choice of two is one.
   const floatv least_x = view[MIN_TAN_X], most_x = view[MAX_TAN_X];
   const floatv least_y = view[MIN_TAN_Y], most_y = view[MAX_TAN_Y];
   const floatv j02 = -j00 * MINIMUM(MAXIMUM(tan_x, least_x), most_x);
@@ -213,7 +225,7 @@ inline void leave_out(int i, int n, __global float* record, __global float* dept
 // key.  status: pairs of the view's order, intersections, least and largest key.
 __kernel void project_arena(
     int count, int chunk, int by_distance, int keep_outside, __global const int* unseen,
-    __global const float* frame,
+    __global const int* sources, __global const float* weights, __global const float* frame,
     __global const float* mean_opacity, __global const float* covariance,
     __global const float* color, __global const float* second_color,
     __global const int* object_index,
@@ -266,7 +278,18 @@ __kernel void project_arena(
     }
     const int n = min(LANES, last - i);
     const intv valid = LANE_NUMBERS < n;
-    LOAD_ROWS(LOAD_MEANS, s, mean_opacity, 4)
+    const long moved = row_of(i, sources) - i;  // from a row that is drawn to where it lies
+    if (i + moved < 0) {
+      for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], tile_bounds[v]);
+      continue;
+    }
+    // As if it began there.
+    __global const float* means = mean_opacity + 4 * moved;
+    LOAD_ROWS(LOAD_MEANS, s, means, 4)
+#if PAGED
+    const float weight = weights[i / PAGE];
+    if (weight != 1.0f) s.opacity = weighed(s.opacity, weight);
+#endif
     // Gate 1, opacity: absent splats of other modalities end here, LANES at a time.
     const intv bright = valid & (s.opacity >= limits[MIN_ALPHA]) & (s.opacity < FLT_MAX);
     entered += bright;
@@ -296,7 +319,8 @@ __kernel void project_arena(
     // Covariances and colours, the larger part of a splat, only where some view may see one of
     // them.
     if (ANY_OF(anywhere)) {
-      LOAD_ROWS(LOAD_COVARIANCES, s, covariance, 8)
+      __global const float* covariances = covariance + 8 * moved;
+      LOAD_ROWS(LOAD_COVARIANCES, s, covariances, 8)
       LOAD_ROWS(LOAD_COLORS, s, color, 4)
       s.power_threshold = fmax(2.0f * log(s.opacity * limits[PER_MIN_ALPHA]), 0.0f);
     }

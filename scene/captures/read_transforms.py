@@ -30,6 +30,8 @@ from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
+from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
+from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.pose import OPENCV_FROM_EYE
 
@@ -59,6 +61,10 @@ class Shot:
     def names_depth(self) -> bool:
         return any(self.entry.get(key) for key in DEPTH_NAMES)
 
+    @property
+    def names_normals(self) -> bool:
+        return any(self.entry.get(key) for key in NORMAL_NAMES)
+
 
 def read_transforms(*files: Path) -> Capture:
     """A capture from one JSON file, or from the train/val/test files of a Blender data set."""
@@ -80,13 +86,14 @@ def read_transforms(*files: Path) -> Capture:
         data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
-    photos, rescaled, no_depth = [], [], []
+    photos, rescaled, no_depth, no_normals = [], [], [], []
     for shot in shots:
         lens = lens_of(shot)
         photos.append(photo := photo_of(shot, lens, world, folder))
         rescaled += [str(shot.path)] if photo.file_size != lens.size else []
         no_depth += [str(shot.path)] if photo.depth is None and shot.names_depth else []
-    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth)
+        no_normals += [str(shot.path)] if photo.normals is None and shot.names_normals else []
+    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth, no_normals)
     photos = with_counts(photos, counts_from(data.get("modalities"), where))
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
@@ -113,6 +120,7 @@ def read_transforms(*files: Path) -> Capture:
         doubts,
     )
     refuse_other_units(capture, where)
+    refuse_other_axes(capture, where)
     return capture
 
 
@@ -242,7 +250,9 @@ def photo_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path) 
             raise BadFile(f"{where}: the mask {path_end(mask)} is missing; put it there")
         image_size(mask, photo.file_size)
     depth, unit = depth_of(entry, shot.folder, photo.file_size, where)
-    return replace(photo, mask=mask, split=SPLITS[split], depth=depth, depth_unit=unit)
+    photo = replace(photo, mask=mask, split=SPLITS[split], depth=depth, depth_unit=unit)
+    normals, axes = normals_of(entry, shot.folder, photo.file_size, where)
+    return replace(photo, normals=normals, normal_axes=axes)
 
 
 def lens_of(shot: Shot) -> ColmapCamera:

@@ -102,6 +102,7 @@
     PUT((float4)(ab_hi.s45, cd_hi.s45), (rows) + (at) + 6 * (stride));                             \
     PUT((float4)(ab_hi.s67, cd_hi.s67), (rows) + (at) + 7 * (stride));                             \
   }
+// The second eight lie eight rows further on.
 #if LANES == 16
 #define PUT_COLUMNS(PUT, rows, stride, at, ca, cb, cc, cd)                                         \
   {                                                                                                \
@@ -112,6 +113,8 @@
 #else
 #define PUT_COLUMNS PUT_EIGHT
 #endif
+// PUT(four, to): how four floats of a row are written.
+// Into the caches, or past them.
 #define PUT_FOUR(four, to) vstore4(four, 0, to)
 #define STREAM_FOUR(four, to) STREAM(four, (__global float4*)(to))
 #define STORE_COLUMNS(rows, stride, at, ca, cb, cc, cd) \
@@ -145,6 +148,7 @@ inline void store_floats(floatv values, int i, int n, __global float* array) {
     VSTORE(values, 0, array + i);
     return;
   }
+  // Nothing behind the last may be written.
   float one[LANES];
   VSTORE(values, 0, one);
   for (int lane = 0; lane < n; lane++) array[i + lane] = one[lane];
@@ -156,6 +160,7 @@ inline void store_eight_pairs(uint8 a, uint8 b, __global uint2* array) {
                     b.s6, a.s7, b.s7), 0, (__global uint*)array);
 }
 
+// As many as a vector has lanes.
 inline void store_all_pairs(uintv a, uintv b, __global uint2* array) {
 #if LANES == 16
   store_eight_pairs(a.lo, b.lo, array);
@@ -171,6 +176,7 @@ inline void store_pairs(uintv a, uintv b, int i, int n, __global uint2* array) {
     store_all_pairs(a, b, array + i);
     return;
   }
+  // Nothing behind the last pair may be written.
   uint first[LANES], second[LANES];
   VSTORE(a, 0, first);
   VSTORE(b, 0, second);

@@ -50,6 +50,7 @@ IN_PLACE TileBoundsV tile_bounds_of_lanes(const Ellipses* e, int tiles_x, int ti
   floatv top = CONVERT_FLOAT(y0 * TILE) + 0.5f - y;
   uintv mask = 0;
   intv count = 0;
+  // Of all lanes.
   const int most_rows = max_ints(masked & rows);
   for (int row = 0; row < most_rows; row++) {
     const floatv bottom = top + (TILE - 1);

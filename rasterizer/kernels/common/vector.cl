@@ -11,7 +11,9 @@
 typedef float16 floatv;
 typedef int16 intv;
 typedef uint16 uintv;
+// Which lane each is.
 #define LANE_NUMBERS (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+// What a vector is read and written with, its type aside.
 #define VLOAD vload16
 #define VSTORE vstore16
 #define CONVERT_INT convert_int16
@@ -32,6 +34,7 @@ typedef uint8 uintv;
 #define CONVERT_FLOAT convert_float8
 #define AS_INT as_int8
 #define AS_UINT as_uint8
+// The lanes of two registers of SSE or one of AVX: asked one by one, mostly the first says all.
 #define ANY_OF any
 #define ALL_OF all
 #endif
@@ -42,6 +45,7 @@ typedef uint8 uintv;
 #ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
 #define PREFETCH(address) __builtin_prefetch(address)
 #define PREFETCH_TO_WRITE(address) __builtin_prefetch(address, 1)
+// Newer than the two above.
 #if __has_builtin(__builtin_nontemporal_store)
 #define STREAM(value, to) __builtin_nontemporal_store(value, to)
 #endif
@@ -84,34 +88,15 @@ inline float8 sums8(float8 a, float8 b, float8 c, float8 d, float8 e, float8 f, 
 #define EIGHT_OF(combine, a) (a)
 #endif
 #define ADDED(a, b) ((a) + (b))
-
-inline int sum_ints(intv a) {
-  const int8 b = EIGHT_OF(ADDED, a);
-  const int4 c = b.lo + b.hi;
-  const int2 d = c.lo + c.hi;
-  return d.x + d.y;
-}
-
-inline int max_ints(intv a) {
-  const int8 b = EIGHT_OF(max, a);
-  const int4 c = max(b.lo, b.hi);
-  return max(max(c.x, c.y), max(c.z, c.w));
-}
-
-inline int min_ints(intv a) {
-  const int8 b = EIGHT_OF(min, a);
-  const int4 c = min(b.lo, b.hi);
-  return min(min(c.x, c.y), min(c.z, c.w));
-}
-
-inline uint min_uints(uintv a) {
-  const uint8 b = EIGHT_OF(min, a);
-  const uint4 c = min(b.lo, b.hi);
-  return min(min(c.x, c.y), min(c.z, c.w));
-}
-
-inline uint max_uints(uintv a) {
-  const uint8 b = EIGHT_OF(max, a);
-  const uint4 c = max(b.lo, b.hi);
-  return max(max(c.x, c.y), max(c.z, c.w));
-}
+// A tree of halves, the same for whatever combines two.
+#define REDUCTION(name, scalar, eight, four, wide, combine)                  \
+  inline scalar name(wide a) {                                               \
+    const eight b = EIGHT_OF(combine, a);                                    \
+    const four c = combine(b.lo, b.hi);                                      \
+    return combine(combine(c.x, c.y), combine(c.z, c.w));                    \
+  }
+REDUCTION(sum_ints, int, int8, int4, intv, ADDED)
+REDUCTION(max_ints, int, int8, int4, intv, max)
+REDUCTION(min_ints, int, int8, int4, intv, min)
+REDUCTION(max_uints, uint, uint8, uint4, uintv, max)
+REDUCTION(min_uints, uint, uint8, uint4, uintv, min)
