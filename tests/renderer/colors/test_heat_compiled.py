@@ -54,7 +54,7 @@ def test_the_first_frame_with_heat_compiles_nothing(tmp_path):
     rows = [line.replace("(", "").replace(")", "") for line in done.stdout.splitlines()]
     numbers = [[int(n) for n in row.replace(",", " ").split()] for row in rows]
     assert len(numbers) == 2
-    for first_files, first_programs, *second, after_files, after_programs in numbers:
+    for first_files, _, *second, after_files, after_programs in numbers:
         assert first_files > 0, "the driver has kept nothing: the test sees no compilation"
         assert [after_files, after_programs] == second
         assert second[0] > first_files
