@@ -1,6 +1,6 @@
 """A leaf's old level goes as its new one comes: over some frames both are drawn, by parts.
 
-Parts add up to 1; what a part of a splat is, common/pages.cl says.
+Parts add up to 1; what a part of a splat is, project_arena.cl says.
 """
 
 import numpy as np

@@ -31,6 +31,7 @@ class BlockTrainer(Trainer):
             length = {"run_length": settings.iterations}
             resume = start.state, start.notes | length
         super().__init__(device, start.capture_of(capture), settings, resume, room=room)
+        self.targets.most = 0  # made at each use, 2 % of a step: a block sees half of all photos
 
     def lay_out(self) -> None:
         super().lay_out()
@@ -45,7 +46,8 @@ class BlockTrainer(Trainer):
         outside = ~self.inside(self.device.download(self.adam["anchors"]), MARGIN)
         self.anchor_cap = self.most_inside + int(outside.sum())
         state = self.stats.state()
-        state["densify.grad2d"].reshape(len(outside), -1)[outside] = 0
+        grad2d = state["densify.grad2d"]
+        grad2d.reshape(len(grad2d), len(outside), -1)[:, outside] = 0
         state["densify.opacity"][outside] = 0
         state["densify.contribution"][:, outside] = 0
         self.stats.load(state)
