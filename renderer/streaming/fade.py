@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.streaming.pages import PageTable
 
-FRAMES = 2  # that show both levels: the new one is there alone in the frame after them
+FRAMES = 3  # that show both levels: the new one is there alone in the frame after them
 
 
 class Fades:

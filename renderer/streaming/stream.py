@@ -305,7 +305,8 @@ class Stream:
         total = int(there.sum())
         needed = total + int(base[new].sum()) - self._left
         number = int(np.searchsorted(freed, needed)) + 1 if needed > 0 else 0
-        number = max(number, int(np.searchsorted(np.cumsum(counts[downs]), room, side="right")))
+        fit = int(np.searchsorted(np.cumsum(counts[downs]), room, side="right"))
+        number = max(number, fit, 1)  # one at least, or a small budget would be stuck
         downs = downs[:number]
         total -= int((there[downs] - counts[downs]).sum())
         new = new[np.argsort(-worth[new], kind="stable")]
