@@ -47,12 +47,13 @@ def test_both_levels_are_drawn_for_so_many_frames_and_then_one(moving):
         table = stream.table
         leaving = np.unique(table.left[table.left >= 0])
         most = max(most, len(leaving))
-        ages = np.where(np.isin(np.arange(len(ages)), leaving), ages + 1, 0)
-        assert ages.max() <= FRAMES
-        for leaf in leaving[:3]:
+        before, ages = ages, np.zeros_like(ages)
+        for leaf in leaving:
             new = pages.weight[table.pages_of(np.array([leaf]))]
             old = pages.weight[table.leaving(np.array([leaf]))]
-            # Parts add up to 1, and the new one grows.
+            ages[leaf] = round((FRAMES + 1) * new[0])
+            # Frame by frame; the one after the last may begin another change.
+            assert ages[leaf] == before[leaf] % FRAMES + 1
             np.testing.assert_allclose(new, ages[leaf] / (FRAMES + 1), atol=1e-6)
             np.testing.assert_allclose(old, 1 - ages[leaf] / (FRAMES + 1), atol=1e-6)
         others = np.setdiff1d(np.flatnonzero(table.leaf_of >= 0), table.pages_of(leaving))
