@@ -44,7 +44,8 @@ class Fetcher:
     def _pace(self) -> None:
         with self._wake:
             if self._moving and not self._ended:
-                self._wake.wait_for(lambda now=self._frames: self._frames != now, PACE_S)
+                now = self._frames
+                self._wake.wait_for(lambda: self._frames != now, PACE_S)
 
     @property
     def waiting(self) -> bool:

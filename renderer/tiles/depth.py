@@ -30,9 +30,8 @@ def blend_depth(
 
     arena: mean_opacity, covariance, object_index, pages.
     """
-    camera = camera_of(view)
-    given = (world_from_objects, camera, projected, arena[3])
-    surfaces = surface_arena(device, *arena[:3], *given)
+    posed = (world_from_objects, camera_of(view))
+    surfaces = surface_arena(device, arena[0], arena[1], arena[2], *posed, projected, arena[3])
     return rasterize_depth(device, projected, tiles, surfaces, view.size)
 
 
