@@ -1,5 +1,6 @@
 """Every number that a training run can be asked for: what `train` offers, and what a run keeps."""
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -65,7 +66,9 @@ class TrainSettings:
     iterations: int | None = 2000
     """Train for this many steps; the same number gives the same bits."""
     max_anchors: int = 12000
-    """Most anchors; as far as there are points, a run starts with that many."""
+    """Most anchors; as far as there are points, a run starts with that many.  A capture of one
+    modality has 30000 of 2 splats with light by direction instead, where none of --max-anchors,
+    --splats-per-anchor, --anchor-attributes and --max-mb is given."""
     max_mb: float | None = None
     """Most megabytes of the package on disk, from the start on.  Default: no limit."""
     points: str = "auto"
@@ -151,6 +154,24 @@ class TrainSettings:
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
+
+
+# A scene that never changes: the networks have nothing to share between stops, so more anchors with
+# fewer splats each, and light of their own, gain 0.2 to 1 dB for two to three times the bytes.
+ONE_MODALITY = {
+    "splats_per_anchor": 2, "max_anchors": 30000, "anchor_attributes": "frame,color,light",
+}  # fmt: skip
+SIZES = (*ONE_MODALITY, "max_mb")  # who gives one of these means all of them
+
+
+def suited(settings: TrainSettings, asked: Iterable[str], modalities: int) -> TrainSettings:
+    """New settings of a run as they suit a capture of so many modalities.
+
+    asked: fields that somebody gave.
+    """
+    if modalities > 1 or not set(asked).isdisjoint(SIZES):
+        return settings
+    return replace(settings, **ONE_MODALITY)
 
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed

@@ -1,7 +1,7 @@
 """Few photos: what the defaults give with 3, 6, 12 of them, and what priors and ways to train add.
 
     python3 tools/training/sparse.py CAPTURE MODALITY [CAPTURE MODALITY ...]
-        --out docs/bench/sparse.csv [--photos 3 6 12 0] [--iterations 600] [--max-anchors 6000]
+        --out docs/bench/sparse.csv [--photos 3 6 12 0] [--iterations 600] [--max-anchors 7500]
         [--downscale N] [--seeds 0] [--ways default ...]
 
 CAPTURE is a folder of posed photos, or `bench` RGB: the demo's closed bench with true depth and
@@ -11,7 +11,7 @@ psnr_db, ssim and depth_error (of what is seen, where the capture knows it) are 
 photos, train_db of up to 8 of the photos that were learned from.  Ways take turns; those that want
 what a capture does not have are left out.
 
-  default        as `train` does it, without depth and normals
+  default        as `train` does it for one modality, without depth and normals
   depth          with depth photos (--depth-share 0.3)
   normals        with normal maps (--normal-share 0.1)
   both           with both
@@ -21,7 +21,7 @@ what a capture does not have are left out.
   rough both     both of these
   seen points    depth at the points that were triangulated out of these photos, alone
   alike          colours that do not see the eye (view_dependent)
-  light          light by direction (--anchor-attributes frame,color,light)
+  five           fewer anchors of 5 splats each, as many splats, without light by direction
   half           half of the anchors
   left out       each step leaves out a tenth of the anchors, drawn by chance (DropGaussian, 2025)
   early          half of the steps
@@ -29,17 +29,19 @@ what a capture does not have are left out.
 """
 
 import argparse
-import csv
-import shlex
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+
+from ways import add_sweep, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402
@@ -53,7 +55,7 @@ from shapeshift.training.photos import (  # noqa: E402
     choose_downscale,
     load_photos,
 )
-from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.settings import TrainSettings, suited  # noqa: E402
 from shapeshift.training.synthetic import one_shape, workshop  # noqa: E402
 from shapeshift.training.synthetic.tracer import depth_under, look, pixel_rays  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
@@ -113,7 +115,7 @@ WAYS = {
     "rough both": Way(priors=("depth", "normals"), rough=True),
     "seen points": Way(priors=("points",)),
     "alike": Way({"view_dependent": False}),
-    "light": Way({"anchor_attributes": "frame,color,light"}),
+    "five": Way({"splats_per_anchor": 5, "max_anchors": 0.4, "anchor_attributes": "frame,color"}),
     "half": Way({"max_anchors": 0.5}),
     "left out": Way(left_out=0.1),
     "early": Way({"iterations": 0.5}),
@@ -249,32 +251,26 @@ def depth_error(trainer: Trainer, drawing, photo: LoadedPhoto) -> float:
     return float(np.where(covered[known] >= COVERED, away, 1).mean())
 
 
-def captures(options: argparse.Namespace, folder: Path) -> Iterator[tuple[str, Capture]]:
-    for name, modality in zip(options.captures[::2], options.captures[1::2], strict=True):
-        whole = bench(folder) if name == "bench" else read_capture(Path(name))
-        yield Path(name).name, one_modality(whole, modality)
-
-
-def runs(options: argparse.Namespace, device, folder: Path) -> Iterator[dict]:
-    for name, whole in captures(options, folder):
-        (stop,) = whole.stops
-        for photos in options.photos:
-            part = part_of(whole, photos)
-            for seed in options.seeds:
-                settings = TrainSettings(
-                    iterations=options.iterations, max_anchors=options.max_anchors, seed=seed,
-                    downscale=options.downscale or choose_downscale(whole.photos),
-                )  # fmt: skip
-                loaded = {
-                    split: load_photos(part, split, settings.downscale or 1, settings.masks)
-                    for split in ("train", "test")
-                }
-                for way in options.ways:
-                    if not has(part, WAYS[way]):
-                        continue
-                    row = measured(device, part, WAYS[way], settings, loaded)
-                    about = {"capture": name, "modality": stop.name, "photos": photos}
-                    yield about | {"way": way, "seed": seed} | row
+def rows_of(
+    word: str, options: argparse.Namespace, modality: str, photos: int, seed: int, way: str
+) -> Iterator[dict]:
+    """One, or none where the capture has not what the way is about."""
+    with tempfile.TemporaryDirectory() as folder:
+        whole = bench(Path(folder)) if word == "bench" else read_capture(Path(word))
+        part = part_of(one_modality(whole, modality), photos)
+        settings = TrainSettings(
+            iterations=options.iterations, seed=seed,
+            downscale=options.downscale or choose_downscale(whole.photos),
+        )  # fmt: skip
+        settings = replace(suited(settings, (), 1), max_anchors=options.max_anchors)
+        loaded = {
+            split: load_photos(part, split, settings.downscale or 1, settings.masks)
+            for split in ("train", "test")
+        }
+        if has(part, WAYS[way]):
+            about = {"capture": Path(word).name, "modality": modality, "photos": photos}
+            row = measured(open_device(), part, WAYS[way], settings, loaded)
+            yield about | {"way": way, "seed": seed} | row
 
 
 def measured(
@@ -302,20 +298,21 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--photos", type=int, nargs="+", default=[3, 6, 12, 0])
     parser.add_argument("--iterations", type=int, default=600)
-    parser.add_argument("--max-anchors", type=int, default=6000)
+    parser.add_argument("--max-anchors", type=int, default=7500)
     parser.add_argument("--downscale", type=int)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
-    options, device = parser.parse_args(), open_device()
-    words = [Path(w).name if Path(w).is_dir() else w for w in sys.argv[1:]]
-    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(f"# python3 tools/training/sparse.py {shlex.join(words)}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        rows.writeheader()
-        for row in runs(options, device, Path(folder)):
-            rows.writerow(row)
-            file.flush()
+    add_sweep(parser)
+    options = parser.parse_args()
+    pairs = zip(options.captures[::2], options.captures[1::2], strict=True)
+    runs, places = {}, {}
+    for word, modality in pairs:
+        if word != "bench":
+            places[word] = Path(word).absolute()
+        for photos, seed, way in product(options.photos, options.seeds, options.ways):
+            name = f"{Path(word).name} {modality} {photos} {seed} {way}"
+            runs[name] = partial(rows_of, word, options, modality, photos, seed, way)
+    sweep(options, COLUMNS, runs, places)
 
 
 if __name__ == "__main__":

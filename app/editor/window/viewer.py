@@ -39,7 +39,7 @@ from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.inspection.attach_inspection import attach_inspection
 from shapeshift.app.editor.window.inspection.attach_ruler import attach_ruler
-from shapeshift.app.editor.window.inspection.mouse_marks import Seen
+from shapeshift.app.editor.window.inspection.picture_under import Seen
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
 from shapeshift.app.editor.window.parts import attach_parts
