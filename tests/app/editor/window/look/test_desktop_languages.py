@@ -7,7 +7,6 @@ import glfw
 import pytest
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.texts import table
 from shapeshift.app.editor.texts.table import ENGLISH, Language, all_languages, use_language
 from shapeshift.app.editor.window.window import KeyDown
 from tests.support.desktop.desktop_stand import run_frames
@@ -49,12 +48,11 @@ class Asked(Mapping):
 @pytest.fixture
 def asked(monkeypatch):
     """With every heading open and every tip shown, whatever the mouse is at."""
-    found, languages = Asked(), dict(all_languages())
+    found = Asked()
     tree = imgui.tree_node_ex
     monkeypatch.setattr(imgui, "tree_node_ex", lambda *given: bool(tree(*given)) or True)
     monkeypatch.setattr(imgui, "is_item_hovered", lambda *given: True)
-    languages["xx"] = Language("xx", "Noted", found)
-    monkeypatch.setattr(table, "all_languages", lambda: languages)
+    monkeypatch.setitem(all_languages(), "xx", Language("xx", "Noted", found))
     use_language("xx")
     yield found.texts
     use_language(ENGLISH)
@@ -84,5 +82,5 @@ def test_every_text_of_the_panel_is_in_every_table(which, request, asked):
     said -= names_of(viewer)
     assert len(said) > 250, "the panel was folded"
     for code in OTHERS:
-        missing = sorted(said - table.all_languages()[code].texts.keys())
+        missing = sorted(said - all_languages()[code].texts.keys())
         assert not missing, f"{code}: {missing}"
