@@ -30,8 +30,8 @@ LOOK_S = 0.5  # between looks at what else may end a task
 CREATE_NO_WINDOW = 0x08000000  # of Windows
 BAD_INPUT, FAULT = 2, 3  # exit codes with a sentence
 OTHER_CODE = (
-    "the program's code on {host} is another than that of the command that hands out the tasks; "
-    "have the same on all machines, and start the command again."
+    "the program's code on {host} is another than where and when the command began that hands out "
+    "the tasks; start it again, with the same code on all machines."
 )
 Hear = Callable[[str], None]  # a line of the task's standard error
 
