@@ -110,7 +110,7 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
         seen = alpha >= 128 if weight is None else (weight >= 0.5) & (alpha >= 128)
         depth = np.where(seen, depth, np.float32(0))
     view, masked = photo.view.divided(factor), mask is not None
-    return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth, masked)
+    return LoadedPhoto(view, photo.modality, rgba, weight, photo.name, depth, masked)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop
-from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
 from shapeshift.scene.pose import View
 
 
@@ -26,6 +26,14 @@ class Photo:
     def file_size(self) -> tuple[int, int]:
         """Width and height of the image file, pixels."""
         return self.view.size if self.lens is None else self.lens.size
+
+    @property
+    def name(self) -> str:
+        """Its file; of a panorama's faces also where they look, since they share one."""
+        if self.lens is None or self.lens.model != PANORAMA:
+            return str(self.path)
+        right, up = self.lens.params[4:6]
+        return f"{self.path} ({right:g} degrees right, {up:g} up)"
 
 
 @dataclass(frozen=True)

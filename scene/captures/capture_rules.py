@@ -88,7 +88,10 @@ class CaptureWorld:
 
 
 def rigid(matrix: object, where: str) -> np.ndarray:
-    """(4, 4) float64 world_from_camera, its rotation made exactly orthonormal; or BadFile."""
+    """(4, 4) float64 world_from_camera, its rotation made exactly orthonormal; or BadFile.
+
+    A scale of the matrix is left out: it moves neither the camera nor what it sees.
+    """
     try:
         m = np.asarray(matrix, np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -101,13 +104,15 @@ def rigid(matrix: object, where: str) -> np.ndarray:
         raise BadFile(
             f"{where}: the pose is beyond {FARTHEST:g} m; pose this photo again or drop it"
         )
-    rotation = m[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # 1e300 is no rotation either
+        # Of one scale in all directions, as Blender's and Unity's cameras have, nothing is seen.
+        scale = float(np.cbrt(np.abs(np.linalg.det(m[:3, :3]))))
+        rotation = m[:3, :3] / (scale if 0 < scale < np.inf else 1.0)
         error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if not error <= ORTHONORMAL:
         raise BadFile(
             f"{where}: the pose is no rotation (R^T R differs from 1 by {error:.3g}); "
-            "give camera-to-world matrices without scale or shear"
+            "give camera-to-world matrices without shear, and of one scale in all directions"
         )
     if not np.linalg.det(rotation) > 0:
         raise BadFile(f"{where}: the pose mirrors the world; flip one axis of its matrix")
@@ -231,7 +236,7 @@ def split_every_8th(photos: list[Photo]) -> list[Photo]:
     """Every 8th photo of each modality, by name, becomes a test photo; fewer than 3 all train."""
     tests = set()
     for name in {p.modality for p in photos}:
-        mine = sorted(p.path for p in photos if p.modality == name)
+        mine = sorted({p.path for p in photos if p.modality == name})  # once of a panorama
         tests |= set(mine[::TEST_EVERY]) if len(mine) >= 3 else set()
     return [replace(p, split="test" if p.path in tests else "train") for p in photos]
 

@@ -101,9 +101,14 @@ class PhotoFiles:
         depth = floats.pop(0) if flags & DEEP else None
         photo, masked = self.photos[number], bool(flags & MASKED)
         return LoadedPhoto(
-            view.divided(self.reader.factor), photo.modality, rgba, weight, str(photo.path), depth,
+            view.divided(self.reader.factor),
+            photo.modality,
+            rgba,
+            weight,
+            photo.name,
+            depth,
             masked,
-        )  # fmt: skip
+        )
 
     def write(self, number: int, photo: LoadedPhoto, stamp: bytes) -> None:
         """Keeps a photo; stamp: taken before its files were read.  Raises OSError."""
