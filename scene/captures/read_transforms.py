@@ -290,5 +290,5 @@ def photos_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path)
     depth, unit = None, 0.001
     if not is_panorama(lens):  # whose depth is measured along rays, not along a view
         depth, unit = depth_of(entry, shot.folder, photos[0].file_size, where)
-    each = {"mask": mask, "split": SPLITS[split], "depth": depth, "depth_unit": unit}
-    return [replace(photo, **each) for photo in photos]
+    split = SPLITS[split]
+    return [replace(p, mask=mask, split=split, depth=depth, depth_unit=unit) for p in photos]
