@@ -8,6 +8,7 @@ import numpy as np
 
 from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, clusters_of, find_unseen
 from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
 from shapeshift.rasterizer.project import (
     CULL_REASONS,
     LEAST_ALPHA,
@@ -62,7 +63,7 @@ def project_arena(
     device: Device, mean_opacity, covariance, color, object_index, world_from_object,
     cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
     into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (), second_color=None,
-    clusters: Clusters | None = None,
+    clusters: Clusters | None = None, pages: PageMap | None = None,
 ) -> list[Projected]:  # fmt: skip
     """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
 
@@ -78,10 +79,12 @@ def project_arena(
     ellipse, by sqrt(det / det with it) (Mip-Splatting's 2D filter, gsplat's "antialiased").
     clusters: boxes of the same arena, by which it leaves out what no view sees: not with
     keep_outside, and `into` must be the latest result that was made in its arrays.
+    pages: the rows that are drawn, in pages of mean_opacity and covariance; color, second_color and
+    object_index are theirs, N is their number.
     """
     limits = limits or Limits()
     sort = sort or SortFrames(tuple(camera.camera_from_world for camera in cameras))
-    count, views, orders = mean_opacity.shape[0], len(cameras), len(sort.camera_from_world)
+    count, views, orders = object_index.shape[0], len(cameras), len(sort.camera_from_world)
     if views not in (1, 2) or orders not in (0, 1, views):
         raise ValueError(f"project_arena takes 1 or 2 views and 0, 1 or as many sort frames, "
                          f"not {views} and {orders}.")  # fmt: skip
@@ -91,7 +94,7 @@ def project_arena(
     if into is None or not _fits(into, count, orders, grids):
         into = _room(device, count, orders, grids)
     poses = _poses(cameras, sort, world_from_object)
-    variant = {"VIEWS": views, "ORDERS": orders}
+    variant = {"VIEWS": views, "ORDERS": orders} | defines_of_pages(pages)
     if second_color is not None and views == 2:
         variant["OWN_COLORS"] = 1
     if any(antialiased):
@@ -111,8 +114,9 @@ def project_arena(
     device.launch(
         device.program(KERNEL, **variant)["project_arena"], len(scratch.status), 1,
         count, scratch.chunk, sort.by_distance, sort.keep_outside, unseen,
-        frame, mean_opacity, covariance, color, second_color,
-        object_index, *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
+        *(pages.arrays if pages else (None, None)), frame, mean_opacity, covariance, color,
+        second_color, object_index,
+        *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
     )  # fmt: skip
     return projected
 

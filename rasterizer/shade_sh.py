@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.paging.pages import PAGE
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -57,5 +58,25 @@ def shade_sh(
     x, y, z = (float(v) for v in eye)
     device.launch(
         kernel, -(-blocks // RUN), 1,
-        count, rows.start, RUN, x, y, z, mean_opacity, sh, wanted, color,
+        count, rows.start, RUN, x, y, z, mean_opacity, sh, wanted, None, None, color,
     )  # fmt: skip
+
+
+def shade_pages(
+    device: Device, sh: "Array", eye: np.ndarray, start: int, pages: tuple[np.ndarray, np.ndarray],
+    mean_opacity: "Array", color: "Array",
+) -> None:  # fmt: skip
+    """The same of pages: of an arena (n,) whose splats `sh` has, into pages that are drawn (n,).
+
+    Both begin at row `start`, of mean_opacity (N, 4) and of color (M, 4).
+    """
+    stored, drawn = pages
+    if len(stored):
+        kernel = device.program(KERNEL, COEFFICIENTS=sh.shape[1] // 3, PAGED=1, PAGE=PAGE)
+        lists = [device.constants(np.asarray(each, np.int32)) for each in (stored, drawn)]
+        x, y, z = (float(v) for v in eye)
+        count = PAGE * len(stored)
+        device.launch(
+            kernel["shade_sh"], -(-count // (LANES * RUN)), 1,
+            count, start, RUN, x, y, z, mean_opacity, sh, None, *lists, color,
+        )  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
 from shapeshift.rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
 from shapeshift.rasterizer.raster import FORMS, RasterFrame, defines_of, room_for_blocks
 
@@ -76,7 +77,7 @@ def resized_records(
 
 def surface_arena(
     device: Device, mean_opacity, covariance, object_index, world_from_object, camera: Camera,
-    projected: Projected,
+    projected: Projected, pages: PageMap | None = None,
 ) -> "Array":  # fmt: skip
     """(N, 8) float32 of an arena as project_arena takes it; the records' colours become normals.
 
@@ -84,14 +85,16 @@ def surface_arena(
     """
     poses = np.reshape(np.asarray(world_from_object, np.float64), (-1, 4, 4))
     rows = np.asarray(camera.camera_from_world, np.float64) @ poses  # (O, 4, 4)
-    count = mean_opacity.shape[0]
+    count = object_index.shape[0]
     out = device.empty((count, SURFACE))
-    kernel = device.program(KERNELS / "surface_arena.cl")["surface_arena"]
+    kernel = device.program(KERNELS / "surface_arena.cl", **defines_of_pages(pages))[
+        "surface_arena"
+    ]
     device.launch(
         kernel, count, GROUP,
         count, float(camera.near), device.constants(camera.packed()),
         device.upload(np.ascontiguousarray(rows[:, :3], np.float32).ravel()), mean_opacity,
-        covariance, object_index, projected.record, out,
+        covariance, object_index, pages and pages.sources, projected.record, out,
     )  # fmt: skip
     return out
 

@@ -31,6 +31,7 @@ class Drawing(ABC):
     sorts: int  # of the last frame, as order_age: see FrameStats
     order_age: int
     draws_heat: bool  # in addition to the colours, from the next frame on
+    shares_pages = False  # copies of an object may draw the same pages
 
     @abstractmethod
     def allocate(self, models: list[Model]) -> None:
@@ -43,9 +44,12 @@ class Drawing(ABC):
         self.allocate(models)
         return [False] * len(models)
 
-    def allocate_pages(self, models: list[Model], pages: int, coefficients: int) -> None:
+    def allocate_pages(
+        self, models: list[Model], pages: int, coefficients: int, stored: int | None = None
+    ) -> None:
         """The same, with pages of rasterizer/paging/pages.py for what a budget draws of models with
-        leaves (streaming/); coefficients: harmonics of each of their splats.
+        leaves (streaming/); coefficients: harmonics of each of their splats; stored: pages that
+        they lie in at first, where copies share them.
         """
         raise BadFile("only tiles draw by a budget; add --drawing tiles, or leave --budget out.")
 
@@ -56,6 +60,12 @@ class Drawing(ABC):
     def place_pages(self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats) -> None:
         """Splats (n PAGE,), of opacity 0 where there are none, into pages (n,) of objects (n,)."""
         raise TypeError("this drawing has no pages.")
+
+    def share_pages(self, pages: np.ndarray, owner: np.ndarray, like: np.ndarray) -> None:
+        """Draws in pages (n,) of objects (n,) the splats of pages `like` (n,).  Where one of these
+        objects is changed later, it has splats of its own from then on.
+        """
+        raise TypeError("this drawing shares no pages.")
 
     def clear_pages(self, pages: np.ndarray) -> None:
         """Nothing is in these pages any more."""

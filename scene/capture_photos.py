@@ -70,11 +70,13 @@ def doubts_of(
     photos: list[Photo],
     rescaled: list[str],
     no_depth: Sequence[str] = (),
+    no_normals: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """What a person should know of a capture's files, a sentence each.
 
     named: photos that the capture names, of which the files `missing` are not there; rescaled:
-    photos of another size than it says; no_depth: photos whose depth photo is not there.
+    photos of another size than it says; no_depth, no_normals: photos whose depth photo or
+    normal map is not there.
     """
     said = []
     if missing:
@@ -91,6 +93,11 @@ def doubts_of(
         said.append(
             f"{len(no_depth)} depth photos are not there, for example of "
             f"{path_end(no_depth[0])}; those photos are used without."
+        )
+    if no_normals:
+        said.append(
+            f"{len(no_normals)} normal maps are not there, for example of "
+            f"{path_end(no_normals[0])}; those photos are used without."
         )
     faces = [photo for photo in photos if is_panorama(photo.lens)]
     if faces:

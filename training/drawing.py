@@ -17,7 +17,7 @@ from shapeshift.rasterizer.surface import (
 )
 from shapeshift.scene.pose import View
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.depth_loss import DepthTerm
+from shapeshift.training.losses.normal_loss import ShapeTerm
 
 Color = tuple[float, float, float]
 Timed = Callable[[str], AbstractContextManager]  # of a pass, by its name
@@ -73,13 +73,13 @@ def draw_splats(
 
 
 def splats_backward(
-    device, drawing: DrawnView, grad_image, depth: DepthTerm | None = None, timed: Timed = untimed,
+    device, drawing: DrawnView, grad_image, depth: ShapeTerm | None = None, timed: Timed = untimed,
     **asked: Any,
 ) -> tuple[Gaussians, object]:  # fmt: skip
     """Gradients of the splats and (N, 12) of the records by those of the image.
 
-    depth: what is to be learned from a depth photo, for a drawing that has depth.  asked: what
-    rasterize_backward is to give besides them.
+    depth: what is to be learned from a depth photo or a normal map, for a drawing that has depth.
+    asked: what rasterize_backward is to give besides them.
     """
     drawn = None if depth is None else drawing.depth_frame
     with timed("rasterize backward"):
@@ -88,7 +88,7 @@ def splats_backward(
                 device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None, **asked
             )
         else:
-            by_metres, by_through = depth.loss.compare(drawn, depth.target, depth.share)
+            by_metres, by_through = depth.compare(drawn)
             grad_record, by_surface = rasterize_depth_backward(
                 device, drawing.projected, drawing.tiles, drawn, grad_image, by_through,
                 by_metres, **asked,

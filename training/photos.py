@@ -12,6 +12,7 @@ from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.lens_resampling import LEAST_PHOTOS
+from shapeshift.scene.captures.normal_photo import load_normals
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.pose import View
 
@@ -30,14 +31,24 @@ class LoadedPhoto:
     name: str  # of the file
     depth: np.ndarray | None = None  # (H, W) float32 metres along the view, 0 = not known
     masked: bool = False  # whether it came with a mask or an alpha channel
+    normals: np.ndarray | None = None  # (H, W, 4) int8, as load_normals gives them
 
     @property
     def has_depth(self) -> bool:
         return self.depth is not None
 
     @property
+    def has_normals(self) -> bool:
+        return self.normals is not None
+
+    @property
+    def kind(self) -> tuple:
+        """What its steps are compiled for."""
+        return self.view.size, self.has_depth, self.has_normals
+
+    @property
     def bytes(self) -> int:
-        arrays = (self.rgba, self.weight, self.depth)
+        arrays = (self.rgba, self.weight, self.depth, self.normals)
         return sum(array.nbytes for array in arrays if array is not None)
 
     def in_memory(self) -> "LoadedPhoto":
@@ -80,7 +91,8 @@ def memory_of(photos: tuple[Photo, ...], factor: int) -> int:
 
 def bytes_a_pixel(photo: Photo) -> int:
     weighted = photo.mask is not None or photo.lens is not None
-    return 4 + 4 * weighted + 4 * (photo.depth is not None)
+    mapped = (photo.depth is not None) + (photo.normals is not None)
+    return 4 + 4 * weighted + 4 * mapped
 
 
 def memory_for_photos() -> int:
@@ -106,11 +118,14 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
         weight = np.where(lost, np.float32(0), np.float32(1) if weight is None else weight)
     rgba = np.concatenate([rgb, alpha[..., None]], axis=2)
     depth = None if photo.depth is None else load_depth(photo, factor)
-    if depth is not None:  # nothing is known of what does not count
-        seen = alpha >= 128 if weight is None else (weight >= 0.5) & (alpha >= 128)
-        depth = np.where(seen, depth, np.float32(0))
+    normals = None if photo.normals is None else load_normals(photo, factor)
+    # Nothing is known of what does not count.
+    seen = alpha >= 128 if weight is None else (weight >= 0.5) & (alpha >= 128)
+    for values in (depth, normals):
+        if values is not None:
+            values[~seen] = 0
     view, masked = photo.view.divided(factor), mask is not None
-    return LoadedPhoto(view, photo.modality, rgba, weight, photo.name, depth, masked)
+    return LoadedPhoto(view, photo.modality, rgba, weight, photo.name, depth, masked, normals)
 
 
 @dataclass(frozen=True)

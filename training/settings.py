@@ -1,9 +1,12 @@
 """Every number that a training run can be asked for: what `train` offers, and what a run keeps."""
 
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from shapeshift.training.heads.networks import HeadLayout
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Poses = Literal["stated", "refine"]
 Masks = Literal["object", "valid", "ignore"]
@@ -94,6 +97,8 @@ class TrainSettings:
     Default: none, all five see x."""
     depth_share: float = 0.3
     """Weight of the depth loss where photos have depth photos; 0: those are not used."""
+    normal_share: float = 0.1
+    """Weight of the loss of directions where photos have normal maps; 0: those are not used."""
     min_scale_px: float = 0.0
     """Splats are not made smaller than so many pixels (one sigma) of the photo that sees a place
     finest.  0.45 is for scenes that are looked at from closer than they were photographed;
@@ -119,7 +124,7 @@ class TrainSettings:
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
             "hidden": 1, "max_anchors": 1, "grow_every": 1, "downscale": 1, "depth_share": 0,
-            "max_mb": 1e-6, "blended_shapes": 0, "min_scale_px": 0,
+            "normal_share": 0, "max_mb": 1e-6, "blended_shapes": 0, "min_scale_px": 0,
         }  # fmt: skip
         check_numbers(self, least, ("blended_shapes",))
         self.layout(2)
@@ -149,9 +154,10 @@ class TrainSettings:
 
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
+Kind = TypeVar("Kind", bound="DataclassInstance")  # TrainSettings, or PlainSettings
 
 
-def adjusted(settings: TrainSettings, asked: dict[str, Any]) -> TrainSettings:
+def adjusted(settings: Kind, asked: dict[str, Any]) -> Kind:
     """The settings with the values that were asked for, by name.
 
     A budget of one kind takes the place of the other.  Raises ValueError, one sentence.
@@ -162,13 +168,14 @@ def adjusted(settings: TrainSettings, asked: dict[str, Any]) -> TrainSettings:
     return replace(settings, **(asked | more))
 
 
-def resumed(before: dict[str, Any], asked: dict[str, Any], said: str = "") -> TrainSettings:
+def resumed(usual: Kind, before: dict[str, Any], asked: dict[str, Any], said: str = "") -> Kind:
     """A checkpoint's settings with another budget.  Raises ValueError for anything else, and for a
     checkpoint of another version.
 
-    said: what stands before a name where it is typed, as --.
+    usual: settings of the kind that it has to be of; said: what stands before a name where it is
+    typed, as --.
     """
-    if other := sorted(before.keys() ^ {field.name for field in fields(TrainSettings)}):
+    if other := sorted(before.keys() ^ {field.name for field in fields(usual)}):
         raise ValueError(
             f"{said}resume: the checkpoint was written by another version of this program, which "
             f"trains in another way ({other[0]}); train anew without {said}resume."
@@ -180,4 +187,4 @@ def resumed(before: dict[str, Any], asked: dict[str, Any], said: str = "") -> Tr
             f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
         )
     budget = {name: asked[name] for name in BUDGET if name in asked}
-    return adjusted(TrainSettings(**before), budget)
+    return adjusted(replace(usual, **before), budget)

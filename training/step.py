@@ -13,10 +13,10 @@ from shapeshift.training.drawing import Color, DrawnView, draw_splats, splats_ba
 from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import HeadLayout, Heads
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthTerm
 from shapeshift.training.losses.losses import ImageLoss, Target
 from shapeshift.training.losses.min_opacity import SHARE, add_min_opacity_gradient
 from shapeshift.training.losses.min_scale import MinScale
+from shapeshift.training.losses.normal_loss import ShapeTerm
 
 
 class TrainingStep:
@@ -69,7 +69,7 @@ class TrainingStep:
         loss: ImageLoss,
         target: Target,
         stats: DensificationStats | None = None,
-        depth: DepthTerm | None = None,
+        depth: ShapeTerm | None = None,
         min_opacity_share: float = SHARE,
     ) -> dict[str, object]:
         """Gradients of the loss by what the optimiser holds, under its names.

@@ -226,7 +226,7 @@ class Trainer(Run):
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
-            whole = {(p.view.size, p.has_depth): p for p in photos}.values()
+            whole = {photo.kind: photo for photo in photos}.values()
             for photo in whole:
                 self.step.update(self.photo_gradients(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()
@@ -242,7 +242,7 @@ class Trainer(Run):
     ) -> dict[str, object]:
         """Gradients of how a photo differs.  shapes: None for those of its stop."""
         self.stats.stop = stop = [s.name for s in self.stops].index(photo.modality)
-        depth, rows = self.targets.depth_term(photo, self.settings.depth_share), None
+        depth, rows = self.targets.shape_term(photo, self.settings), None
         view = self.poses.view(photo)
         if shapes is None:
             control = self.control(photo.modality)
@@ -263,7 +263,7 @@ class Trainer(Run):
         aside, collected = self.poses.probe(photo, fraction), self.step.pose_gradient
         if aside is None or collected is None:
             return
-        depth = self.targets.depth_term(photo, self.settings.depth_share)
+        depth = self.targets.shape_term(photo, self.settings)
         view, control = self.poses.view(photo, aside), self.control(photo.modality)
         drawing = self.step.draw(view, control, background, depth is not None)
         target = self.targets.target(photo, background, self.exposures)

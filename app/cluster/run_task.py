@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -13,7 +14,7 @@ from contextlib import contextmanager
 from typing import IO
 
 from shapeshift.app.cluster.child import GRACE_S
-from shapeshift.app.cluster.task import Task
+from shapeshift.app.cluster.task import Task, is_of_code_here
 from shapeshift.app.errors import UsageError
 from shapeshift.app.program import ROOT, is_installed
 from shapeshift.app.progress import PERIOD
@@ -27,6 +28,10 @@ LINES_EVERY_S = 2.0  # of a task's progress
 LOOK_S = 0.5  # between looks at what else may end a task
 CREATE_NO_WINDOW = 0x08000000  # of Windows
 BAD_INPUT, FAULT = 2, 3  # exit codes with a sentence
+OTHER_CODE = (
+    "the program's code on {host} is another than that of the command that hands out the tasks; "
+    "have the same on all machines, and start the command again."
+)
 Hear = Callable[[str], None]  # a line of the task's standard error
 
 
@@ -44,25 +49,49 @@ def run_task(task: Task, key: str, hear: Hear, wanted: Callable[[], bool] = lamb
     key: `task.key()` of who hands it out.  Raises TaskFailed, and TaskStopped once not `wanted`;
     also after Ctrl-C no process of the task is left.
     """
+
+    def in_a_process(words: tuple[str, ...], note: int) -> bool:
+        child = start(task, words, note)
+        said = follow(child, task.argv[0], hear, wanted)
+        if child.returncode != 0:
+            raise TaskFailed(f"{task.name}: {why_failed(task, child.returncode, said)}")
+        return True
+
+    do_once(task, key, in_a_process, hear, wanted)
+
+
+def do_once(
+    task: Task, key: str, work: Callable[[tuple[str, ...], int], bool], hear: Hear,
+    wanted: Callable[[], bool] = lambda: True,
+) -> bool:  # fmt: skip
+    """Whether the task is done: before, by another attempt, or now by `work`.
+
+    work: given the words of this attempt, and the handle of its note; False where it was ended
+    early.  The rest as run_task.
+    """
     if task.is_done(key):
-        return
+        return True
+    if not is_of_code_here(key):
+        raise TaskFailed(f"{task.name}: {OTHER_CODE.format(host=socket.gethostname())}")
     for path in (task.writes[0], str(task.begun_note)):
         os.makedirs(os.path.dirname(path), exist_ok=True)
     with alone(task, hear, wanted) as note:
         if task.is_done(key):
-            return
+            return True
         begun = read_key(note)
         words = task.words(begun if begun == key else "")
         write_key(note, key)
-        child = start(task, words, note.fileno())
-        said = follow(child, task.argv[0], hear, wanted)
-        if child.returncode != 0:
-            raise TaskFailed(f"{task.name}: {why_failed(task, child.returncode, said)}")
+        if not work(words, note.fileno()):
+            return False
         lacking = [path for path in task.writes if not os.path.exists(path)]
         if lacking:
             raise TaskFailed(f"{task.name}: ended well, yet {lacking[0]} is not there.")
-        task.note_done(key)
+        if is_of_code_here(key):
+            task.note_done(key)
+        else:  # nobody knows which parts of it were done by which
+            hear("the program's code was changed meanwhile: a later start does it anew")
         task.begun_note.unlink(missing_ok=True)
+    return True
 
 
 def why_failed(task: Task, code: int, said: str) -> str:

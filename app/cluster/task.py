@@ -11,11 +11,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from shapeshift.app.cluster.digests import code_digest, digest_of, own_code
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.files.json_fields import saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 
 MOST_BYTES = 1 << 16  # of a note
+CODE_DIGITS = 24  # of a key's 64
 DONE, BEGUN = ".done.json", ".begun.json"  # notes beside the first file that is written
 
 
@@ -57,14 +59,14 @@ class Task:
         return Path(self.writes[0] + ending)
 
     def key(self) -> str:
-        """A hash of the command and of what it reads; where the files lie is not in it."""
-        from shapeshift.app.program import version
-
+        """A hash of the command, of what it reads and of the program's code, which is its
+        beginning (`is_of_code_here`); where the files lie is not in it."""
         places = {path: f"<read {i}>" for i, path in enumerate(self.reads)}
         places |= {path: f"<write {i}>" for i, path in enumerate(self.writes)}
         words = [places.get(word, word) for word in self.argv]
         inputs = [digest_of(Path(path)) for path in self.reads]
-        return hashlib.sha256(json.dumps([version(), words, inputs]).encode()).hexdigest()
+        work = hashlib.sha256(json.dumps([words, inputs]).encode()).hexdigest()
+        return own_code()[:CODE_DIGITS] + work[CODE_DIGITS:]
 
     def is_done(self, key: str) -> bool:
         """Whether this very task, by its key, has left all that it writes."""
@@ -81,6 +83,11 @@ class Task:
         return (*self.argv, *self.resume) if goes_on else self.argv
 
 
+def is_of_code_here(key: str) -> bool:
+    """Whether the code that lies on this machine now is that of a task's key."""
+    return key.startswith(code_digest()[:CODE_DIGITS])
+
+
 def forget(tasks: Iterable[Task]) -> None:
     """Takes the notes of tasks away, and their folders of notes where nothing else is in them."""
     for task in tasks:
@@ -92,20 +99,3 @@ def forget(tasks: Iterable[Task]) -> None:
 def is_task() -> bool:
     """Whether this process does a task: who reads its words cannot type what comes next."""
     return "SHAPESHIFT_TASK" in os.environ
-
-
-_digests: dict[tuple[str, int, int], str] = {}  # by path, bytes and time
-
-
-def digest_of(path: Path) -> str:
-    """A hash of a file's bytes, or of all files of a folder with their names."""
-    if path.is_dir():
-        found = sorted(file for file in path.rglob("*") if file.is_file())
-        rows = [[file.relative_to(path).as_posix(), digest_of(file)] for file in found]
-        return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
-    stat = path.stat()
-    known = (str(path), stat.st_size, stat.st_mtime_ns)
-    if known not in _digests:
-        with path.open("rb") as file:
-            _digests[known] = hashlib.file_digest(file, "sha256").hexdigest()
-    return _digests[known]

@@ -1,7 +1,7 @@
 """launch.py table: one shape-shifting model compared with separate models and plain splats."""
 
 import os
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -9,9 +9,8 @@ from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf, Opt
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
-from shapeshift.app.progress import working
 from shapeshift.app.terminal import say
-from shapeshift.app.training.run_loop import INTERRUPTED, READING
+from shapeshift.app.training.run_loop import INTERRUPTED
 from shapeshift.app.training.table_rows import MEAN, NAMES, TableRow, VggRow, finish, mean_row
 from shapeshift.app.training.train_options import OF_SPLATS, Asked, MachineOptions
 from shapeshift.app.training.train_options import Options as TrainOptions
@@ -74,7 +73,7 @@ def run(options: Options) -> int:
     from shapeshift.app.charts.chart_rows import RowsFile
     from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.training.table_parts import train_by_cluster
+    from shapeshift.app.training.table_parts import train_by_cluster, train_here
     from shapeshift.rasterizer.device import open_device
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.evaluation.vgg_distance import VggDistance
@@ -119,9 +118,9 @@ def run(options: Options) -> int:
             runs = pack_splats(capture, options.out, table.rows)
         else:
             say(f"{NAMES[method]}:")
-            runs = train_method(method, device, capture, options, rig)
+            runs = train_here(method, device, capture, options, train_options(method, options), rig)
         if runs is None:
-            say(f"{options.out}: interrupted; the same command goes on with this method.")
+            say(f"{options.out}: interrupted; the same command goes on.")
             return INTERRUPTED
         for row in rows_of(method, device, capture, options, runs, distance):
             table.add(row)
@@ -177,44 +176,6 @@ def offset_of(device, capture: "Capture", options: Options) -> str:
         settings = settings_of(train_options("joint", options).asked)
         write_text(kept, calibrated(device, capture, settings, options.calibrate).rig)
     return kept.read_text(encoding="utf-8")
-
-
-def train_method(
-    method: str, device, capture: "Capture", options: Options, rig: str
-) -> "dict[str, TrainedFile] | None":
-    """What the training of each modality's model left behind; None where Ctrl-C ended it early.
-
-    rig: of TrainSettings, what the capture's cameras were moved by.
-    """
-    from shapeshift.app.training.run_loop import describe, train
-    from shapeshift.app.training.train_baselines import (
-        plain_settings,
-        train_separate,
-        train_splats,
-        trained_file,
-    )
-    from shapeshift.app.training.train_options import settings_of
-    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
-    from shapeshift.training.train import Trainer
-
-    asked, out = train_options(method, options), options.out / PLACES[method]
-    if method == "splats":
-        outcome = train_splats(device, capture, plain_settings(asked), out)
-    elif method == "separate":
-        settings = replace(settings_of(asked.asked), rig=rig)
-        outcome = train_separate(device, capture, settings, out)
-    else:
-        refuse_foreign(out)
-        wished = replace(settings_of(asked.asked), rig=rig)
-        with working(READING) as report:
-            trainer = Trainer(device, capture, wished, report=report)
-        say(describe(trainer), *trainer.warnings)
-        if train(trainer):
-            return None
-        write_package(trainer.model(), out)
-        one = trained_file(out, trainer)
-        return {stop.name: one for stop in capture.stops}
-    return None if outcome.interrupted else outcome.runs
 
 
 def pack_splats(capture: "Capture", out: Path, rows: list[TableRow]) -> "dict[str, TrainedFile]":

@@ -6,24 +6,24 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.cluster.open_cluster import NONE, open_cluster
+from shapeshift.app.cluster.run_task import do_once
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.cluster.words import words_for
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name, full
-from shapeshift.app.progress import working
 from shapeshift.app.terminal import say
-from shapeshift.app.training.run_loop import READING, describe, train
 from shapeshift.app.training.train_baselines import (
+    ModelRun,
     TrainedFile,
-    describe_plain,
+    anchors_run,
     plain_settings,
-    result_line,
     share_of,
+    splats_run,
+    train_model,
 )
 from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.app.training.train_options import settings_of
@@ -63,7 +63,8 @@ class TablePart:
         from shapeshift.runtime_models.files.json_fields import saved_object
 
         facts = saved_object(self.trained, MOST_BYTES)
-        return TrainedFile(self.file, float(facts.get("seconds", 0.0)), int(facts.get("steps", 0)))
+        seconds, start_s = (float(facts.get(name, 0.0)) for name in ("seconds", "start_s"))
+        return TrainedFile(self.file, seconds, int(facts.get("steps", 0)), start_s)
 
 
 def parts_of(capture: "Capture", out: Path, methods: Sequence[str]) -> list[TablePart]:
@@ -99,89 +100,94 @@ def train_part(part: TablePart, device, capture: "Capture", asked: TrainOptions,
     asked: as of train; rig: of TrainSettings, what the capture's cameras were moved by; resume: go
     on from the checkpoint of an earlier attempt.
     """
+    from shapeshift.app.training.saving import save_checkpoint
     from shapeshift.runtime_models.files.whole_file import write_whole
+    from shapeshift.training.baselines.plain import one_modality
+    from shapeshift.training.checkpoint import read_checkpoint
 
+    run = run_of(part, capture, asked, rig)
     part.file.parent.mkdir(parents=True, exist_ok=True)
     part.notes.mkdir(parents=True, exist_ok=True)
-    plain = part.method == "splats"
-    trained = train_splats_part if plain else partial(train_anchors_part, rig=rig, resume=resume)
-    facts = trained(part, device, capture, asked)
-    if facts is None:
+    state = read_checkpoint(part.checkpoint) if resume else None
+    photos = one_modality(capture, part.modality) if part.modality else capture
+    trainer, interrupted = train_model(device, photos, run, part.checkpoint, state)
+    if interrupted:
+        save_checkpoint(trainer, part.checkpoint)
         return False
+    run.write(trainer, part.file)
+    part.checkpoint.unlink(missing_ok=True)
+    facts = {"seconds": trainer.seconds, "steps": trainer.iteration, "start_s": trainer.start_s}
     write_whole(part.trained, json.dumps(facts).encode() + b"\n")
     return True
 
 
-def train_splats_part(
-    part: TablePart, device, capture: "Capture", asked: TrainOptions
-) -> dict | None:
-    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-    from shapeshift.training.baselines.plain import PlainTrainer, one_modality
+def run_of(part: TablePart, capture: "Capture", asked: TrainOptions, rig: str) -> ModelRun:
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
 
-    settings = share_of(plain_settings(asked), capture)
-    with working(READING) as report:
-        trainer = PlainTrainer(device, one_modality(capture, part.modality), settings, report)
-    say(describe_plain(trainer), *trainer.warnings)
-    if train(trainer):
-        return None
-    write_ply(trainer.splats(), part.file)
-    say(result_line(trainer, trainer.count), *trainer.exposures.warnings())
-    return {"seconds": trainer.elapsed, "steps": trainer.iteration}
-
-
-def train_anchors_part(
-    part: TablePart, device, capture: "Capture", asked: TrainOptions, rig: str, resume: bool
-) -> dict | None:
-    from shapeshift.app.training.saving import save_checkpoint
-    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
-    from shapeshift.training.baselines.plain import one_modality
-    from shapeshift.training.checkpoint import read_checkpoint
-    from shapeshift.training.train import Trainer
-
+    if part.method == "splats":
+        plain = share_of(plain_settings(asked), capture)
+        return splats_run(plain, asked.asked | asked.splats)
     refuse_foreign(part.file)
     settings = replace(settings_of(asked.asked), rig=rig)
-    if part.modality:
-        settings = share_of(settings, capture)
-        capture = one_modality(capture, part.modality)
-    state = read_checkpoint(part.checkpoint) if resume else None
-    with working(READING) as report:
-        trainer = Trainer(device, capture, settings, state, report=report)
-    say(describe(trainer), *trainer.warnings)
-    save = partial(save_checkpoint, trainer, part.checkpoint)
-    if train(trainer, save):
-        save()
-        return None
-    write_package(trainer.model(), part.file)
-    part.checkpoint.unlink(missing_ok=True)
-    say(result_line(trainer, trainer.anchors_count), *trainer.exposures.warnings())
-    return {"seconds": trainer.elapsed, "steps": trainer.iteration}
+    return anchors_run(share_of(settings, capture) if part.modality else settings, asked.asked)
+
+
+def train_here(
+    method: str, device, capture: "Capture", options: Any, asked: TrainOptions, rig: str
+) -> dict[str, TrainedFile] | None:
+    """What the training of each modality's model left; None where Ctrl-C ended it early.
+
+    What an earlier start has trained stays, and what it began goes on, also if that was by a
+    cluster.
+    """
+    parts = parts_of(capture, options.out, (method,))
+    refuse_foreign_splats(parts, options.out)
+    for part in parts:
+        task = task_of(part, options)
+
+        def work(words: tuple[str, ...], note: int, part=part, task=task) -> bool:
+            return train_part(part, device, capture, asked, rig, resume=words != task.argv)
+
+        if not do_once(task, task.key(), work, say):
+            return None
+    return results_of(parts, capture, options.out)[method]
+
+
+def refuse_foreign_splats(parts: Sequence[TablePart], out: Path) -> None:
+    """Raises BadFile where splats would go into a folder of others: now, not after the training."""
+    from shapeshift.runtime_models.splats.layers.write_layer_list import refuse_other_folder
+
+    splats = [part for part in parts if part.method == "splats"]
+    if splats and not any(part.trained.exists() for part in splats):
+        refuse_other_folder(out / "splats")
+
+
+def results_of(
+    parts: Sequence[TablePart], capture: "Capture", out: Path
+) -> dict[str, dict[str, TrainedFile]]:
+    """method: modality: what its training left; splats get their layers.json."""
+    from shapeshift.runtime_models.splats.layers.write_layer_list import write_list
+
+    runs: dict[str, dict[str, TrainedFile]] = {}
+    for part in parts:
+        names = [part.modality] if part.modality else [stop.name for stop in capture.stops]
+        runs.setdefault(part.method, {}).update({name: part.result() for name in names})
+    if names := [part.file.name for part in parts if part.method == "splats"]:
+        write_list(capture.stops, names, out / "splats")
+    return runs
 
 
 def train_by_cluster(
     capture: "Capture", options: Any, methods: Sequence[str]
 ) -> dict[str, dict[str, TrainedFile]]:
     """method: modality: what its training left, of all models by the workers of --cluster."""
-    from shapeshift.runtime_models.splats.layers.write_layer_list import (
-        refuse_other_folder,
-        write_list,
-    )
-
-    parts, out = parts_of(capture, options.out, methods), options.out / "splats"
-    begun = any(part.trained.exists() for part in parts if part.method == "splats")
-    if "splats" in methods and not begun:
-        refuse_other_folder(out)  # now, not after the training
+    parts = parts_of(capture, options.out, methods)
+    refuse_foreign_splats(parts, options.out)
     if options.seconds is not None:
         say("With --seconds a faster worker gets further; --iterations gives the same bytes.")
     with open_cluster(options.cluster, options.certificates, options.gpus) as cluster:
         cluster.run([task_of(part, options) for part in parts])
-    runs: dict[str, dict[str, TrainedFile]] = {}
-    for part in parts:
-        names = [part.modality] if part.modality else [stop.name for stop in capture.stops]
-        runs.setdefault(part.method, {}).update({name: part.result() for name in names})
-    if "splats" in methods:
-        names = [part.file.name for part in parts if part.method == "splats"]
-        write_list(capture.stops, names, out)
-    return runs
+    return results_of(parts, capture, options.out)
 
 
 def task_of(part: TablePart, options: Any) -> Task:
@@ -193,10 +199,8 @@ def task_of(part: TablePart, options: Any) -> Task:
     reads = [full(options.capture)]
     if options.calibrate is not None:
         reads.append(full(options.out / "rig.json"))
-    resumes = part.method != "splats"
     return Task(
         part.name, words_for("table", words), tuple(reads), (full(part.file), full(part.trained)),
         {"gpu": 1} if options.device == "gpu" else {},
-        full(part.checkpoint) if resumes else "", ("--resume",) if resumes else (),
-        full(part.notes),
+        full(part.checkpoint), ("--resume",), full(part.notes),
     )  # fmt: skip

@@ -53,11 +53,6 @@ def run_whole(options: Options) -> int:
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.training.calibration.extrinsics import with_extrinsics
-    from shapeshift.training.calibration.outlier_views import (
-        failed_modalities,
-        find_outlier_views,
-        report,
-    )
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.train import Trainer
 
@@ -91,13 +86,14 @@ def run_whole(options: Options) -> int:
         pace_package(options.out)
     more = [*refined(trainer, options.out), *trainer.exposures.warnings()]
     say(summary(trainer, options.out, interrupted), *more)
-    lines = what_next(options, trainer.iteration, step_s, interrupted)
+    lines, ended = what_next(options, trainer.iteration, step_s, interrupted), False
     if not interrupted:
-        lines = [*(failed_modalities(trainer) or report(find_outlier_views(trainer))), *lines]
+        found, ended = doubts(trainer)
+        lines = [*found, *lines]
     if lines:
         say(*lines)
     trainer.photos.close(keep=interrupted)
-    return INTERRUPTED if interrupted else 0
+    return INTERRUPTED if interrupted or ended else 0
 
 
 def part_in_blocks(options: Options) -> Callable[[Options], int] | None:
@@ -143,6 +139,24 @@ def check_plain_options(options: Options) -> None:
     for name in options.splats:
         option = f"--{name.replace('_', '-')}"
         raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
+
+
+def doubts(trainer: "Trainer") -> tuple[list[str], bool]:
+    """What the photos say against a finished scene, and whether Ctrl-C ended the look at them."""
+    from shapeshift.app.progress import tracked
+    from shapeshift.training.calibration.outlier_views import (
+        failed_modalities,
+        find_outlier_views,
+        report,
+    )
+
+    try:
+        if lost := failed_modalities(trainer):
+            return lost, False
+        look = partial(tracked, what="looking for photos that do not fit")
+        return report(find_outlier_views(trainer, look)), False
+    except KeyboardInterrupt:
+        return ["The scene is complete; not every photo was looked at for what does not fit."], True
 
 
 def what_next(options: Options, steps: int, step_s: float, interrupted: bool) -> list[str]:

@@ -1,8 +1,10 @@
 """train --model splats and --separate: what a shape-shifting model is compared with."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import open_capture
@@ -18,9 +20,11 @@ from shapeshift.app.training.run_loop import (
     train,
     used,
 )
-from shapeshift.app.training.train_options import Options, settings_of
+from shapeshift.app.training.train_options import Asked, Options, settings_of
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.baselines.plain import PlainTrainer
     from shapeshift.training.baselines.plain_settings import PlainSettings
@@ -29,6 +33,7 @@ if TYPE_CHECKING:
     from shapeshift.training.train import Trainer
 
     Kind = TypeVar("Kind", TrainSettings, PlainSettings)
+    Checkpoint = tuple[dict[str, np.ndarray], dict]
 
 
 @dataclass(frozen=True)
@@ -66,11 +71,6 @@ def run_baseline(options: Options, room: "PhotoRoom") -> int:
     from shapeshift.rasterizer.device import open_device
     from shapeshift.training.calibration.extrinsics import with_extrinsics
 
-    if options.resume:
-        raise UsageError(
-            "--resume goes on with the one shape-shifting model; --model splats and --separate "
-            "train several models and begin anew."
-        )
     if options.separate and options.model == "splats":
         raise UsageError("plain splats are one model a modality already; leave out --separate.")
     plain = plain_settings(options) if options.model == "splats" else None
@@ -79,13 +79,24 @@ def run_baseline(options: Options, room: "PhotoRoom") -> int:
     say(f"{device.name}, {device.platform}")
     if settings is not None and options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-        capture = with_extrinsics(capture, settings.rig)
     if plain is not None:
-        outcome = train_splats(device, capture, plain, options.out, room)
+        outcome = train_splats(device, capture, options, plain, room)
     elif settings is not None:
-        outcome = train_separate(device, capture, settings, options.out, room)
+        rig = rig_of_checkpoints(capture, options) if options.resume else settings.rig
+        capture = with_extrinsics(capture, rig)
+        outcome = train_separate(device, capture, options, settings, room)
     say(outcome_line(outcome, capture, options.out))
     return INTERRUPTED if outcome.interrupted else 0
+
+
+def rig_of_checkpoints(capture: "Capture", options: Options) -> str:
+    """TrainSettings.rig of the models that --resume goes on with."""
+    from shapeshift.training.checkpoint import read_checkpoint
+
+    for file in files_of(capture, options.out, ".shift"):
+        if (path := checkpoint_of(options.out, file)).exists():
+            return read_checkpoint(path)[1]["settings"].get("rig", "")
+    return ""
 
 
 def plain_settings(options: Options) -> "PlainSettings":
@@ -120,81 +131,154 @@ def share_of(settings: "Kind", capture: "Capture") -> "Kind":
     )
 
 
-def train_splats(
-    device,
-    capture: "Capture",
-    settings: "PlainSettings",
-    out: Path,
-    room: "PhotoRoom | None" = None,
-) -> Outcome:
-    """Plain splats of every modality into the folder `out`: a PLY each and layers.json."""
-    from shapeshift.runtime_models.splats.layers.write_layer_list import (
-        layer_name,
-        refuse_other_folder,
-        write_layer_list,
-    )
-    from shapeshift.training.baselines.plain import PlainTrainer, one_modality
+@dataclass(frozen=True)
+class ModelRun:
+    """How runs of one kind of model begin, and what they leave."""
 
+    begin: Callable[..., Any]  # (device, capture, checkpoint | None, report, room) -> its trainer
+    describe: Callable[[Any], str]
+    write: Callable[[Any, Path], object]  # the trainer's model into a file
+    count: str  # what the trainer calls the number of its primitives
+
+
+def splats_run(settings: "PlainSettings", asked: Asked) -> ModelRun:
+    """asked: what of the settings was given by name, which a checkpoint has to agree with."""
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+    from shapeshift.training.baselines.plain import PlainTrainer
+
+    def begin(device, part: "Capture", state: "Checkpoint | None", report, room) -> "PlainTrainer":
+        chosen = begun_or_resumed(settings, asked, state)
+        return PlainTrainer(device, part, chosen, report, room, state)
+
+    def write(trainer: "PlainTrainer", file: Path) -> None:
+        write_ply(trainer.splats(), file)
+
+    return ModelRun(begin, describe_plain, write, "count")
+
+
+def anchors_run(settings: "TrainSettings", asked: Asked) -> ModelRun:
+    """The same for anchor models."""
+    from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.training.train import Trainer
+
+    def begin(device, part: "Capture", state: "Checkpoint | None", report, room) -> "Trainer":
+        chosen = begun_or_resumed(settings, asked, state)
+        return Trainer(device, part, chosen, state, report=report, room=room)
+
+    def write(trainer: "Trainer", file: Path) -> None:
+        write_package(trainer.model(), file)
+
+    return ModelRun(begin, describe, write, "anchors_count")
+
+
+def begun_or_resumed(settings: "Kind", asked: Asked, state: "Checkpoint | None") -> "Kind":
+    """The settings, or those of a checkpoint with their budget.  Raises UsageError."""
+    from shapeshift.training.settings import resumed
+
+    if state is None:
+        return settings
+    given = {name: getattr(settings, name) for name in asked if name != "rig"}
+    given = {name: value for name, value in given.items() if value is not None}
+    try:
+        return resumed(settings, state[1]["settings"], given, "--")
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+def train_model(
+    device, capture: "Capture", run: ModelRun, checkpoint: Path, state: "Checkpoint | None",
+    room: "PhotoRoom | None" = None,
+) -> tuple[Any, bool]:  # fmt: skip
+    """(the trainer after its run, whether Ctrl-C ended it early).
+
+    checkpoint: written on the way; state: what an earlier run left there.
+    """
+    from shapeshift.app.training.saving import save_checkpoint
+
+    with working(READING) as report:
+        trainer = run.begin(device, capture, state, report, room)
+    say(run.describe(trainer), *trainer.warnings)
+    interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
+    say(result_line(trainer, getattr(trainer, run.count)), *trainer.exposures.warnings())
+    return trainer, interrupted
+
+
+def train_splats(
+    device, capture: "Capture", options: Options, settings: "PlainSettings", room: "PhotoRoom"
+) -> Outcome:
+    """Plain splats of every modality into the folder --out: a PLY each and layers.json."""
+    from shapeshift.runtime_models.splats.layers.write_layer_list import (
+        refuse_other_folder,
+        write_list,
+    )
+
+    out = options.out
     refuse_other_folder(out)  # now, not after the training
-    settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
-    layers, runs, interrupted = [], {}, False
-    for number, part in enumerate(parts):
-        with working(READING) as report:
-            trainer = PlainTrainer(device, part, settings, report, room)
-        say(describe_plain(trainer), *trainer.warnings)
-        interrupted = train(trainer)
-        layers.append((trainer.stop, trainer.splats()))
-        file = out / layer_name(number, trainer.stop)
-        runs[trainer.stop.name] = trained_file(file, trainer)
-        say(result_line(trainer, trainer.count), *trainer.exposures.warnings())
-        trainer.photos.close()
-        if interrupted:
-            break
-    write_layer_list(layers, out)
-    return Outcome(runs, interrupted)
+    run = splats_run(share_of(settings, capture), options.asked | options.splats)
+    outcome = train_each(device, capture, run, files_of(capture, out, ".ply"), options, room)
+    names = [made.file.name for made in outcome.runs.values()]
+    write_list(capture.stops[: len(names)], names, out)
+    return outcome
 
 
 def train_separate(
-    device,
-    capture: "Capture",
-    settings: "TrainSettings",
-    out: Path,
-    room: "PhotoRoom | None" = None,
+    device, capture: "Capture", options: Options, settings: "TrainSettings", room: "PhotoRoom"
 ) -> Outcome:
-    """An anchor model of every modality into the folder `out`: a package each."""
-    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
-    from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name
-    from shapeshift.training.baselines.plain import one_modality
-    from shapeshift.training.train import Trainer
+    """An anchor model of every modality into the folder --out: a package each."""
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
 
-    if out.is_file() or out.suffix == ".shift":
-        raise UsageError(f"{out}: --separate writes several packages; name a folder for them.")
-    files = {
-        stop.name: (out / layer_name(number, stop)).with_suffix(".shift")
-        for number, stop in enumerate(capture.stops)
-    }
-    for file in files.values():
+    if options.out.is_file() or options.out.suffix == ".shift":
+        raise UsageError(
+            f"{options.out}: --separate writes several packages; name a folder for them."
+        )
+    files = files_of(capture, options.out, ".shift")
+    for file in files:
         refuse_foreign(file)  # now, not after the training
-    settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
+    run = anchors_run(share_of(settings, capture), options.asked)
+    return train_each(device, capture, run, files, options, room)
+
+
+def files_of(capture: "Capture", out: Path, ending: str) -> list[Path]:
+    """One a modality."""
+    from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name
+
+    return [out / layer_name(n, stop, ending) for n, stop in enumerate(capture.stops)]
+
+
+def train_each(
+    device, capture: "Capture", run: ModelRun, files: list[Path], options: Options,
+    room: "PhotoRoom",
+) -> Outcome:  # fmt: skip
+    """A model of every modality into its file, until Ctrl-C; --resume: from their checkpoints."""
+    from shapeshift.app.training.saving import save_checkpoint
+    from shapeshift.training.baselines.plain import one_modality
+    from shapeshift.training.checkpoint import read_checkpoint
+
+    parts = [one_modality(capture, stop.name) for stop in capture.stops]  # all refused before
+    checkpoints = [checkpoint_of(options.out, file) for file in files]
+    begun = [path.exists() for path in checkpoints]
+    if options.resume and not any(begun):
+        read_checkpoint(checkpoints[0])  # which says so
+    options.out.mkdir(parents=True, exist_ok=True)
     runs, interrupted = {}, False
-    for part in parts:
-        with working(READING) as report:
-            trainer = Trainer(device, part, settings, report=report, room=room)
-            name = part.stops[0].name
-        say(describe(trainer), *trainer.warnings)
-        interrupted = train(trainer)
-        write_package(trainer.model(), files[name])
-        runs[name] = trained_file(files[name], trainer)
-        say(result_line(trainer, trainer.anchors_count), *trainer.exposures.warnings())
+    for part, file, checkpoint, there in zip(parts, files, checkpoints, begun, strict=True):
+        state = read_checkpoint(checkpoint) if options.resume and there else None
+        trainer, interrupted = train_model(device, part, run, checkpoint, state, room)
+        run.write(trainer, file)
+        if failed := save_checkpoint(trainer, checkpoint):
+            say(failed)
+        runs[part.stops[0].name] = trained_file(file, trainer)
         trainer.photos.close()
         if interrupted:
             break
     return Outcome(runs, interrupted)
 
 
-def each_modality(capture: "Capture", one_modality) -> list["Capture"]:
-    """A capture a modality; all are checked before the first is trained.  Raises BadFile."""
-    return [one_modality(capture, stop.name) for stop in capture.stops]
+def checkpoint_of(out: Path, file: Path) -> Path:
+    """Of a model of several in the folder `out`: beside it, where nothing looks for models."""
+    from shapeshift.training.checkpoint import checkpoint_path
+
+    return checkpoint_path(out.with_name(f"{out.name}.{file.stem}"))
 
 
 def describe_plain(trainer: "PlainTrainer") -> str:
@@ -219,5 +303,5 @@ def outcome_line(outcome: Outcome, capture: "Capture", out: Path) -> str:
     missing = [s.name for s in capture.stops if s.name not in outcome.runs]
     if outcome.interrupted:
         rest = f"; not trained: {', '.join(missing)}" if missing else ""
-        return f"{where}: interrupted after {outcome.seconds:.1f} s{rest}"
+        return f"{where}: interrupted after {outcome.seconds:.1f} s{rest}; --resume goes on"
     return f"{where}: done after {outcome.steps} steps in {outcome.seconds:.1f} s"

@@ -16,8 +16,8 @@ USUAL = (
     "poses",
 )  # fmt: skip
 EXPERTS = (
-    "seed", "splats_per_anchor", "features", "hidden", "fixed", "depth_share", "blended_shapes",
-    "min_scale_px", "anchor_attributes",
+    "seed", "splats_per_anchor", "features", "hidden", "fixed", "depth_share", "normal_share",
+    "blended_shapes", "min_scale_px", "anchor_attributes",
 )  # fmt: skip
 OF_SPLATS = ("max_splats", "sh_degree")  # of PlainSettings
 Asked = dict[str, Any]  # settings that were given, by name
@@ -95,7 +95,7 @@ def settings_of(asked: Asked, before: dict[str, Any] | None = None) -> TrainSett
         asked = asked | {"points": str(plain(asked["points"]))}
     try:
         if before is not None:
-            return resumed(before, asked, "--")
+            return resumed(TrainSettings(), before, asked, "--")
         return adjusted(TrainSettings(), asked)
     except ValueError as error:
         raise UsageError(str(error)) from None

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from shapeshift.training.update.update_trainer import UpdateTrainer
 
 USUAL = ("seconds", "iterations", "points", "downscale", "masks", "background")
-EXPERTS = ("seed", "max_anchors", "depth_share", "min_scale_px")
+EXPERTS = ("seed", "max_anchors", "depth_share", "normal_share", "min_scale_px")
 READING = "reading photos, finding the first points"
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -36,13 +37,15 @@ def clusters_of(count: int) -> int:
 
 def bound_clusters(
     device: Device, mean_opacity: "Array", covariance: "Array", object_index: "Array",
-    min_alpha: float,
+    min_alpha: float, pages: PageMap | None = None,
 ) -> Clusters:  # fmt: skip
-    """The boxes of an arena: mean_opacity (N, 4), covariance (N, 8), object_index (N,)."""
-    count = mean_opacity.shape[0]
+    """The boxes of an arena as project_arena takes it."""
+    count = object_index.shape[0]
     bounds = device.empty((clusters_of(count), BOUNDS))
-    kernel = device.program(KERNELS / "bound_clusters.cl")["bound_clusters"]
-    arrays = (mean_opacity, covariance, object_index, bounds)
+    kernel = device.program(KERNELS / "bound_clusters.cl", **defines_of_pages(pages))[
+        "bound_clusters"
+    ]
+    arrays = (mean_opacity, covariance, object_index, pages and pages.sources, bounds)
     device.launch(kernel, clusters_of(count), 1, count, float(min_alpha), *arrays)
     return Clusters(bounds, float(min_alpha))
 

@@ -7,6 +7,7 @@
 // Needs:   VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
 // ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
 // OWN_COLORS = 1: the second view has colours of its own.
+// PAGED = 1: rows that are drawn lie in pages of the arena, see common/pages.cl.
 // Reads:   frame (limits, views, poses), mean_opacity (N, 4), covariance (N, 8), color (N, 4),
 //          object_index (N,); unseen (clusters,) where there is one: CLUSTER splats each that no
 //          view sees (clusters.py), of which nothing is read.
@@ -21,6 +22,7 @@
 #endif
 #include "common/camera.cl"
 #include "common/limits.cl"
+#include "common/pages.cl"
 #include "common/eight_rows.cl"
 #include "common/tile_bounds_of_eight.cl"
 
@@ -230,7 +232,7 @@ inline void leave_out(int i, int n, __global float* record, __global float* dept
 // key.  status: pairs of the view's order, intersections, least and largest key.
 __kernel void project_arena(
     int count, int chunk, int by_distance, int keep_outside, __global const int* unseen,
-    __global const float* frame,
+    __global const int* sources, __global const float* weights, __global const float* frame,
     __global const float* mean_opacity, __global const float* covariance,
     __global const float* color, __global const float* second_color,
     __global const int* object_index,
@@ -283,7 +285,17 @@ __kernel void project_arena(
     }
     const int n = min(LANES, last - i);
     const int8 valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
-    LOAD_ROWS(LOAD_MEANS, s, mean_opacity, 4)
+    const long moved = row_of(i, sources) - i;  // from a row that is drawn to where it lies
+    if (i + moved < 0) {
+      for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], tile_bounds[v]);
+      continue;
+    }
+    __global const float* means = mean_opacity + 4 * moved;
+    LOAD_ROWS(LOAD_MEANS, s, means, 4)
+#if PAGED
+    const float weight = weights[i / PAGE];
+    if (weight != 1.0f) s.opacity = weighed(s.opacity, weight);
+#endif
     // Gate 1, opacity: absent splats of other modalities end here, eight at a time.
     const int8 bright = valid & (s.opacity >= limits[MIN_ALPHA]) & (s.opacity < FLT_MAX);
     entered += bright;
@@ -313,7 +325,8 @@ __kernel void project_arena(
     // Covariances and colours, the larger part of a splat, only where some view may see one of
     // eight.
     if (any(anywhere)) {
-      LOAD_ROWS(LOAD_COVARIANCES, s, covariance, 8)
+      __global const float* covariances = covariance + 8 * moved;
+      LOAD_ROWS(LOAD_COVARIANCES, s, covariances, 8)
       LOAD_ROWS(LOAD_COLORS, s, color, 4)
       s.power_threshold = fmax(2.0f * log(s.opacity * limits[PER_MIN_ALPHA]), 0.0f);
     }

@@ -6,6 +6,7 @@
 // Units:   metres; slopes in 1/pixel; normals have eye axes: x right, y up, z towards the eye.
 #include "common/record.cl"
 #include "common/camera.cl"
+#include "common/pages.cl"
 #include "common/surface.cl"
 
 // The normal is that of the surface of midpoints at the mean, b = M p turned towards the eye; of a
@@ -13,6 +14,7 @@
 __kernel void surface_arena(int count, float near, __constant float* camera,
                             __global const float* poses, __global const float* mean_opacity,
                             __global const float* covariance, __global const int* object_index,
+                            __global const int* sources,
                             __global float* record, __global float* surface) {
   const int i = get_global_id(0);
   if (i >= count) return;
@@ -22,8 +24,8 @@ __kernel void surface_arena(int count, float near, __constant float* camera,
   for (int k = 0; k < SURFACE_SIZE; k++) f[k] = 0;
   if (!(r[EXTENT_X] > 0)) return;
   __global const float* m = poses + 12 * object_index[i];
-  const float4 mean = vload4(i, mean_opacity);
-  const float8 c = vload8(i, covariance);
+  const float4 mean = vload4(row_of(i, sources), mean_opacity);
+  const float8 c = vload8(row_of(i, sources), covariance);
   const float3 w[3] = {vload3(0, m), vload3(0, m + 4), vload3(0, m + 8)};
   float p[3], sigma[3][3];
   const float3 rows[3] = {(float3)(c.s0, c.s1, c.s2), (float3)(c.s1, c.s3, c.s4),

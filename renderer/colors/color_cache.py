@@ -38,6 +38,11 @@ class ColorCache:
     tint: Tint | None = None  # that lies over them now
     untinted: tuple = ()  # rows under it, their colours and their heat without it
 
+    @property
+    def is_done(self) -> bool:
+        """Whether all have colours that follow neither x nor the eye."""
+        return self.key == (None, None) and self.anchors is None
+
     def is_stale(self, key: tuple, degrees: float, nearer: bool = False) -> bool:
         """Whether x changed, or the eye moved by more than so many degrees around the centre.
 

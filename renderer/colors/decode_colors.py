@@ -31,6 +31,8 @@ def decode_colors(
         if not obj.seen:
             continue
         colored = decoded.colored[which]
+        if colored.is_done and obj.tint is colored.tint:
+            continue  # a thousand copies are asked every frame
         object_from_world = np.linalg.inv(obj.world_from_object.matrix())
         eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
         key = color_key(obj.model, decoded.version, eye)

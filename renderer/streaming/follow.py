@@ -78,6 +78,7 @@ def follow(
     """Asks the stream, and gives what changed the look that its object has."""
     cut = [i for i in stream.objects if decoded[i].own is not None]
     before = {i: drawing.pages_of(i) for i in cut}
+    stream.edit(cut)
     for i in stream.follow(scene, views):
         obj, each = scene.objects[i], decoded[i]
         if i in before:

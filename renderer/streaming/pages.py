@@ -43,6 +43,15 @@ class PageTable:
         self.level[leaves], self.splats[leaves] = levels, counts
         return pages
 
+    def pages_of(self, leaves: np.ndarray) -> np.ndarray:
+        """All pages of leaves (n,), one leaf after the other, in the order of their splats."""
+        order = np.argsort(self.leaf_of, kind="stable")
+        of = self.leaf_of[order]
+        first, last = np.searchsorted(of, leaves, "left"), np.searchsorted(of, leaves, "right")
+        counts = last - first
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        return order[np.repeat(first, counts) + within]
+
     @property
     def room(self) -> int:
         """Pages that are free."""

@@ -17,7 +17,7 @@ WIDEST = math.radians(80)  # from straight on; wider pictures have no tangents
 
 @dataclass(frozen=True)
 class LeafSight:
-    """Of the leaves of one object."""
+    """Of leaves."""
 
     held: np.ndarray  # (L,) bool: a view may show it
     wide: np.ndarray  # (L,) bool: so may a view WIDER on each side
@@ -25,41 +25,43 @@ class LeafSight:
     distance: np.ndarray  # (L,) metres from the eye to its box
 
 
-def sight_of(levels: LeafLevels, world_from_object: np.ndarray, views: Sequence[View]) -> LeafSight:
-    """In any of the views; world_from_object (4, 4), rigid."""
+def sight_of(
+    levels: LeafLevels, world_from_objects: np.ndarray, views: Sequence[View]
+) -> LeafSight:
+    """In any of the views, of n copies one after the other; world_from_objects (n, 4, 4), rigid."""
     middle, half = (levels.high + levels.low) / 2, (levels.high - levels.low) / 2
-    shape = (len(middle),)
+    shape = (len(world_from_objects), len(middle))
     held, wide = np.zeros(shape, bool), np.zeros(shape, bool)
     cover, distance = np.zeros(shape), np.full(shape, np.inf)
     radius = np.linalg.norm(half, axis=1)
     for view in views:
-        eye_from_object = view.eye_from_world() @ world_from_object
-        held |= _inside(middle, half, eye_from_object, view.tangents, view.near)
-        wide |= _inside(middle, half, eye_from_object, wider(view.tangents), 0.0)
-        eye = np.linalg.inv(eye_from_object)[:3, 3]
-        away = np.linalg.norm(np.maximum(np.abs(eye - middle) - half, 0), axis=1)
+        eye_from_objects = view.eye_from_world() @ world_from_objects
+        held |= _inside(middle, half, eye_from_objects, view.tangents, view.near)
+        wide |= _inside(middle, half, eye_from_objects, wider(view.tangents), 0.0)
+        eyes = np.linalg.inv(eye_from_objects)[:, None, :3, 3]
+        away = np.linalg.norm(np.maximum(np.abs(eyes - middle) - half, 0), axis=2)
         distance = np.minimum(distance, away)
         focal = view.size[0] / (view.tangents[1] - view.tangents[0])
         pixels = (focal * radius / np.maximum(away, 0.3 * radius + view.near)) ** 2
         cover = np.maximum(cover, np.minimum(pixels, view.size[0] * view.size[1]))
-    return LeafSight(held, wide | held, cover, distance)
+    return LeafSight(*(each.ravel() for each in (held, wide | held, cover, distance)))
 
 
 def _inside(
-    middle: np.ndarray, half: np.ndarray, eye_from_object: np.ndarray, tangents: tuple, near: float
+    middle: np.ndarray, half: np.ndarray, eye_from_objects: np.ndarray, tangents: tuple, near: float
 ) -> np.ndarray:
-    """(L,) bool: boxes that are not wholly outside of one side of a view's pyramid."""
-    turn, shift = eye_from_object[:3, :3], eye_from_object[:3, 3]
+    """(n, L) bool: boxes that are not wholly outside of one side of a view's pyramid."""
+    turns, shifts = eye_from_objects[:, :3, :3], eye_from_objects[:, :3, 3]
     left, right, down, up = tangents
     out = BLUR
     planes = np.array([  # a point in the eye's axes is inside where the product is above 0
         (-1, 0, -(right + out)), (1, 0, left - out), (0, -1, -(up + out)), (0, 1, down - out),
         (0, 0, -1),
     ])  # fmt: skip
-    in_object = planes @ turn
-    place = middle @ in_object.T + planes @ shift  # (L, 5)
-    reach = (1 + TAIL) * half @ np.abs(in_object).T
-    return (place + reach > np.array([0, 0, 0, 0, near])).all(axis=1)
+    in_objects = np.swapaxes(planes @ turns, 1, 2)  # (n, 3, 5)
+    place = middle @ in_objects + (shifts @ planes.T)[:, None]  # (n, L, 5)
+    reach = (1 + TAIL) * half @ np.abs(in_objects)
+    return (place + reach > np.array([0, 0, 0, 0, near])).all(axis=2)
 
 
 def wider(tangents: tuple, angle: float = WIDER) -> tuple[float, float, float, float]:

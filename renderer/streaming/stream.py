@@ -5,7 +5,8 @@ The file to read first in streaming/.  Of each frame: sight (which leaves are in
 """
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -19,16 +20,14 @@ from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, step
 from shapeshift.renderer.streaming.fetch import Fetcher
 from shapeshift.renderer.streaming.pages import (
     ROOM,
-    Filled,
     PageTable,
-    fill_pages,
     pages_needed,
-    together,
 )
 from shapeshift.renderer.streaming.seen import CoarseLook
 from shapeshift.renderer.streaming.sight import LeafSight, sight_of
+from shapeshift.renderer.streaming.upload import Uploader
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
-from shapeshift.runtime_models.leaf_levels import LeafSource, LeafSplats
+from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
@@ -37,12 +36,17 @@ CHANGED = 0.05  # of the budget: what a frame in motion may upload, in splats
 EACH = 8  # frames, one in so many looks ahead
 BESIDE = 1e-6  # pixels that a leaf beside the picture counts: last, and the coarsest of all
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
-AT_ONCE = 1 << 16  # splats that are uploaded together
 LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
 
 
 def has_leaves(model: Model) -> bool:
     return isinstance(model, SplatLayers) and model.leaves is not None
+
+
+def pages_of_all(sources: Sequence[LeafSource]) -> int:
+    """Pages for every level of every leaf, once for all copies."""
+    once = {id(source): source for source in sources}.values()
+    return sum(int(pages_needed(source.levels.counts).sum()) for source in once)
 
 
 class Stream:
@@ -72,19 +76,17 @@ class Stream:
         self.first = np.concatenate([[0], np.cumsum(sizes, dtype=int)])
         self._object = np.repeat(np.arange(len(sizes)), sizes)  # of each leaf, in self.objects
         self._every_count = every_count(self._sources)  # (L, K) splats
-        pairs = zip(self._models, self._sources, strict=True)
-        self._coarse = {id(source): CoarseLevels(model, source) for model, source in pairs}
         self._finest = np.concatenate([source.levels.finest_counts for source in self._sources])
         self._pages = pages_for(self._finest, self._left)
         coefficients = max(source.coefficients for source in self._sources)
-        drawing.allocate_pages(list(models), self._pages, coefficients)
+        stored = min(self._pages, pages_of_all(self._sources))
+        drawing.allocate_pages(list(models), self._pages, coefficients, stored)
         self.follows_eye = coefficients > 1  # then its colours are decoded a frame
-        self._waiting: list[tuple[np.ndarray, Filled]] = []  # pages that are still to be written
         self.table = PageTable(self._pages, int(self.first[-1]))
+        self._uploader = Uploader(drawing, self.table, self.objects, self._models, self.first)
         self.weights = Weights(int(self.first[-1]), self._look())
         self._fetcher = Fetcher()
         self._last: tuple = ()  # the views and poses that all is there for
-        self.placed = np.zeros(0, np.int64)  # pages that were filled for the last frame
         self._views: tuple[Sequence[View], Sequence[View]] = ((), ())  # of the last two frames
         self._poses: list[np.ndarray] = []
         self._shown: list[bool] = []
@@ -123,6 +125,15 @@ class Stream:
         pending = bool((wanted != self.table.level).any())
         self.stats = self._stats(splats, pending, int(self._finest[sight.held].sum()))
         return sorted({self.objects[i] for i in np.unique(self._object[changed])})
+
+    @property
+    def placed(self) -> np.ndarray:
+        """Pages that were filled for the last frame."""
+        return self._uploader.placed
+
+    def edit(self, objects: Sequence[int]) -> None:
+        """Objects whose splats are not as they were read: they share no pages."""
+        self._uploader.edited = np.isin(self.objects, objects)
 
     def _choose(self, weight: np.ndarray, sight: LeafSight) -> tuple[np.ndarray, np.ndarray]:
         """Levels of all leaves that fit the budget and the pages, and what each is worth."""
@@ -168,7 +179,9 @@ class Stream:
         self, poses: list[np.ndarray], shown: list[bool], views: Sequence[View]
     ) -> LeafSight:
         """Of all leaves, one object after the other."""
-        each = [sight_of(s.levels, p, views) for s, p in zip(self._sources, poses, strict=True)]
+        each: list[LeafSight] = []
+        for source, run in groupby(zip(self._sources, poses, strict=True), lambda pair: pair[0]):
+            each.append(sight_of(source.levels, np.array([pose for _, pose in run]), views))
         held, wide, cover, distance = (
             np.concatenate([getattr(one, name) for one in each])
             for name in ("held", "wide", "cover", "distance")
@@ -183,7 +196,7 @@ class Stream:
         pages = [table.free(gone)]
         due = np.flatnonzero(wanted != table.level)
         if not self.converges:
-            at_hand = [source.at_hand() for source in self._sources]
+            at_hand = self._at_hand()
             missing = self._missing(wanted, worth, at_hand)
             self._fetcher.want([*missing, *self._ahead(at_hand)])
             self._decoded = sum(int(np.count_nonzero(there)) for there in at_hand)
@@ -193,7 +206,9 @@ class Stream:
             due, level = self._first_of(np.flatnonzero(level != now), level, worth)
         pages.append(table.free(due))
         self._drawing.clear_pages(np.concatenate(pages))
-        self._upload(due, level[due])
+        self._uploader.upload(due, level[due])
+        if not self.follows_eye:
+            self._drawing.shade_pages(self.placed)
         return np.concatenate([gone, due])
 
     def _missing(
@@ -228,12 +243,18 @@ class Stream:
         wanted, worth = choose(self._steps, weight, self._left)
         return self._missing(wanted, worth, at_hand)
 
+    def _at_hand(self) -> list[np.ndarray]:
+        """What each object's source has decoded."""
+        once = {id(source): source for source in self._sources}
+        found = {number: source.at_hand() for number, source in once.items()}
+        return [found[id(source)] for source in self._sources]
+
     @property
     def due(self) -> bool:
         """Whether another frame of the same views would show more."""
         if not self.stats.pending:
             return False
-        decoded = sum(int(np.count_nonzero(source.at_hand())) for source in self._sources)
+        decoded = sum(int(np.count_nonzero(there)) for there in self._at_hand())
         return self.stats.changed > 0 or decoded != self._decoded
 
     def _first_of(
@@ -274,57 +295,6 @@ class Stream:
         after[downs], after[ups] = level[downs], level[ups]
         return np.unique(np.concatenate([new, downs, ups])), after
 
-    def _upload(self, leaves: np.ndarray, levels: np.ndarray) -> None:
-        """Reads leaves (n,) at levels (n,) into free pages: each part once for all copies."""
-        self.placed = np.zeros(0, np.int64)
-        numbers = np.array([id(source) for source in self._sources])
-        object_of = self._object[leaves]
-        for source in {id(source): source for source in self._sources}.values():
-            mine = np.flatnonzero(numbers[object_of] == id(source))
-            own = leaves[mine] - self.first[object_of[mine]]
-            kinds = source.levels.counts.shape[1]
-            pairs, copy_of = np.unique(own * kinds + levels[mine], return_inverse=True)
-            number = {int(pair): n for n, pair in enumerate(pairs)}
-            for part in self._read(source, pairs // kinds, pairs % kinds):
-                given = part.leaves * kinds + part.levels
-                place = np.full(len(pairs), -1)
-                place[[number[int(pair)] for pair in given]] = np.arange(len(given))
-                there = place[copy_of] >= 0
-                which = place[copy_of][there]
-                self._place(part, which, leaves[mine][there])
-        self._flush()
-        if not self.follows_eye:
-            self._drawing.shade_pages(self.placed)
-
-    def _read(
-        self, source: LeafSource, leaves: np.ndarray, levels: np.ndarray
-    ) -> Iterator[LeafSplats]:
-        """LeafSplats of all of these; coarsest levels are in memory already."""
-        coarse = levels == source.levels.coarsest[leaves]
-        if coarse.any():
-            yield self._coarse[id(source)].picked(leaves[coarse], levels[coarse])
-        if not coarse.all():
-            yield from source.read(leaves[~coarse], levels[~coarse])
-
-    def _place(self, part: LeafSplats, which: np.ndarray, leaves: np.ndarray) -> None:
-        """Some leaves of a part into pages, as many as fit."""
-        needed = np.cumsum(pages_needed(part.counts[which]))
-        fit = int(np.searchsorted(needed, self.table.room, side="right"))
-        which, leaves = which[:fit], leaves[:fit]
-        owner = np.array(self.objects)[self._object[leaves]]
-        pages = self.table.reserve(leaves, part.levels[which], part.counts[which])
-        self._waiting.append((pages, fill_pages(part, which, owner)))
-        if sum(len(each) for each, _ in self._waiting) * PAGE >= AT_ONCE:
-            self._flush()
-
-    def _flush(self) -> None:
-        """Uploads what waits: few large writes instead of one a file."""
-        pages = np.concatenate([np.zeros(0, np.int64), *(each for each, _ in self._waiting)])
-        if len(pages):
-            self._drawing.place_pages(pages, *together([filled for _, filled in self._waiting]))
-            self.placed = np.union1d(self.placed, pages)
-        self._waiting.clear()
-
     def close(self) -> None:
         self._fetcher.close()
 
@@ -358,22 +328,3 @@ def pages_for(finest: np.ndarray, budget: int) -> int:
     splats = min(int(finest.sum()), budget)
     full = splats // PAGE + min(len(finest), budget) + 1
     return min(full, int(ROOM * budget) // PAGE + 1)
-
-
-class CoarseLevels:
-    """The splats of a model by leaf."""
-
-    def __init__(self, model: SplatLayers, source: LeafSource) -> None:
-        self._model, leaf = model, source.coarse_leaf
-        self._order = np.argsort(leaf, kind="stable")
-        self._counts = np.bincount(leaf, minlength=len(source.part))
-        self._starts = np.cumsum(self._counts) - self._counts
-
-    def picked(self, leaves: np.ndarray, levels: np.ndarray) -> LeafSplats:
-        """Leaves (n,), one after the other."""
-        counts = self._counts[leaves]
-        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        rows = self._order[np.repeat(self._starts[leaves], counts) + within]
-        m = self._model
-        arrays = (array[rows] for array in (m.means, m.scales, m.wxyz, m.opacity, m.sh))
-        return LeafSplats(leaves, levels, counts, *arrays)

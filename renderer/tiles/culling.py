@@ -21,6 +21,8 @@ from shapeshift.scene.pose import View
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
+    from shapeshift.rasterizer.paging.pages import Arena
+
 RESTS = 4  # frames with the same splats before boxes are made: these cost as one projection
 LEAST_SPLATS = 1 << 16  # left out: to ask takes as long as to project a third of them
 PAUSE = 8  # frames until it is asked again
@@ -45,15 +47,15 @@ class Culling:
         usable = self.allowed and not self._paused and made is not None
         return made if usable and made is not None and made.min_alpha == min_alpha else None
 
-    def next_frame(self, device: Device, arena: "tuple[Array, Array, Array]", least: float) -> None:
-        """Once a frame; arena: mean_opacity, covariance, object_index; least: alpha."""
+    def next_frame(self, device: Device, arena: "Arena", least: float) -> None:
+        """Once a frame; arena: mean_opacity, covariance, object_index, pages; least: alpha."""
         self._paused = max(0, self._paused - 1)
         if self._clusters is not None and self._clusters.min_alpha != least:
             self.forget()
         self._rested += 1
         due = self._clusters is None and self._rested > RESTS
-        if due and arena[0].shape[0] >= LEAST_SPLATS:
-            self._clusters = bound_clusters(device, *arena, least)
+        if due and arena[2].shape[0] >= LEAST_SPLATS:
+            self._clusters = bound_clusters(device, *arena[:3], least, arena[3])
 
     def note(self, device: Device, unseen: "Array | None") -> None:
         """What a projection left out, (C,) as find_unseen.cl has it."""

@@ -19,18 +19,20 @@ from shapeshift.renderer.tiles.inputs import bin_view, camera_of
 from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
-    from pyopencl.array import Array
+    from shapeshift.rasterizer.paging.pages import Arena
 
 
 def blend_depth(
-    device: Device, arena: "tuple[Array, Array, Array]", world_from_objects: np.ndarray,
+    device: Device, arena: "Arena", world_from_objects: np.ndarray,
     projected: Projected, tiles: Tiles, view: View,
 ) -> DepthFrame:  # fmt: skip
     """Depth, and normals in place of colours, which the records lose.
 
-    arena: mean_opacity, covariance, object_index.
+    arena: mean_opacity, covariance, object_index, pages.
     """
-    surfaces = surface_arena(device, *arena, world_from_objects, camera_of(view), projected)
+    camera = camera_of(view)
+    given = (world_from_objects, camera, projected, arena[3])
+    surfaces = surface_arena(device, *arena[:3], *given)
     return rasterize_depth(device, projected, tiles, surfaces, view.size)
 
 
@@ -48,7 +50,7 @@ def in_fewer_pixels(
 
 
 def depth_pictures(
-    device: Device, arena: "tuple[Array, Array, Array]", world_from_objects: np.ndarray,
+    device: Device, arena: "Arena", world_from_objects: np.ndarray,
     projected: list[Projected], tiles: list[Tiles], views: list[View], part: float,
 ) -> list[np.ndarray]:  # fmt: skip
     """(H, W, 4) of each view, in `part` of its width and height."""

@@ -1,5 +1,6 @@
 """Pages of the arena for objects whose splats come and go, as a budget has them (streaming/)."""
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -7,86 +8,164 @@ import numpy as np
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.pack import pack
-from shapeshift.rasterizer.paging.pages import PAGE, gather_pages, scatter_pages
-from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
+from shapeshift.rasterizer.paging.pages import PAGE, PageMap, gather_pages, scatter_pages
+from shapeshift.rasterizer.shade_sh import shade_pages, upload_sh
 from shapeshift.runtime_models.leaf_levels import LeafSplats
 from shapeshift.scene.appearance import Appearance
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
+    from shapeshift.rasterizer.paging.pages import Arena
+
+GROWTH = 1.5  # times the pages that are stored, where there are too few
+
 
 class PagedRows:
-    """The last rows of the arena: pages, each of one object or of none."""
+    """The last rows of a frame: pages that are drawn, each for one object or for none.
 
-    def __init__(self, device: Device, first: int, pages: int, coefficients: int) -> None:
-        """first: the row of the arena where they begin, a whole number of pages."""
+    Their splats lie in stored pages, the last of the arena; copies of an object draw the same ones,
+    until one of them is changed.  Colours are of the pages that are drawn.
+    """
+
+    def __init__(
+        self, device: Device, first: int, pages: int, stored: int, coefficients: int
+    ) -> None:
+        """first: the row where both begin, a whole number of pages."""
         self._device, self.first, self.pages = device, first, pages
-        self.rows = slice(first, first + PAGE * pages)
-        self.owner = np.full(pages, -1, np.int32)  # object of each page
-        self._sh = device.zeros((PAGE // 8 * pages, 3 * coefficients, 8))
+        self.owner = np.full(pages, -1, np.int32)  # object of each page that is drawn
+        self.stored = np.full(pages, -1)  # where its splats are
+        self.weight = np.ones(pages, np.float32)  # part of their optical depth
+        self.uses = np.zeros(stored, int)  # of each stored page: how many are drawn from it
+        self._sh = device.zeros((PAGE // 8 * stored, 3 * coefficients, 8))
         self._coefficients = coefficients
 
-    def place(
-        self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats,
-        arena: "tuple[Array, Array, Array]",
-    ) -> None:  # fmt: skip
-        """Writes splats (n PAGE,), absent ones among them, to pages (n,) of these objects (n,).
+    @cached_property
+    def map(self) -> PageMap:
+        """Of all rows of a frame: objects that are there for good have theirs where they are."""
+        fixed = self.first // PAGE
+        moved = np.where(self.stored >= 0, self.stored + fixed, -1)
+        sources = np.concatenate([np.arange(fixed), moved]).astype(np.int32)
+        weights = np.concatenate([np.ones(fixed, np.float32), self.weight])
+        return PageMap(self._device.upload(sources), self._device.upload(weights))
 
-        arena: mean_opacity (N, 4), covariance (N, 8) and object_index (N,).
-        """
+    def _remap(self) -> None:
+        self.__dict__.pop("map", None)
+
+    def lacking(self, count: int) -> int:
+        """Stored pages to grow to where `count` more are wanted; 0: there are enough."""
+        used = int(np.count_nonzero(self.uses))
+        if used + count <= len(self.uses):
+            return 0
+        return max(used + count, min(int(GROWTH * len(self.uses)), self.pages))
+
+    def grow(self, stored: int) -> None:
+        """To so many stored pages; the arena has grown already."""
+        sh = self._device.zeros((PAGE // 8 * stored, *self._sh.shape[1:]))
+        self._device.copy_rows(self._sh, sh, 0)
+        self._sh, self.uses = sh, np.pad(self.uses, (0, stored - len(self.uses)))
+
+    def place(
+        self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats, arena: "Arena"
+    ) -> None:
+        """Writes splats (n PAGE,), absent ones among them, for pages (n,) of these objects (n,)."""
         device, count = self._device, len(given.means)
         mean_opacity, covariance = device.empty((count, 4)), device.empty((count, 8))
         pack(
             device, (given.means, given.scales, given.wxyz, given.opacity), 0, mean_opacity,
             covariance,
         )  # fmt: skip
-        at = pages + self.first // PAGE
-        index = device.upload(np.repeat(owner.astype(np.int32), PAGE))
-        for rows, array in zip((mean_opacity, covariance, index), arena, strict=True):
-            scatter_pages(device, rows, at, array)
+        stored = np.flatnonzero(self.uses == 0)[: len(pages)]
+        at = stored + self.first // PAGE
+        scatter_pages(device, mean_opacity, at, arena[0])
+        scatter_pages(device, covariance, at, arena[1])
         more = self._coefficients - given.sh.shape[1]  # other scenes have higher degrees
         sh = np.pad(given.sh, ((0, 0), (0, more), (0, 0)))
-        scatter_pages(device, upload_sh(device, sh), pages, self._sh)
-        self.owner[pages] = owner
+        scatter_pages(device, upload_sh(device, sh), stored, self._sh)
+        self._draw(pages, owner, stored, arena[2])
         device.queue.finish()
 
-    def clear(self, pages: np.ndarray, mean_opacity: "Array") -> None:
-        """Nothing is left in these pages (n,)."""
+    def share(
+        self, pages: np.ndarray, owner: np.ndarray, like: np.ndarray, object_index: "Array"
+    ) -> None:
+        """Draws in pages (n,), for these objects (n,), what pages `like` (n,) show."""
         if len(pages):
-            nothing = self._device.zeros((PAGE * len(pages), 4))
-            scatter_pages(self._device, nothing, pages + self.first // PAGE, mean_opacity)
-            self.owner[pages] = -1
+            self._draw(pages, owner, self.stored[like], object_index)
+
+    def _draw(
+        self, pages: np.ndarray, owner: np.ndarray, stored: np.ndarray, object_index: "Array"
+    ) -> None:
+        index = self._device.upload(np.repeat(owner.astype(np.int32), PAGE))
+        scatter_pages(self._device, index, pages + self.first // PAGE, object_index)
+        self.owner[pages], self.stored[pages], self.weight[pages] = owner, stored, 1
+        np.add.at(self.uses, stored, 1)
+        self._remap()
+
+    def clear(self, pages: np.ndarray) -> None:
+        """Nothing is drawn in these pages (n,)."""
+        there = self.stored[pages]
+        np.subtract.at(self.uses, there[there >= 0], 1)
+        self.owner[pages] = self.stored[pages] = -1
+        self._remap()
+
+    def weigh(self, pages: np.ndarray, weight: np.ndarray) -> None:
+        """Pages (n,) are drawn with parts (n,) of their optical depth, until they are cleared."""
+        self.weight[pages] = weight
+        self._remap()
+
+    def shared(self, i: int) -> np.ndarray:
+        """The pages of object i whose splats others draw as well."""
+        pages = self.pages_of(i)
+        return pages[self.uses[self.stored[pages]] > 1]
+
+    def own(self, pages: np.ndarray, arena: "Arena") -> None:
+        """Gives pages (n,) splats of their own, which may be changed."""
+        if not len(pages):
+            return
+        fixed, before = self.first // PAGE, self.stored[pages]
+        stored = np.flatnonzero(self.uses == 0)[: len(pages)]
+        for array, start in ((arena[0], fixed), (arena[1], fixed), (self._sh, 0)):
+            self._move(before + start, stored + start, array)
+        np.subtract.at(self.uses, before, 1)
+        self.stored[pages], self.uses[stored] = stored, 1
+        self._remap()
+
+    def _move(self, before: np.ndarray, after: np.ndarray, array: "Array") -> None:
+        """Copies pages (n,) of an array to its pages (n,)."""
+        rows = PAGE // 8 if array is self._sh else PAGE
+        kept = self._device.empty((rows * len(before), *array.shape[1:]))
+        gather_pages(self._device, array, before, kept)
+        scatter_pages(self._device, kept, after, array)
 
     def shade(
         self, pages: np.ndarray, eye: np.ndarray, mean_opacity: "Array", color: "Array"
     ) -> None:
         """Colours of these pages (n,) towards an eye (3,) in their object's frame."""
-        seen = np.zeros((self.pages, PAGE), bool)
-        seen[pages] = True
-        shade_sh(self._device, self._sh, eye, self.rows, mean_opacity, color, seen.ravel())
+        where = (self.stored[pages], pages)
+        shade_pages(self._device, self._sh, eye, self.first, where, mean_opacity, color)
 
     def grade(self, i: int, color: "Array", grade: Appearance) -> None:
         """The appearance of object i, whose colours were just shaded."""
         if len(pages := self.pages_of(i)):
-            runs = self.read(i, color)
+            runs = self.read(pages, color)
             rows = slice(0, PAGE * len(pages))
             grade_color(self._device, rows, runs, grade.gain, grade.power)
             scatter_pages(self._device, runs, pages + self.first // PAGE, color)
 
     def pages_of(self, i: int) -> np.ndarray:
-        """The pages of object i, rising."""
+        """The pages that are drawn of object i, rising."""
         return np.flatnonzero(self.owner == i)
 
-    def read(self, i: int, array: "Array") -> "Array":
-        """(n PAGE, w) the rows of object i, a copy on the device."""
-        pages = self.pages_of(i)
+    def read(self, pages: np.ndarray, array: "Array") -> "Array":
+        """(n PAGE, w) rows of pages (n,), a copy on the device.
+
+        pages: drawn ones of an array of colours, stored ones of an array of splats.
+        """
         out = self._device.empty((PAGE * len(pages), array.shape[1]))
         gather_pages(self._device, array, pages + self.first // PAGE, out)
         return out
 
-    def write(self, i: int, rows: np.ndarray, array: "Array") -> None:
+    def write(self, pages: np.ndarray, rows: np.ndarray, array: "Array") -> None:
         """The inverse of `read`."""
-        pages = self.pages_of(i)
         given = self._device.upload(np.asarray(rows, np.float32))
         scatter_pages(self._device, given, pages + self.first // PAGE, array)

@@ -6,6 +6,7 @@ import numpy as np
 
 from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer.colors.false_colors import Shade
+from shapeshift.renderer.drawing import SAMPLE, median_distance
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.tiles.paged import PagedRows
@@ -21,30 +22,57 @@ NO_EYE = np.zeros(3)  # for colours that look alike from everywhere
 class PagedTiles(TilesDrawing):
     """TilesDrawing, with pages where a scene has models that need them."""
 
-    _paged: PagedRows | None = None
+    shares_pages = True
+    paged: PagedRows | None = None
     _is_paged: tuple[bool, ...] = ()  # of each object
 
-    def allocate(self, models: list[Model], more: int = 0) -> None:
-        super().allocate(models, more)
-        self._paged, self._is_paged = None, (False,) * len(models)
+    def allocate(self, models: list[Model], more: int = 0, stored: int | None = None) -> None:
+        super().allocate(models, more, stored)
+        self.paged, self._is_paged, self._page_map = None, (False,) * len(models), None
 
-    def allocate_pages(self, models: list[Model], pages: int, coefficients: int) -> None:
+    def allocate_pages(
+        self, models: list[Model], pages: int, coefficients: int, stored: int | None = None
+    ) -> None:
+        stored = pages if stored is None else stored
         fixed = sum(map(arena_rows, models))
         first = -(-fixed // PAGE) * PAGE
-        self.allocate(models, first - fixed + PAGE * pages)
-        self._paged = PagedRows(self.device, first, pages, coefficients)
+        self.allocate(models, first - fixed + PAGE * pages, first - fixed + PAGE * stored)
+        self.paged = PagedRows(self.device, first, pages, stored, coefficients)
         self._is_paged = tuple(getattr(model, "leaves", None) is not None for model in models)
+        self._pages_moved()
+
+    def _pages_moved(self) -> None:
+        self._page_map = self._pages.map
+        self._splats_moved()
 
     def place_pages(self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats) -> None:
+        self._make_room(len(pages))
         self._pages.place(pages, owner, given, self._arena)
-        self._splats_moved()
+        self._pages_moved()
+
+    def share_pages(self, pages: np.ndarray, owner: np.ndarray, like: np.ndarray) -> None:
+        self._pages.share(pages, owner, like, self._object_index)
+        self._pages_moved()
+
+    def _make_room(self, pages: int) -> None:
+        """For so many more stored pages."""
+        if not (stored := self._pages.lacking(pages)):
+            return
+        rows, before = self._pages.first + PAGE * stored, (self._mean_opacity, self._covariance)
+        self._mean_opacity, self._covariance = (
+            self.device.zeros((rows, array.shape[1])) for array in before
+        )
+        for array, into in zip(before, (self._mean_opacity, self._covariance), strict=True):
+            self.device.copy_rows(array, into, 0)
+        self._pages.grow(stored)
 
     def pages_of(self, i: int) -> np.ndarray:
         return self._pages.pages_of(i)
 
     def clear_pages(self, pages: np.ndarray) -> None:
-        self._pages.clear(pages, self._mean_opacity)
-        self._splats_moved()
+        if len(pages):
+            self._pages.clear(pages)
+            self._pages_moved()
 
     def shade_pages(self, pages: np.ndarray) -> None:
         for color in self._colors:
@@ -52,8 +80,8 @@ class PagedTiles(TilesDrawing):
 
     @property
     def _pages(self) -> PagedRows:
-        assert self._paged is not None, "allocate_pages has made them"
-        return self._paged
+        assert self.paged is not None, "allocate_pages has made them"
+        return self.paged
 
     def decode_color(
         self, i: int, shade: Shade, eye_object: np.ndarray, seen: np.ndarray | None = None,
@@ -75,33 +103,67 @@ class PagedTiles(TilesDrawing):
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         if not self._is_paged[i]:
             return super().read_splats(i)
+        stored = self._pages.stored[self.pages_of(i)]
         arrays = (self._mean_opacity, self._covariance)
-        mean_opacity, covariance = (self._read(i, array) for array in arrays)
+        mean_opacity, covariance = (self._read(stored, array) for array in arrays)
         return mean_opacity, covariance
 
     def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
         if not self._is_paged[i]:
             super().write_splats(i, mean_opacity, covariance)
             return
-        self._pages.write(i, mean_opacity, self._mean_opacity)
+        shared = self._pages.shared(i)
+        self._make_room(len(shared))
+        self._pages.own(shared, self._arena)
+        stored = self._pages.stored[self.pages_of(i)]
+        self._pages.write(stored, mean_opacity, self._mean_opacity)
         if covariance is not None:
-            self._pages.write(i, covariance, self._covariance)
-        self._splats_moved()
+            self._pages.write(stored, covariance, self._covariance)
+        self._pages_moved()
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
         if not self._is_paged[i]:
             return super().read_colors(i)
-        heat = self._heats[self._set]
-        return self._read(i, self._color)[:, :3], None if heat is None else self._read(i, heat)
+        heat, pages = self._heats[self._set], self.pages_of(i)
+        color = self._read(pages, self._color)[:, :3]
+        return color, None if heat is None else self._read(pages, heat)
 
     def replace_colors(self, i: int, color: np.ndarray, heat: np.ndarray | None) -> None:
         if not self._is_paged[i]:
             super().replace_colors(i, color, heat)
             return
-        self._pages.write(i, np.pad(color, ((0, 0), (0, 1))), self._color)
+        pages = self.pages_of(i)
+        self._pages.write(pages, np.pad(color, ((0, 0), (0, 1))), self._color)
         if (kept := self._heats[self._set]) is not None and heat is not None:
-            self._pages.write(i, heat, kept)
+            self._pages.write(pages, heat, kept)
 
-    def _read(self, i: int, array) -> np.ndarray:
-        """(n, w) a copy of the rows of an object in pages."""
-        return self.device.download(self._pages.read(i, array)).reshape(-1, array.shape[1])
+    def _read(self, pages: np.ndarray, array) -> np.ndarray:
+        """(n, w) a copy of the rows of pages."""
+        return self.device.download(self._pages.read(pages, array)).reshape(-1, array.shape[1])
+
+    def _median_distance(self, eye_from_world: np.ndarray) -> float:
+        if self.paged is None:
+            return super()._median_distance(eye_from_world)
+        row = np.arange(0, self.splats, -(-self.splats // SAMPLE))
+        fixed, page = self.paged.first // PAGE, row // PAGE
+        drawn = np.concatenate([np.arange(fixed), self.paged.stored + fixed])
+        there = (page < fixed) | (self.paged.stored[np.maximum(page - fixed, 0)] >= 0)
+        row, page = row[there], page[there]
+        mean_opacity = self.device.view(self._mean_opacity)[PAGE * drawn[page] + row % PAGE]
+        owner = self.device.view(self._object_index)[row]
+        return median_distance(eye_from_world @ self._world_from_objects, mean_opacity, owner)
+
+    def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        if self.paged is None:
+            return super().splat_points()
+        first, stored = self.paged.first, self.paged.stored
+        out = []
+        for array in (self._mean_opacity, self._covariance):
+            rows = np.zeros((len(stored), PAGE, array.shape[1]), np.float32)
+            drawn = stored >= 0
+            rows[drawn] = self._read(stored[drawn], array).reshape(-1, *rows.shape[1:])
+            fixed = (
+                self.device.download(array[:first]) if first else rows[:0].reshape(0, rows.shape[2])
+            )
+            out.append(np.concatenate([fixed, rows.reshape(-1, rows.shape[2])]))
+        return out[0], self.device.download(self._object_index), out[1]

@@ -17,6 +17,7 @@ from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.heat import add_heat, blend_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
+from shapeshift.rasterizer.paging.pages import PageMap
 from shapeshift.rasterizer.project import CULL_REASONS, Projected
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
@@ -60,14 +61,12 @@ class TilesDrawing(Drawing):
     """
 
     decodes_on_gpu = False
+    _page_map: PageMap | None = None  # where rows that are drawn lie; None: where they are drawn
 
     def __init__(self, device: Device | None = None, mlps: str = "opencl") -> None:
         self.device, self._mlps = device or open_device(), mlps
-        self.backends = {
-            "drawing": f"tiles ({self.device.platform})",
-            "mlps": mlps,
-            "sort": f"tiles ({self.device.platform})",
-        }
+        name = f"tiles ({self.device.platform})"
+        self.backends = {"drawing": name, "mlps": mlps, "sort": name}
         self.allocations = 0  # how often the arena was made: once for each set of objects
         self._slots: list[Slot] = []
         self._decodings: dict[int, Decoding] = {}
@@ -100,8 +99,8 @@ class TilesDrawing(Drawing):
     def _tables(self) -> tuple[list, list, list]:
         return [self._mean_opacity, self._covariance], self._colors, self._heats
 
-    def allocate(self, models: list[Model], more: int = 0) -> None:
-        """more: rows behind those of the objects."""
+    def allocate(self, models: list[Model], more: int = 0, stored: int | None = None) -> None:
+        """more: rows behind those of the objects, of which so many are stored, by default all."""
         check_tiles(self.device, models, more)
         counts = [arena_rows(model) for model in models]
         self.splats = sum(counts) + more
@@ -109,8 +108,8 @@ class TilesDrawing(Drawing):
         device = self.device
         self._projected, self._rooms, self._orders = [], {}, []
         self._splats_moved()
-        self._mean_opacity = device.zeros((self.splats, 4))
-        self._covariance = device.zeros((self.splats, 8))
+        rows = self.splats if stored is None else sum(counts) + stored
+        self._mean_opacity, self._covariance = device.zeros((rows, 4)), device.zeros((rows, 8))
         self._colors = [device.zeros((self.splats, 4))]
         self._color, self._set = self._colors[0], 0  # that decoding writes into
         self._heats = [None]
@@ -242,8 +241,8 @@ class TilesDrawing(Drawing):
                 self._depths.update(enumerate(made, first))
 
     @property
-    def _arena(self) -> "tuple[Array, Array, Array]":
-        return self._mean_opacity, self._covariance, self._object_index
+    def _arena(self) -> "tuple[Array, Array, Array, PageMap | None]":
+        return self._mean_opacity, self._covariance, self._object_index, self._page_map
 
     def _heats_of(self, sets: Sequence[int]) -> list:
         """(N, 4) of each of these sets; made where there is none yet."""
@@ -289,7 +288,7 @@ class TilesDrawing(Drawing):
         return project_arena(
             self.device, self._mean_opacity, self._covariance, first, self._object_index,
             self._world_from_objects, [camera_of(view) for view in views], limits_of(settings),
-            sort, into, self._antialiased, second[0] if second else None, clusters,
+            sort, into, self._antialiased, second[0] if second else None, clusters, self._page_map,
         )  # fmt: skip
 
     def _bin(self, views: list[View], key_bits: int) -> list[Tiles]:

@@ -19,6 +19,8 @@ class Photo:
     split: str = "train"  # train | test
     depth: Path | None = None  # metres along the view, of the same field of view
     depth_unit: float = 0.001  # metres a step, where the depth photo holds integers
+    normals: Path | None = None  # directions of what it shows, of the same field of view
+    normal_axes: str = "opengl"  # that they are in; or opencv
     counts: tuple[float, float] | None = None  # numbers of a grey photo that stand for 0 and 1
     lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
 

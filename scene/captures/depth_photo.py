@@ -89,28 +89,30 @@ def load_depth(photo: Photo, factor: int | None = None) -> np.ndarray:
         values *= np.float32(photo.depth_unit)
     known = (values > 0) & (values <= FARTHEST)  # NaN is not
     values[~known] = 0
-    return values if factor is None else _at_pixels(values, photo, factor)
+    return values if factor is None else at_pixels(values, photo, factor)
 
 
-def _at_pixels(depth: np.ndarray, photo: Photo, factor: int) -> np.ndarray:
-    """What lies at the centre of each pixel of the photo as training sees it.
+def at_pixels(values: np.ndarray, photo: Photo, factor: int) -> np.ndarray:
+    """What of (H, W, ...) lies at the centre of each pixel of the photo as training sees it.
 
-    Means would put points between an object and what is behind it.
+    0 where nothing does.  Means would put points between an object and what is behind it.
     """
     width, height = photo.view.divided(factor).size
     x, y = ((np.arange(side) + 0.5) * factor for side in (width, height))
     if photo.lens is not None:
         places = straight_pixels(photo.lens, x, y)
-        across, below = (places / photo.file_size * depth.shape[::-1]).transpose(2, 0, 1)
+        across, below = (places / photo.file_size * values.shape[1::-1]).transpose(2, 0, 1)
         inside = (across >= 0) & (below >= 0)
-        inside &= (across < depth.shape[1]) & (below < depth.shape[0])
+        inside &= (across < values.shape[1]) & (below < values.shape[0])
         column, row = (np.where(inside, at, 0).astype(int) for at in (across, below))
-        return np.where(inside, depth[row, column], np.float32(0))
+        found = values[row, column]
+        found[~inside] = 0
+        return found
     rows, columns = (
         np.minimum((at * old / side).astype(int), old - 1)
-        for at, old, side in zip((y, x), depth.shape, photo.view.size[::-1], strict=True)
+        for at, old, side in zip((y, x), values.shape[:2], photo.view.size[::-1], strict=True)
     )
-    return depth[np.ix_(rows, columns)]
+    return values[np.ix_(rows, columns)]
 
 
 def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -31,6 +31,8 @@ from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
 from shapeshift.scene.captures.lenses.frame_lens import lens_of
 from shapeshift.scene.captures.lenses.panorama import FACES, face_lens, face_pose, is_panorama
+from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
+from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.pose import OPENCV_FROM_EYE
 
@@ -56,6 +58,10 @@ class Shot:
     @property
     def names_depth(self) -> bool:
         return any(self.entry.get(key) for key in DEPTH_NAMES)
+
+    @property
+    def names_normals(self) -> bool:
+        return any(self.entry.get(key) for key in NORMAL_NAMES)
 
 
 def read_transforms(*files: Path) -> Capture:
@@ -84,13 +90,14 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
-    photos, rescaled, no_depth = [], [], []
+    photos, rescaled, no_depth, no_normals = [], [], [], []
     for shot in shots:
         lens = lens_of(shot.entry, shot.path, shot.where)
         photos += (made := photos_of(shot, lens, world, folder))
         rescaled += [str(shot.path)] if made[0].file_size != lens.size else []
         no_depth += [str(shot.path)] if made[0].depth is None and shot.names_depth else []
-    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth)
+        no_normals += [str(shot.path)] if made[0].normals is None and shot.names_normals else []
+    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth, no_normals)
     doubts += doubts_of_entries(shots, entries)
     photos = with_counts(photos, counts_from(data.get("modalities"), where))
     if not any("split" in e for e in entries):
@@ -110,6 +117,7 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         doubts + more,
     )
     refuse_other_units(capture, where)
+    refuse_other_axes(capture, where)
     return capture
 
 
@@ -287,8 +295,10 @@ def photos_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path)
         if not os.path.isfile(mask):
             raise BadFile(f"{where}: the mask {path_end(mask)} is missing; put it there")
         image_size(mask, photos[0].file_size)
-    depth, unit = None, 0.001
-    if not is_panorama(lens):  # whose depth is measured along rays, not along a view
-        depth, unit = depth_of(entry, shot.folder, photos[0].file_size, where)
-    split = SPLITS[split]
-    return [replace(p, mask=mask, split=split, depth=depth, depth_unit=unit) for p in photos]
+    photos = [replace(photo, mask=mask, split=SPLITS[split]) for photo in photos]
+    if is_panorama(lens):  # whose depth is measured along rays, not along a view
+        return photos
+    size = photos[0].file_size
+    depth, unit = depth_of(entry, shot.folder, size, where)
+    normals, axes = normals_of(entry, shot.folder, size, where)
+    return [replace(photos[0], depth=depth, depth_unit=unit, normals=normals, normal_axes=axes)]

@@ -70,6 +70,9 @@ def frame(photo: Photo, folder: Path) -> dict:
     if photo.depth is not None:
         out["depth_path"] = photo.depth.relative_to(folder).as_posix()
         out["depth_unit"] = photo.depth_unit
+    if photo.normals is not None:
+        out["normal_path"] = photo.normals.relative_to(folder).as_posix()
+        out["normal_convention"] = photo.normal_axes
     return out
 
 

@@ -147,7 +147,7 @@ def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
             raise UsageError(f"there is no setting '{name}' of a training; {hint}")
     try:
         if before is not None:
-            return resumed(before, asked)
+            return resumed(TrainSettings(), before, asked)
         return adjusted(TrainSettings(), asked)
     except ValueError as error:
         raise UsageError(str(error)) from None

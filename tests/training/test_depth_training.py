@@ -19,7 +19,7 @@ from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.evaluate import evaluate_model, report
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import HOLE, DepthLoss, DepthTerm
+from shapeshift.training.losses.depth_loss import DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.photos import read
 from shapeshift.training.reference import decode_reference, image_loss_reference
@@ -28,23 +28,11 @@ from shapeshift.training.step import TrainingStep
 from shapeshift.training.supervision.targets import Targets
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.training.depth_photos import depth_error, depth_loss_reference, depth_photo
 from tests.support.training.plain_situations import situation as plain_situation
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 SHARE = 0.7
-
-
-def depth_photo(seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    depth = rng.uniform(2, 4, SIZE[::-1]).astype(np.float32)
-    depth[rng.random(depth.shape) < 0.3] = 0
-    return depth
-
-
-def depth_loss_reference(metres, through, depth) -> float:
-    known = depth > 0
-    away = np.abs(metres - (1 - through) * depth)[known] / depth[known]
-    return float((away + HOLE * through[known]).mean())
 
 
 @pytest.mark.parametrize("seed", [1])
@@ -150,12 +138,6 @@ def black_half(photo: Path) -> Path:
     path = photo.with_name("mask.png")
     Image.fromarray(mask).save(path)
     return path
-
-
-def depth_error(trainer: Trainer) -> float:
-    """Mean over the modalities, as `eval` tells it of the exported model."""
-    scores = evaluate_model(trainer.device, trainer.model(), trainer.capture)
-    return float(np.mean([score.depth_error for score in scores.values()]))
 
 
 def trained(device, capture, **changes) -> Trainer:

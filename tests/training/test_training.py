@@ -199,11 +199,11 @@ def test_a_checkpoint_that_is_cut_off_is_refused(tmp_path):
 
 def test_a_checkpoint_of_another_version_is_refused():
     before = SETTINGS.as_dict()
-    assert resumed(before, {}) == SETTINGS
+    assert resumed(TrainSettings(), before, {}) == SETTINGS
     older = {name: value for name, value in before.items() if name != "points"} | {"voxel": None}
     for other, word in ((older, "points"), (before | {"tomorrow": 1}, "tomorrow")):
         with pytest.raises(ValueError, match=rf"another version.*\({word}\); train anew"):
-            resumed(other, {})
+            resumed(TrainSettings(), other, {})
 
 
 def test_a_modality_without_photos_is_refused(device, balls):

@@ -19,7 +19,12 @@ from shapeshift.training.baselines.plain_density import (
     reset_opacity,
 )
 from shapeshift.training.baselines.plain_settings import PlainRates, PlainSettings
-from shapeshift.training.baselines.plain_step import REST, PlainDensificationStats, PlainStep
+from shapeshift.training.baselines.plain_step import (
+    GROUPS,
+    REST,
+    PlainDensificationStats,
+    PlainStep,
+)
 from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
 from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color
@@ -42,6 +47,10 @@ from shapeshift.training.supervision.targets import Targets
 GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
 DEGREES = 30  # a degree of the harmonics more after each 1 / DEGREES of the run, as 3DGS
 FIRST_OPACITY = 0.1
+NOTED = (
+    "voxel", "origin", "iteration", "elapsed", "start_s", "densified_at", "rate_scale",
+    "run_length",
+)  # fmt: skip
 
 
 def one_modality(capture: Capture, name: str) -> Capture:
@@ -70,9 +79,10 @@ class PlainTrainer(Run):
 
     def __init__(
         self, device, capture: Capture, settings: PlainSettings, report: Report | None = None,
-        room: PhotoRoom | None = None,
+        room: PhotoRoom | None = None, resume: tuple[dict[str, np.ndarray], dict] | None = None,
     ) -> None:  # fmt: skip
-        """report: called with words while the first points take long; room: for the photos."""
+        """report: called with words while the first points take long; room: for the photos; resume:
+        what `checkpoint` of a run with the same photos gave.  Raises BadFile."""
         self.device, self.capture, self.settings = device, capture, settings
         (self.stop,) = capture.stops
         self.budget = Budget(settings.iterations, settings.seconds)
@@ -89,12 +99,19 @@ class PlainTrainer(Run):
         self.exposures = Exposures(device, self.schedule.photos, has_one_exposure(photos))
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, 1.0
-        with self.counted_start():
-            values = self.first_values(photos, report)
-        self.adam = Adam(device, values, self.all_rates())
+        self.warnings = self.photos.warnings()
+        if resume is None:
+            with self.counted_start():
+                values = self.first_values(photos, report)
+            self.adam = Adam(device, values, self.all_rates())
+            self.stats = PlainDensificationStats(device, self.count)
+        else:
+            self.restore(*resume)
         self.step = PlainStep(device, self.adam, settings.sh_degree)
-        self.stats = PlainDensificationStats(device, self.count)
-        self.guard, self.next_snapshot = DivergenceGuard(self.adam.state()), SNAPSHOT_EVERY
+        self.guard = DivergenceGuard(self.adam.state())
+        self.next_snapshot = self.iteration + SNAPSHOT_EVERY
+        if resume is not None:
+            self.guard.first_loss = dict(resume[1]["first_loss"])
 
     def first_values(
         self, photos: list[LoadedPhoto], report: Report | None
@@ -104,7 +121,7 @@ class PlainTrainer(Run):
         rng = np.random.default_rng([settings.seed, 0])
         first = initial_points(self.capture, photos, rng, settings.points, report, settings.seconds)
         points, self.origin = np.concatenate([first.points, first.guesses]), first.origin
-        self.warnings = [*self.photos.warnings(), *first.doubts]
+        self.warnings += first.doubts
         most = min(settings.splats, settings.max_splats)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
         means = voxel_centres(points, self.voxel)
@@ -119,6 +136,37 @@ class PlainTrainer(Run):
             "rest": np.zeros((count, REST[settings.sh_degree], 3)),
         }
         return {name: array.astype(np.float32) for name, array in values.items()}
+
+    def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
+        """(state, notes) from which `resume` goes on to the same bits."""
+        notes = {name: getattr(self, name) for name in NOTED}
+        notes |= {"first_loss": self.guard.first_loss, "settings": self.settings.as_dict()}
+        return self.adam.state() | self.statistics(), notes | {"plain_splats_of": self.stop.name}
+
+    def restore(self, state: dict[str, np.ndarray], notes: dict) -> None:
+        """Everything as it was when the checkpoint was written.  Raises BadFile."""
+        if notes.get("plain_splats_of") != self.stop.name:
+            raise BadFile(
+                f"the checkpoint is not of plain splats of '{self.stop.name}'; train anew without "
+                "--resume."
+            )
+        for name in NOTED:
+            setattr(self, name, notes[name])
+        self.set_start(notes["start_s"])
+        values = {name: state[f"{name}.value"] for name in GROUPS}
+        self.adam = Adam(self.device, values, self.all_rates())
+        self.adam.load(state)
+        self.load_statistics(state)
+
+    def statistics(self) -> dict[str, np.ndarray]:
+        """What is summed up beside what the optimiser holds."""
+        sums = self.device.download(self.stats.sums)
+        return self.exposures.state() | {"densify.grad2d": sums}
+
+    def load_statistics(self, state: dict[str, np.ndarray]) -> None:
+        self.exposures.load(state)
+        self.stats = PlainDensificationStats(self.device, self.count)
+        self.stats.sums = self.device.upload(state["densify.grad2d"])
 
     @property
     def count(self) -> int:
@@ -137,15 +185,15 @@ class PlainTrainer(Run):
 
     def compile_kernels(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted."""
-        before = self.adam.state()
+        before, known = self.adam.state(), self.statistics()
         background = self.schedule.background or BLACK
         photos = self.schedule.photos[self.stop.name]
-        for photo in {(p.view.size, p.has_depth): p for p in photos}.values():
+        for photo in {photo.kind: photo for photo in photos}.values():
             self.adam.step(self.photo_gradients(photo, background), 0.0)
             loss, visible = self.empty_loss(photo, background), self.visible()
             self.guard.observe(self.stop.name, loss, visible, 1.0)
         self.adam.load(before)
-        self.stats = PlainDensificationStats(self.device, self.count)
+        self.load_statistics(known)
 
     def empty_loss(self, photo: LoadedPhoto, background: Color) -> float:
         """The loss of a picture without splats; the first splats, coloured, are better already."""
@@ -156,7 +204,7 @@ class PlainTrainer(Run):
         return loss.value()
 
     def photo_gradients(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
-        depth = self.targets.depth_term(photo, self.settings.depth_share)
+        depth = self.targets.shape_term(photo, self.settings)
         self.drawing = self.step.draw(photo.view, background, depth is not None)
         target = self.target(photo, background)
         loss = self.targets.loss(photo)

@@ -49,6 +49,7 @@ class PlainSettings:
     prune_opacity: float = 0.005  # a splat below it goes, as 3DGS
     reset_every: int = 3000  # iterations until opacities are set back, as 3DGS
     depth_share: float = 0.3
+    normal_share: float = 0.1
     downscale: int | None = None
     masks: Masks = "object"
     background: Background = "auto"
@@ -58,6 +59,7 @@ class PlainSettings:
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "sh_degree": 0, "voxel": 1e-6, "splats": 1,
             "max_splats": 1, "grow_every": 1, "reset_every": 1, "downscale": 1, "depth_share": 0,
+            "normal_share": 0,
         }  # fmt: skip
         check_numbers(self, least, ())
         if not self.sh_degree <= 3:

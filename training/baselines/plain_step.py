@@ -9,8 +9,8 @@ from shapeshift.training.drawing import Color, DrawnView, draw_splats, splats_ba
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.networks import KERNELS
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthTerm
 from shapeshift.training.losses.losses import ImageLoss, Target
+from shapeshift.training.losses.normal_loss import ShapeTerm
 
 # What the optimiser holds of N splats of degree n: means (N, 3) metres, scales (N, 3) logarithms of
 # one sigma, wxyz (N, 4) any length, opacity (N,) logits, base (N, 3) first coefficient of the
@@ -77,7 +77,7 @@ class PlainStep:
         loss: ImageLoss,
         target: Target,
         stats: PlainDensificationStats | None = None,
-        depth: DepthTerm | None = None,
+        depth: ShapeTerm | None = None,
     ) -> dict[str, Any]:
         """Gradients of the loss by what the optimiser holds, under its names."""
         device, splats = self.device, drawing.splats

@@ -1,5 +1,6 @@
 """Training photos that fit a trained scene much worse than the others, by name, and why."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ FEWEST = 5  # photos of a modality: among fewer none stands out
 SHOWN = 20  # names at most
 LOOKED_AT = 8  # photos of a modality that tell whether there is any picture
 STEEP = (0.4, 2.5)  # contrast that another exposure or white balance may have
+Tracked = Callable[[list[LoadedPhoto]], Iterable[LoadedPhoto]]
 
 
 @dataclass(frozen=True)
@@ -105,21 +107,24 @@ def failed_modalities(trainer: Trainer) -> list[str]:
     ]
 
 
-def find_outlier_views(trainer: Trainer) -> list[OutlierView]:
+def find_outlier_views(trainer: Trainer, tracked: Tracked = iter) -> list[OutlierView]:
     """Draws every training photo of a trained model once; those that stand out in their modality.
 
     A model that is far from trained fits all photos badly, so few stand out; but then close-ups,
-    which are learned last, do.
+    which are learned last, do.  tracked: gives the photos one by one, and may tell how many.
     """
-    out = []
-    for modality, photos in trainer.schedule.photos.items():
-        fits = []
-        for photo in photos:
-            image, wanted = drawn(trainer, photo)
-            again = recolored(image, wanted, photo.weight)
-            fits.append((psnr(image, wanted, photo.weight), psnr(again, wanted, photo.weight)))
-        out += judge(modality, photos, fits)
-    return out
+    by_modality = trainer.schedule.photos
+    fits: dict[str, list[tuple[float, float]]] = {modality: [] for modality in by_modality}
+    for photo in tracked([photo for photos in by_modality.values() for photo in photos]):
+        image, wanted = drawn(trainer, photo)
+        again = recolored(image, wanted, photo.weight)
+        fit = psnr(image, wanted, photo.weight), psnr(again, wanted, photo.weight)
+        fits[photo.modality].append(fit)
+    return [
+        outlier
+        for modality, photos in by_modality.items()
+        for outlier in judge(modality, photos, fits[modality])
+    ]
 
 
 def report(found: list[OutlierView]) -> list[str]:

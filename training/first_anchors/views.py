@@ -4,6 +4,8 @@ import numpy as np
 
 from shapeshift.scene.pose import View
 
+SLACK = 1.5  # distances of samples, by which a surface's own samples may lie behind each other
+
 
 def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(P, 2) pixels, row 0 on top, and (P,) whether the point lies in the image."""
@@ -16,6 +18,30 @@ def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     inside = (z > view.near) & (column >= 0) & (row >= 0) & (column < width) & (row < height)
     pixel = np.stack([column, row], axis=1)
     return pixel, inside
+
+
+def seen_first(points: np.ndarray, edge: float, views: list[View]) -> np.ndarray:
+    """(P,) whether any view has nothing of a surface before a point of it.
+
+    points: samples of surfaces, metres, `edge` apart.
+    """
+    from scipy.ndimage import minimum_filter
+
+    seen = np.zeros(len(points), bool)
+    for view in views:
+        pixel, inside = pixel_of(view, points)
+        rows = np.flatnonzero(inside)
+        if not len(rows):
+            continue
+        camera_from_world, fx, _, _, _ = view.pinhole()
+        depth = points[rows] @ camera_from_world[2, :3] + camera_from_world[2, 3]
+        side = max(1.0, edge * fx / float(np.median(depth)))  # pixels between the samples
+        column, row = (pixel[rows] / side).astype(int).T
+        nearest = np.full([int(length / side) + 1 for length in view.size[::-1]], np.inf)
+        np.minimum.at(nearest, (row, column), depth)
+        nearest = minimum_filter(nearest, 3)  # a surface has no gaps between its samples
+        seen[rows] |= depth <= nearest[row, column] + SLACK * edge
+    return seen
 
 
 def common_box(views: list[View]) -> tuple[np.ndarray, float]:

@@ -65,3 +65,7 @@ class DepthTerm:
     loss: DepthLoss
     target: DepthTarget
     share: float
+
+    def compare(self, drawn: DepthFrame) -> tuple:
+        """Gradients (H, W) by metres and by transmittance."""
+        return self.loss.compare(drawn, self.target, self.share)

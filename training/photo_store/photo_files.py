@@ -30,7 +30,7 @@ from shapeshift.training.photos import LoadedPhoto, PhotoReader
 PIXELS, INDEX = "photos.bin", "index.bin"
 MAGIC = b"shapeshift photos 1\n".ljust(32, b"\0")
 RECORD = struct.Struct("<16sIB11x")  # what it was made of, checksum of the pixels, flags
-THERE, WEIGHTED, DEEP, MASKED = 1, 2, 4, 8  # flags
+THERE, WEIGHTED, DEEP, MASKED, MAPPED = 1, 2, 4, 8, 16  # flags
 
 
 class PhotoFiles:
@@ -94,31 +94,31 @@ class PhotoFiles:
                 self.known.pop(number, None)
             return None
         width, height = view.divided(self.reader.factor).size
-        parts = np.split(np.frombuffer(data, np.uint8), [4 * width * height, 8 * width * height])
+        ends = [4 * width * height * part for part in (1, 2, 3)]
+        parts = np.split(np.frombuffer(data, np.uint8), ends)
         rgba = parts[0].reshape(height, width, 4)
         floats = [part.view(np.float32).reshape(height, width) for part in parts[1:] if len(part)]
         weight = floats.pop(0) if flags & WEIGHTED else None
         depth = floats.pop(0) if flags & DEEP else None
+        normals = None
+        if flags & MAPPED:
+            normals = floats.pop(0).view(np.int8).reshape(height, width, 4)
         photo, masked = self.photos[number], bool(flags & MASKED)
         return LoadedPhoto(
-            view.divided(self.reader.factor),
-            photo.modality,
-            rgba,
-            weight,
-            photo.name,
-            depth,
-            masked,
-        )
+            view.divided(self.reader.factor), photo.modality, rgba, weight, photo.name, depth,
+            masked, normals,
+        )  # fmt: skip
 
     def write(self, number: int, photo: LoadedPhoto, stamp: bytes) -> None:
         """Keeps a photo; stamp: taken before its files were read.  Raises OSError."""
-        arrays = [a for a in (photo.rgba, photo.weight, photo.depth) if a is not None]
+        parts = (photo.rgba, photo.weight, photo.depth, photo.normals)
+        arrays = [part for part in parts if part is not None]
         size = self.reader.bytes_of(self.photos[number])
         data = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays).ljust(
             size, b"\0"
         )
         flags = THERE | WEIGHTED * (photo.weight is not None) | DEEP * (photo.depth is not None)
-        flags |= MASKED * photo.masked
+        flags |= MASKED * photo.masked | MAPPED * (photo.normals is not None)
         checksum = zlib.crc32(data)
         with self.lock:
             write_at(self.pixels, self.starts[number], data)
@@ -129,11 +129,12 @@ class PhotoFiles:
     def stamp(self, number: int) -> bytes:
         """What a photo is made of: its files by time and size, and all that is done to them."""
         photo, about = self.photos[number], [PIL.__version__, str(self.starts[number])]
-        for path in (photo.path, photo.mask, photo.depth):
+        for path in (photo.path, photo.mask, photo.depth, photo.normals):
             if path is not None:
                 state = os.stat(path)
                 about.append(f"{path.absolute()} {state.st_mtime_ns} {state.st_size}")
-        about += [repr(self.reader.way(photo)), repr((photo.counts, photo.depth_unit, photo.lens))]
+        of_files = photo.counts, photo.depth_unit, photo.lens, photo.normal_axes
+        about += [repr(self.reader.way(photo)), repr(of_files)]
         return hashlib.blake2b("\n".join(about).encode(), digest_size=16).digest()
 
     def close(self, keep: bool) -> None:

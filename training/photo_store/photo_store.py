@@ -144,6 +144,14 @@ class StoredPhoto(LoadedPhoto):
         return self.store.photos[self.number].depth is not None
 
     @property
+    def normals(self) -> np.ndarray | None:
+        return self.store.get(self.number).normals if self.has_normals else None
+
+    @property
+    def has_normals(self) -> bool:
+        return self.store.photos[self.number].normals is not None
+
+    @property
     def see_through(self) -> bool:
         return self.masked and self.store.see_through(self.number)
 

@@ -1,9 +1,17 @@
 """Photos as targets of the losses, on the device; as many are kept as fit into memory."""
 
 from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.losses.depth_loss import DepthLoss, DepthTarget, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss, Target
+from shapeshift.training.losses.normal_loss import (
+    NormalLoss,
+    NormalTarget,
+    NormalTerm,
+    ShapeTerm,
+)
 from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.exposure import NONE, Exposures
 
 CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use ...
@@ -20,6 +28,8 @@ class Targets:
         self.kept: dict[tuple, Target] = {}
         self.kept_depths: dict[tuple, DepthTarget] = {}
         self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
+        self.kept_normals: dict[tuple, NormalTarget] = {}
+        self.normal_losses: dict[tuple[int, int], NormalLoss] = {}
         most = CACHE_BYTES if most is None else min(CACHE_BYTES, most)
         self.bytes, self.most = 0, min(most, int(CACHE * Memory().most))
 
@@ -56,6 +66,29 @@ class Targets:
             self.kept[key] = target
             self.bytes += target.bytes
         return target
+
+    def shape_term(
+        self, photo: LoadedPhoto, settings: TrainSettings | PlainSettings
+    ) -> ShapeTerm | None:
+        """What is to be learned of the shape from the photo's depth and normal map, if any."""
+        depth = self.depth_term(photo, settings.depth_share)
+        return self.normal_term(photo, settings.normal_share, depth) or depth
+
+    def normal_term(
+        self, photo: LoadedPhoto, share: float, depth: DepthTerm | None
+    ) -> NormalTerm | None:
+        """What is to be learned from the photo's normal map, beside its depth; None: nothing."""
+        if not (share > 0 and photo.has_normals) or (normals := photo.normals) is None:
+            return None
+        size, key = photo.view.size, (photo.modality, photo.name, photo.view.size)
+        if size not in self.normal_losses:
+            self.normal_losses[size] = NormalLoss(self.device, size)
+        loss = self.normal_losses[size]
+        target = self.kept_normals.get(key) or loss.target(normals, photo.view)
+        if key not in self.kept_normals and self.bytes + target.bytes <= self.most:
+            self.kept_normals[key] = target
+            self.bytes += target.bytes
+        return NormalTerm(loss, target, share, depth) if target.known else None
 
     def depth_term(self, photo: LoadedPhoto, share: float) -> DepthTerm | None:
         """What is to be learned from the photo's depth; None where it has none or share is 0."""

@@ -101,6 +101,9 @@ def cut_photo(photo: LoadedPhoto, region: UpdateRegion) -> LoadedPhoto | None:
         rgba=np.ascontiguousarray(photo.rgba[rows, columns]),
         weight=np.ascontiguousarray(weight[rows, columns], np.float32),
         depth=None if photo.depth is None else np.ascontiguousarray(photo.depth[rows, columns]),
+        normals=None
+        if (normals := photo.normals) is None
+        else np.ascontiguousarray(normals[rows, columns]),
     )
 
 

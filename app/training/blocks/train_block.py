@@ -107,7 +107,7 @@ def settings_of_block(
             )
     try:
         if resume is not None:
-            return resumed(resume[1]["settings"], options.asked, "--")
+            return resumed(TrainSettings(), resume[1]["settings"], options.asked, "--")
         usual = {"iterations": TrainSettings().iterations}
         return adjusted(TrainSettings(**start.notes["settings"]), usual | options.asked)
     except ValueError as error:

@@ -9,8 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shapeshift.app.cluster.digests import digest_of, own_code
 from shapeshift.app.cluster.open_cluster import NONE, Cluster
-from shapeshift.app.cluster.task import Task, digest_of
+from shapeshift.app.cluster.task import Task
 from shapeshift.app.cluster.words import words_for
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import full
@@ -52,12 +53,11 @@ def calibrated_once(
 ) -> "TrainSettings":
     """The settings with the offset of --calibrate, looked for unless an earlier start has."""
     from shapeshift.app.charts.chart_rows import write_text
-    from shapeshift.app.program import version
     from shapeshift.app.training.run_loop import calibrated
     from shapeshift.runtime_models.files.json_fields import saved_object
 
     assert options.calibrate is not None, "asked for"
-    asked = [version(), digest_of(Path(full(options.capture))), settings.as_dict()]
+    asked = [own_code(), digest_of(Path(full(options.capture))), settings.as_dict()]
     key = hashlib.sha256(json.dumps([*asked, options.calibrate]).encode()).hexdigest()
     kept = trials_folder(options.out) / "rig.json"
     noted = saved_object(kept, MOST_BYTES)

@@ -1,10 +1,12 @@
 // shade_sh: spherical harmonics -> colour towards the eye, for eight splats as vectors. colour =
 // max(0, 0.5 + sum of basis(direction) * coefficient), the basis and its signs of 3DGS.
 // Needs:   COEFFICIENTS = 1, 4, 9 or 16.
+// PAGED = 1: of pages (n,) that are drawn, from pages of the arena (n,), which begin at `start`.
 // Reads:   mean_opacity (N, 4); sh (blocks, 3 COEFFICIENTS, 8): what eight splats need is one run
 //          of memory (with a stream a coefficient it took 2.6 times as long); seen, a byte a block.
 // Writes:  color (N, 4).
 // Units:   metres in the object; display sRGB, from 0 on.
+#include "common/pages.cl"
 #include "common/eight_rows.cl"
 
 typedef struct {
@@ -32,12 +34,20 @@ inline float8 at_least_0(float8 color) {
 // A work-item takes `run` blocks.  seen: a byte a block, 0 where no colour is wanted; may be null.
 __kernel void shade_sh(int count, int start, int run, float eye_x, float eye_y, float eye_z,
                        __global const float* mean_opacity, __global const float* sh,
-                       __global const uchar* seen, __global float* color) {
+                       __global const uchar* seen, __global const int* stored,
+                       __global const int* drawn, __global float* color) {
   const int first = get_global_id(0) * run, blocks = (count + LANES - 1) / LANES;
   for (int block = first; block < min(first + run, blocks); block++) {
     if (seen && !seen[block]) continue;
-    const int n = min(LANES, count - LANES * block), i = start + LANES * block;
-    __global const float* s = sh + (size_t)(3 * COEFFICIENTS * LANES) * block;
+#if PAGED
+    const int page = block / (PAGE / LANES), part = block % (PAGE / LANES), n = LANES;
+    const int from = PAGE / LANES * stored[page] + part, i = start + LANES * from;
+    __global float* into = color + 4 * ((long)start + PAGE * (long)drawn[page] + LANES * part - i);
+#else
+    const int n = min(LANES, count - LANES * block), i = start + LANES * block, from = block;
+    __global float* into = color;
+#endif
+    __global const float* s = sh + (size_t)(3 * COEFFICIENTS * LANES) * from;
     // 3DGS stores colours less a half.
     float8 red = 0.5f, green = 0.5f, blue = 0.5f;
     // Degree 0: Y00 = 1 / (2 sqrt(pi)), the same from everywhere.
@@ -77,6 +87,6 @@ __kernel void shade_sh(int count, int start, int run, float eye_x, float eye_y, 
     red = at_least_0(red);
     green = at_least_0(green);
     blue = at_least_0(blue);
-    STORE_ROWS(STORE_COLORS, color, 4)
+    STORE_ROWS(STORE_COLORS, into, 4)
   }
 }

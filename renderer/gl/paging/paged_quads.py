@@ -40,7 +40,9 @@ class PagedQuads(QuadsDrawing):
         self._is_paged, self._owner = (False,) * len(models), np.zeros(0, np.int32)
         self._release_harmonics()
 
-    def allocate_pages(self, models: list[Model], pages: int, coefficients: int) -> None:
+    def allocate_pages(
+        self, models: list[Model], pages: int, coefficients: int, stored: int | None = None
+    ) -> None:
         self._first = sum(map(arena_rows, models))
         self.allocate(models, PAGE * pages)
         self._is_paged = tuple(getattr(model, "leaves", None) is not None for model in models)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from shapeshift.app.cluster import digests
 from shapeshift.app.cluster import run_task as running
 from shapeshift.app.cluster.open_cluster import open_cluster
 from shapeshift.app.cluster.run_task import TaskFailed, TaskStopped, progress_words, run_task
@@ -70,6 +71,63 @@ def test_a_key_is_of_words_and_bytes_and_of_no_place(tmp_path):
     assert len({key, task("two", word="9").key(), task("two", b"bc").key()}) == 3
     (tmp_path / "one" / "in" / "more").write_bytes(b"")
     assert Task("one", task("one").argv, task("one").reads, task("one").writes).key() != key
+
+
+@pytest.fixture
+def other_code(tmp_path, monkeypatch):
+    """A program of two files, instead of this one."""
+    root = tmp_path / "code"
+    (root / "app").mkdir(parents=True)
+    (root / "app" / "__init__.py").write_text("")
+    (root / "app" / "draw.cl").write_text("1")
+    monkeypatch.setattr(digests, "ROOT", root)
+    digests.own_code.cache_clear()
+    yield root
+    digests.own_code.cache_clear()
+
+
+def test_a_digest_of_code_is_of_all_its_files_and_of_nothing_else(other_code):
+    first = digests.code_digest()
+    (other_code / "app" / "draw.pyc").write_text("1")
+    (other_code / "notes").mkdir()
+    (other_code / "notes" / "mine.py").write_text("1")  # in no package
+    assert digests.code_digest() == first
+    seen = {first}
+    (other_code / "app" / "draw.cl").write_text("2")
+    seen.add(digests.code_digest())
+    (other_code / "app" / "draw.cl").rename(other_code / "app" / "drawn.cl")
+    seen.add(digests.code_digest())
+    (other_code / "app" / "more").mkdir()
+    (other_code / "app" / "more" / "new.py").write_text("")
+    seen.add(digests.code_digest())
+    assert len(seen) == 4
+
+
+def test_what_other_code_has_done_is_done_anew(counting, other_code):
+    task, code = counting(letters=30), other_code / "app" / "draw.cl"
+    assert run_heard(task) == ["from 0"] and run_heard(task) == []
+    code.write_text("another")
+    digests.own_code.cache_clear()  # a later start of the program
+    assert run_heard(task) == ["from 0"] and run_heard(task) == []
+    # Changed since the command began, or on a worker's machine: refused before it starts.
+    key = task.key()
+    Path(task.writes[0]).unlink()
+    code.write_text("a third")
+    with pytest.raises(TaskFailed, match=r"count: the program's code on .* is another than"):
+        run_task(task, key, print)
+    assert not Path(task.writes[0]).exists()
+    # Changed while it runs: what it wrote is there, yet no later start takes it for done.
+    digests.own_code.cache_clear()
+    heard: list[str] = []
+
+    def hear(line: str) -> None:
+        heard.append(line)
+        code.write_text("a fourth")
+
+    run_task(task, task.key(), hear)
+    assert heard[0] == "from 0" and "does it anew" in heard[1] and Path(task.writes[0]).exists()
+    digests.own_code.cache_clear()
+    assert run_heard(task) == ["from 0"]  # nor is the checkpoint of the old code gone on from
 
 
 @pytest.mark.parametrize("wrong", [{"argv": ()}, {"writes": ()}, {"writes": ("a",)}, {"name": ""},

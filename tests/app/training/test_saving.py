@@ -7,13 +7,16 @@ import numpy as np
 import pyopencl
 import pytest
 
+from shapeshift.app import progress
 from shapeshift.app.cli import main
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training.saving import cameras_path, check_writable, resume_hint
+from shapeshift.app.training.train import doubts as doubts_of
 from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.calibration import outlier_views
 from shapeshift.training.calibration.outlier_views import failed_modalities
 from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
 from shapeshift.training.photos import load_photos
@@ -194,3 +197,39 @@ def test_a_scene_that_shows_nothing_is_called_that(balls):
     state = trainer.adam.state()
     trainer.adam.load(state | {"anchors.value": state["anchors.value"] + np.float32(1000)})
     assert "RGB, Thermal: the pictures are no nearer" in failed_modalities(trainer)[0]
+
+
+def test_the_look_for_photos_that_do_not_fit_tells_how_far_it_is_and_can_be_ended(
+    balls, monkeypatch
+):
+    """Every photo of every modality counts, and Ctrl-C in the middle says that the scene is whole;
+    the next look begins anew."""
+    trainer = Trainer(open_device(), balls, TrainSettings(iterations=30, max_anchors=200))
+    for _ in trainer.steps():
+        pass
+    monkeypatch.setattr(outlier_views, "failed_modalities", lambda trainer: [])
+    count = sum(map(len, trainer.schedule.photos.values()))
+    told, done, tracked, draw = [], [], progress.tracked, outlier_views.drawn
+
+    def noted(work, what):
+        told.append((len(work), what))
+        for item in tracked(work, what):
+            done.append(item)
+            yield item
+
+    def drawn(trainer, photo):
+        if ends and len(done) == 3:
+            raise KeyboardInterrupt
+        return draw(trainer, photo)
+
+    monkeypatch.setattr(progress, "tracked", noted)
+    monkeypatch.setattr(outlier_views, "drawn", drawn)
+    for ends in (True, False):
+        done.clear()
+        lines, ended = doubts_of(trainer)
+        assert ended is ends and len(done) == (3 if ends else count)
+        if ends:
+            assert lines == [
+                "The scene is complete; not every photo was looked at for what does not fit."
+            ]
+    assert told == 2 * [(count, "looking for photos that do not fit")]

@@ -239,7 +239,6 @@ def test_options_of_another_kind_of_model_are_refused(balls, tmp_path):
     asked = TrainOptions(balls.folder, tmp_path / "out", {"iterations": 2}, model="splats")
     for wrong, words in (
         ({"asked": {"features": 8}}, "--features is of anchor models"),
-        ({"resume": True}, "begin anew"),
         ({"separate": True}, "leave out --separate"),
         ({"splats": {"sh_degree": 4}}, "up to degree 3"),
         ({"model": "anchors", "splats": {"sh_degree": 2}}, "--sh-degree is of plain splats"),
@@ -255,30 +254,72 @@ def test_options_of_another_kind_of_model_are_refused(balls, tmp_path):
 
 
 @pytest.mark.parametrize(("kind", "trainer"), [("splats", PlainTrainer), ("anchors", Trainer)])
-def test_ctrl_c_keeps_what_was_trained(balls, tmp_path, monkeypatch, capsys, kind, trainer):
-    step = trainer.one_step
+def test_ctrl_c_keeps_what_was_trained_and_resume_goes_on(
+    balls, tmp_path, monkeypatch, capsys, kind, trainer
+):
+    step, asked_to_stop = trainer.one_step, []
 
     def interrupted(self):
-        if self.iteration == 5:
+        if asked_to_stop and self.iteration == asked_to_stop[0]:
             os.kill(os.getpid(), signal.SIGINT)
+            asked_to_stop.clear()
         return step(self)
 
     monkeypatch.setattr(trainer, "one_step", interrupted)
     small = {} if kind == "splats" else {"max_anchors": 100}
     asked = TrainOptions(
-        balls.folder, tmp_path / "out", {"iterations": 4000} | small, model=kind,
+        balls.folder, tmp_path / "whole", {"iterations": 40} | small, model=kind,
         splats={"max_splats": 300} if kind == "splats" else {}, separate=kind == "anchors",
         device="cpu",
     )  # fmt: skip
+    assert run_training(asked) == 0
+    whole = models_of(tmp_path / "whole")
+    asked = replace(asked, out=tmp_path / "out")
+    with pytest.raises(BadFile, match="no checkpoint to resume from"):
+        run_training(replace(asked, resume=True))
+    asked_to_stop.append(5)
     assert run_training(asked) == 130
-    assert "interrupted" in (told := capsys.readouterr().err) and "not trained: Thermal" in told
+    told = capsys.readouterr().err
+    assert "not trained: Thermal; --resume goes on" in told
     path = tmp_path / "out" if kind == "splats" else tmp_path / "out" / "0_RGB.shift"
     assert [stop.name for stop in read_model(path).stops] == ["RGB"]
-    few = {"max_splats": 300}
-    table = Options(balls.folder, tmp_path / "t", iterations=4000, methods=("splats",), splats=few)
-    if kind == "splats":
-        assert run(table) == 130  # no row of half a method
-        assert not (tmp_path / "t" / "table.csv").exists()
+    with pytest.raises(UsageError, match="where seed is 0, not 7"):
+        run_training(replace(asked, asked=asked.asked | {"seed": 7}, resume=True))
+    asked_to_stop.append(10)  # and once more: a run may be ended as often as one likes
+    assert run_training(replace(asked, resume=True)) == 130
+    assert run_training(replace(asked, resume=True)) == 0
+    assert models_of(tmp_path / "out") == whole and len(whole) == 2 + (kind == "splats")
+    # Two modalities share a budget: twice as many steps are twice as many for each.
+    more = replace(asked, asked={"iterations": 80}, splats={}, resume=True)
+    assert run_training(more) == 0 and "40 steps" in capsys.readouterr().err
+    assert models_of(tmp_path / "out") != whole
+
+
+def models_of(folder: Path) -> dict[str, bytes]:
+    """All that is in a folder of models; checkpoints lie beside it."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_comparison_that_was_ended_goes_on(balls, tmp_path, monkeypatch):
+    """In the middle of the second model: the first is not trained again, the second goes on."""
+    few = {"splats": {"max_splats": 300}, "iterations": 24, "methods": ("splats",)}
+    table = Options(balls.folder, tmp_path / "t", device="cpu", **few)
+    step, done = PlainTrainer.one_step, []
+
+    def interrupted(self):
+        if len(done) == 12 + 5:
+            os.kill(os.getpid(), signal.SIGINT)
+        done.append((self.stop.name, self.iteration))
+        return step(self)
+
+    monkeypatch.setattr(PlainTrainer, "one_step", interrupted)
+    assert run(table) == 130  # no row of half a method
+    assert not (tmp_path / "t" / "table.csv").exists()
+    assert run(table) == 0
+    assert done == [(name, i) for name in ("RGB", "Thermal") for i in range(12)]
+    monkeypatch.undo()
+    assert run(replace(table, out=tmp_path / "whole")) == 0
+    assert models_of(tmp_path / "t" / "splats") == models_of(tmp_path / "whole" / "splats")
 
 
 def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):

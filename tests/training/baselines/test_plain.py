@@ -28,6 +28,7 @@ from shapeshift.training.baselines.plain_density import (
 )
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.baselines.plain_step import GROUPS
+from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.first_anchors.first_anchors import neighbour_distance, photo_colors
 from shapeshift.training.synthetic.balls import STOPS, make_balls
@@ -175,6 +176,43 @@ def test_the_same_seed_gives_the_same_bits(device, balls, trained):
         np.testing.assert_array_equal(again[name], values, err_msg=name)
     other = run(PlainTrainer(device, one_modality(balls, "RGB"), replace(SETTINGS, seed=1)), 5)
     assert not np.array_equal(other.adam.state()["base.value"], again["base.value"])
+
+
+def stopped_at(trainer, step: int, path):
+    for now in trainer.steps():
+        if now.iteration == step:
+            break
+    write_checkpoint(path, *trainer.checkpoint())
+    return read_checkpoint(path)
+
+
+@pytest.mark.parametrize("step", [1, 20, 21, 60])  # 20: right after a change of the splats
+def test_a_run_that_goes_on_ends_with_the_same_bits(device, balls, trained, tmp_path, step):
+    capture = one_modality(balls, "RGB")
+    state = stopped_at(PlainTrainer(device, capture, SETTINGS), step, tmp_path / "a.npz")
+    again = PlainTrainer(device, capture, SETTINGS, resume=state)
+    assert again.iteration == step and again.start_s > 0
+    run(again)
+    for name, values in trained[0].adam.state().items():
+        np.testing.assert_array_equal(again.adam.state()[name], values, err_msg=name)
+    np.testing.assert_array_equal(
+        device.download(again.stats.sums), device.download(trained[0].stats.sums)
+    )
+    # One that was done already trains nothing, and is what it was.
+    done = PlainTrainer(device, capture, SETTINGS, resume=again.checkpoint())
+    assert run(done).iteration == SETTINGS.iterations
+    np.testing.assert_array_equal(done.splats().means, again.splats().means)
+
+
+def test_a_checkpoint_of_something_else_is_refused(device, balls, tmp_path):
+    state = stopped_at(
+        PlainTrainer(device, one_modality(balls, "RGB"), SETTINGS), 1, tmp_path / "a.npz"
+    )
+    with pytest.raises(BadFile, match="not of plain splats of 'Thermal'"):
+        PlainTrainer(device, one_modality(balls, "Thermal"), SETTINGS, resume=state)
+    del state[1]["plain_splats_of"]  # as those of anchors
+    with pytest.raises(BadFile, match="not of plain splats of 'RGB'"):
+        PlainTrainer(device, one_modality(balls, "RGB"), SETTINGS, resume=state)
 
 
 ONE_THREAD = """

@@ -35,19 +35,24 @@ ONE = SIZE[0] * SIZE[1] * 4  # bytes of a photo
 
 
 def capture_of(folder: Path, count: int = 20, bent: bool = False) -> Capture:
-    """Photos of noise, of every kind: plain, with alpha, mask, depth; the last two held out."""
+    """Photos of noise, of every kind: plain, with alpha, mask, depth, and normals beside the last
+    two of these; the last two held out.
+    """
     lens = ColmapCamera("SIMPLE_RADIAL", SIZE, (45.0, 20.0, 15.0, 0.1)) if bent else None
     size = SIZE if lens is None else pinhole_of(lens).size
     view = View(look_at(np.ones(3), np.zeros(3)), perspective(0.7, size), 0.05, 100.0, size)
     mask, deep = folder / "mask.png", folder / "depth.png"
     Image.fromarray(RNG(1).integers(0, 256, SIZE[::-1], np.uint8)).save(mask)
     Image.fromarray(RNG(2).integers(0, 4000, SIZE[::-1], np.uint16)).save(deep)
-    photos = []
+    mapped, photos = folder / "normals.png", []
+    ahead = RNG(3).integers((64, 64, 200), (192, 192, 256), (*SIZE[::-1], 3), np.uint8)
+    Image.fromarray(ahead).save(mapped)
     for i in range(count):
         channels = 4 if i % 4 == 1 else 3
         path = folder / f"{i:03}.png"
         Image.fromarray(RNG(i).integers(0, 256, (*SIZE[::-1], channels), np.uint8)).save(path)
         more = {"mask": mask} if i % 4 == 2 else {"depth": deep} if i % 4 == 3 else {}
+        more |= {"normals": mapped} if i % 8 > 5 else {}
         split = "test" if i >= count - 2 else "train"
         photos.append(Photo(view, path, "RGB", split=split, lens=lens, **more))
     return Capture(folder, (Stop("RGB", 0.0),), tuple(photos))
@@ -64,9 +69,10 @@ def assert_same(found: list[LoadedPhoto], wanted: list[LoadedPhoto]) -> None:
     assert len(found) == len(wanted)
     for a, b in zip(found, wanted, strict=True):
         assert (a.view, a.modality, a.name) == (b.view, b.modality, b.name)
-        assert (a.masked, a.has_depth, a.see_through) == (b.masked, b.has_depth, b.see_through)
+        assert (a.masked, a.see_through) == (b.masked, b.see_through)
         assert a.bytes == b.bytes
-        for name in ("rgba", "weight", "depth"):
+        assert a.kind == b.kind
+        for name in ("rgba", "weight", "depth", "normals"):
             ours, own = getattr(a, name), getattr(b, name)
             assert (ours is None) == (own is None)
             if own is not None:
@@ -212,7 +218,7 @@ def test_steps_find_their_photos_read(tmp_path):
     """What the schedule asks for is in the window or on its way, also for a second run and after a
     jump; photos are read once."""
     capture = capture_of(tmp_path)
-    photos = stored(capture, 11 * 2 * ONE)
+    photos = stored(capture, 11 * 3 * ONE)
     assert photos.store.ahead == 5
     schedule = Schedule({"RGB": photos.train}, 0, (0.0, 0.0, 0.0))
     for start in (0, 0, 40):

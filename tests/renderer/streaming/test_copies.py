@@ -1,0 +1,144 @@
+"""Copies of one object draw the same pages: beside objects that were read one by one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.appearance import Appearance
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import Scene, Tint
+from shapeshift.scene.sections.read_section import read_section
+from tests.support.splat_scenes import random_layers, shell
+from tests.support.streamed_scenes import open_levels, scene_of, view_at, write_levels
+
+BUDGET = 6000
+VIEWS = [view_at((2 * np.sin(turn), 0.4, 5 * np.cos(turn))) for turn in np.linspace(0, 1, 12)]
+EDITS = {
+    "fainter": {"appearance": Appearance(opacity=0.5)},
+    "cut": {"sections": (read_section("plane:1,0,0,0.1:hard", ()),)},
+    "darker": {"appearance": Appearance(exposure=-1.0)},
+    "tinted": {"tint": Tint((1.0, 0.0, 0.0), 0.5)},
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_levels(shell(3000, 1), tmp_path_factory.mktemp("levels") / "shell")
+
+
+def standing(scene: Scene, **first) -> Scene:
+    """Its objects in a row, turned a little more each; the first one looks otherwise."""
+    objects = []
+    for i, obj in enumerate(scene.objects):
+        pose = Pose(np.array([2.1 * i - 3, 0, -1.3 * i]), np.array([np.cos(i), 0, np.sin(i), 0]))
+        objects.append(replace(obj, world_from_object=pose, **(first if i == 0 else {})))
+    return replace(scene, objects=tuple(objects))
+
+
+def both(folder, count: int = 4) -> tuple[Scene, Scene]:
+    """Copies of one model, and as many that were read one by one."""
+    one = open_levels(folder, BUDGET)
+    return scene_of(*[one] * count), scene_of(*[open_levels(folder, BUDGET) for _ in range(count)])
+
+
+def pages_in_use(renderer: Renderer) -> tuple[int, int]:
+    """Those drawn, and those that their splats lie in."""
+    pages = renderer.drawing.paged
+    assert pages.uses.sum() == np.count_nonzero(pages.stored >= 0)
+    np.testing.assert_array_equal(
+        pages.uses, np.bincount(pages.stored[pages.stored >= 0], minlength=len(pages.uses))
+    )
+    return int(pages.uses.sum()), int(np.count_nonzero(pages.uses))
+
+
+@pytest.mark.parametrize("coefficients", [1, 9])
+def test_pictures_are_those_of_separate_objects_to_the_bit(tmp_path, coefficients):
+    folder = write_levels(shell(2000, coefficients), tmp_path / "shell")
+    shared, apart = map(standing, both(folder))
+    with Renderer(None, "tiles") as one, Renderer(None, "tiles") as other:
+        one.update(shared)
+        other.update(apart)
+        for view in VIEWS[::3]:
+            pair = (view, replace(view, size=(80, 48)))
+            one.draw([*pair])
+            other.draw([*pair])
+            for i in range(2):
+                np.testing.assert_array_equal(one.image(i), other.image(i))
+        assert one.image(0)[..., 3].max() > 0.9
+        drawn, stored = pages_in_use(one)
+        assert stored < 0.7 * drawn  # four copies, at levels of their own
+        assert pages_in_use(other)[0] == pages_in_use(other)[1] == drawn
+        np.testing.assert_array_equal(one.surface(VIEWS[0]).metres, other.surface(VIEWS[0]).metres)
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_a_copy_that_is_changed_changes_alone_also_in_motion(folder, edit):
+    """It gets pages of its own when it is changed, others go on sharing, and back."""
+    shared, apart = both(folder)
+    with Renderer(None, "tiles") as one, Renderer(None, "tiles") as other:
+        one.streaming.converges = other.streaming.converges = True
+        for n, view in enumerate(VIEWS):
+            first = EDITS[edit] if 4 <= n < 8 else {}
+            for renderer, scene in ((one, shared), (other, apart)):
+                renderer.update(standing(scene, **first))
+                renderer.draw([view])
+            np.testing.assert_array_equal(one.image(0), other.image(0))
+            drawn, stored = pages_in_use(one)
+            assert stored < drawn
+
+
+def test_frames_in_motion_share_too(folder):
+    shared = standing(both(folder)[0])
+    with Renderer(None, "tiles") as one:
+        one.streaming.converges = False
+        one.update(shared)
+        for view in VIEWS:
+            for _ in range(3):
+                one.draw([view])
+            drawn, stored = pages_in_use(one)
+            table, pages = one.streaming.stream.table, one.drawing.paged
+            # Copies at the same level draw the same rows.
+            counts = np.unique(pages.stored[pages.stored >= 0])
+            levels = table.level.reshape(4, -1)
+            shown = [set(column[column >= 0]) for column in levels.T]
+            assert len(counts) == stored <= drawn
+            sources = shared.objects[0].model.leaves.levels.counts
+            most = sum(-(-sources[i, k] // 32) for i, each in enumerate(shown) for k in each)
+            assert stored <= most
+
+
+def test_a_hundred_copies_lie_in_the_pages_of_one(folder):
+    model = open_levels(folder, 20_000)
+    with Renderer(None, "tiles") as renderer:
+        renderer.update(standing(scene_of(*[model] * 100)))
+        stats = renderer.draw([view_at((0, 2, 8))])
+        drawn, stored = pages_in_use(renderer)
+        assert stats.streaming.shown <= 20_000 and drawn > 4 * stored
+        every = model.leaves.levels.counts
+        assert len(renderer.drawing.paged.uses) == (-(-every // 32)).sum()
+
+
+def test_objects_in_full_and_other_models_stand_beside(folder, tmp_path):
+    """Rows of objects without levels come first and stay where they are."""
+    other = write_levels(shell(900, 4), tmp_path / "other")
+    scenes = []
+    for again in (False, True):
+        one, two = open_levels(folder, BUDGET), open_levels(other, BUDGET)
+        models = [one, random_layers(77), two, one, two]
+        if again:
+            models[3:] = [open_levels(folder, BUDGET), open_levels(other, BUDGET)]
+        scenes.append(standing(scene_of(*models)))
+    pictures, points = [], []
+    for scene in scenes:
+        with Renderer(None, "tiles") as renderer:
+            renderer.update(scene)
+            renderer.draw([VIEWS[0]])
+            pictures.append(renderer.image(0))
+            mean_opacity, owner, _ = renderer.drawing.splat_points()
+            there = mean_opacity[:, 3] > 0
+            rows = np.column_stack([owner, mean_opacity])[there]
+            points.append(rows[np.lexsort(rows.T)])
+    np.testing.assert_array_equal(*pictures)
+    np.testing.assert_array_equal(*points)

@@ -1,0 +1,108 @@
+"""Which way a drawing's surfaces should look: a normal map, with its gradients by the depth drawn.
+
+Two neighbouring pixels of one surface lie along it, so the way from one to the other is square to
+its normal.  That needs no normal of the drawing, and no distance: a normal map says how a surface
+lies, not where.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shapeshift.rasterizer.surface import DepthFrame
+from shapeshift.scene.pose import View
+from shapeshift.training.heads.networks import KERNELS
+from shapeshift.training.losses.depth_loss import DepthTerm
+
+# Cosine between the normals of two neighbours from which they lie on one surface; less is a crease
+# or an edge.  The same number stands in normals.cl, in steps of 1 / 127.
+ALIKE = 0.9
+
+
+@dataclass(frozen=True)
+class NormalTarget:
+    """A normal map on the device, and the camera that sees it."""
+
+    normals: Any  # (H, W, 4) int8: 127 times the direction, eye axes, and 1 where it is known
+    camera: tuple[float, float, float, float]  # fx, fy, cx, cy, pixels
+    known: int  # pairs of neighbours that lie on one surface
+
+    @property
+    def bytes(self) -> int:
+        return self.normals.nbytes
+
+
+def pairs_of(normals: np.ndarray) -> int:
+    """How many pairs of neighbours of (H, W, 4) int8 lie on one surface."""
+    whole, count = normals.astype(np.int32), 0
+    for one, other in ((whole[:, :-1], whole[:, 1:]), (whole[:-1], whole[1:])):
+        both = (one[..., 3] > 0) & (other[..., 3] > 0)
+        cosine = (one[..., :3] * other[..., :3]).sum(axis=2)
+        count += int((both & (cosine >= round(ALIKE * 127 * 127))).sum())
+    return count
+
+
+class NormalLoss:
+    """The mean of |e| / (1 + |e|) over pairs of neighbours on one surface.
+
+    e = n . (p2 - p1) / (z |r2 - r1|): n the mean of their normals, p = z r where their rays r meet
+    what is drawn, z the mean of both depths below the line.  It is the slope by which the drawing
+    leaves the surface; a jump of the depth, which many a prior draws over, counts 1 and pulls
+    little.  Pixels that are covered by less than a half count 0.
+    """
+
+    def __init__(self, device, size: tuple[int, int]) -> None:
+        width, height = size
+        self.device, self.size, self.known = device, size, 1
+        self.kernels = device.program(KERNELS / "normals.cl")
+        self.grad_metres, self.grad_transmittance = (
+            device.empty((height, width)) for _ in range(2)
+        )
+        self.rows = device.empty(height)
+
+    def target(self, normals: np.ndarray, view: View) -> NormalTarget:
+        """(H, W, 4) int8 as load_normals gives them, of a photo with that view."""
+        whole = np.ascontiguousarray(normals, np.int8)
+        _, *camera = view.pinhole()
+        return NormalTarget(self.device.upload(whole), tuple(camera), pairs_of(whole))
+
+    def compare(
+        self, drawn: DepthFrame, target: NormalTarget, share: float, others: tuple | None = None
+    ) -> tuple:
+        """Gradients (H, W) by metres and by transmittance of `share` times the loss.
+
+        others: such of another loss, to which these are added.
+        """
+        width, height = self.size
+        self.known = max(target.known, 1)
+        by_metres, by_through = others or (self.grad_metres, self.grad_transmittance)
+        self.device.launch(
+            self.kernels["compare_normals"], height, 1, width, height,
+            np.float32(share / self.known), int(others is not None),
+            *(np.float32(number) for number in target.camera), target.normals, drawn.metres,
+            drawn.frame.transmittance, by_metres, by_through, self.rows,
+        )  # fmt: skip
+        return by_metres, by_through
+
+    def value(self) -> float:
+        """The loss of the last `compare`, without its share."""
+        return float(self.device.download(self.rows).sum(dtype=np.float64)) / self.known
+
+
+@dataclass(frozen=True)
+class NormalTerm:
+    """What a step learns from a normal map, and how much of it; and from depth beside it."""
+
+    loss: NormalLoss
+    target: NormalTarget
+    share: float
+    depth: DepthTerm | None = None
+
+    def compare(self, drawn: DepthFrame) -> tuple:
+        """Gradients (H, W) by metres and by transmittance."""
+        others = None if self.depth is None else self.depth.compare(drawn)
+        return self.loss.compare(drawn, self.target, self.share, others)
+
+
+ShapeTerm = DepthTerm | NormalTerm
