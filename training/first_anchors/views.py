@@ -4,7 +4,7 @@ import numpy as np
 
 from shapeshift.scene.pose import View
 
-SLACK = 1.5  # distances of samples, by which a surface's own samples may lie behind each other
+SLACK = 1.5  # distances of samples by which those of one surface may lie behind each other
 
 
 def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -40,7 +40,8 @@ def seen_first(points: np.ndarray, edge: float, views: list[View]) -> np.ndarray
         nearest = np.full([int(length / side) + 1 for length in view.size[::-1]], np.inf)
         np.minimum.at(nearest, (row, column), depth)
         nearest = minimum_filter(nearest, 3)  # a surface has no gaps between its samples
-        seen[rows] |= depth <= nearest[row, column] + SLACK * edge
+        slack = SLACK * side / fx * depth  # metres: the samples', or a pixel where that is more
+        seen[rows] |= depth <= nearest[row, column] + slack
     return seen
 
 
