@@ -1,7 +1,7 @@
 """The OpenCL device that everything here runs on: GPU before CPU, a plain word where is none."""
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -207,6 +207,18 @@ def _opened(device: "cl.Device") -> Device:
         lanes=device.native_vector_width_float,
         most_bytes=device.max_mem_alloc_size,
     )
+
+
+def with_small_pool(device: Device) -> Device:
+    """The device with a pool of its own that keeps less for arrays whose sizes change all the time.
+
+    Sizes are rounded up to 1, 1.5, 2, 3, 4, ... times a power of two, not to eighths, so that fewer
+    sizes are kept unused; arrays take a fifth more in the mean.  Contents are the same to the bit.
+    """
+    from pyopencl.tools import ImmediateAllocator, MemoryPool
+
+    pool = MemoryPool(ImmediateAllocator(device.queue), leading_bits_in_bin_id=1)
+    return replace(device, pool=pool)
 
 
 def _kind(device: "cl.Device") -> str:

@@ -14,12 +14,18 @@ from shapeshift.runtime_models.model import (
     Stop,
 )
 from shapeshift.runtime_models.rotation import normalize
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
 from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, HeadLayout
 
 ACTIVATION = {
     "offset": "tanh", "scale": "exp", "rotation": "none", "opacity": "tanh", "color": "sigmoid",
 }  # fmt: skip
+
+
+def origin_in(capture: Capture) -> dict[str, object]:
+    """What a package says of where its zero lies in the world of its capture, if elsewhere."""
+    return {"origin_m": list(capture.origin)} if any(capture.origin) else {}
 
 
 def model_of(

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from shapeshift.app.cluster.run_task import progress_words
 from shapeshift.app.progress import progress_bar
@@ -36,6 +36,19 @@ class Board:
         shown = [f"{name}: {words}" if words else name for name, words in self._now.items()]
         more = f"; {len(shown) - MOST_SHOWN} more" if len(shown) > MOST_SHOWN else ""
         self._show(description="; ".join(shown[:MOST_SHOWN]) + more, advance=advance)
+
+
+Shown = Callable[[int, int], AbstractContextManager[Board]]  # of so many tasks, some done already
+
+
+def board_of_words(hear: Callable[[str], None]) -> Shown:
+    """Instead of a bar: words for a function, as they come."""
+
+    def show(description: str, advance: int = 0) -> None:
+        if description:
+            hear(description)
+
+    return lambda count, done: nullcontext(Board(show, hear))
 
 
 @contextmanager

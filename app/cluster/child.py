@@ -15,9 +15,21 @@ GRACE_S = 20.0  # to save what there is
 
 def main() -> int:
     watch_parent()
+    if len(sys.argv) > 1 and sys.argv[1].endswith(".py"):
+        return run_script(sys.argv[1:])
     from shapeshift.app.cli import main as run_program
 
     return run_program()
+
+
+def run_script(argv: list[str]) -> int:
+    """A program of tools/ instead of a command of this one, as Python itself starts it."""
+    import runpy
+
+    sys.argv[:] = argv
+    sys.path.insert(0, os.path.dirname(argv[0]))
+    runpy.run_path(argv[0], run_name="__main__")
+    return 0
 
 
 def watch_parent() -> None:

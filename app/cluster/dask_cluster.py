@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.cluster import on_worker
-from shapeshift.app.cluster.board import Board, board
+from shapeshift.app.cluster.board import Board, Shown, board
 from shapeshift.app.cluster.child import GRACE_S
 from shapeshift.app.cluster.here import check_tasks, raise_failed
 from shapeshift.app.cluster.on_worker import DONE, FAILED, run_on_worker
@@ -33,6 +33,8 @@ CONNECT_S = 15.0
 class DaskCluster:
     """Runs tasks on the workers of a scheduler."""
 
+    shown: Shown = staticmethod(board)
+
     def __init__(self, client: "Client") -> None:
         self.client = client
 
@@ -43,7 +45,10 @@ class DaskCluster:
         self._check_slots(waiting)
         failed: list[TaskFailed] = []
         futures: dict[Future, Task] = {}
-        with board(len(tasks), len(tasks) - len(waiting)) as shown, self._heard(shown) as topic:
+        with (
+            self.shown(len(tasks), len(tasks) - len(waiting)) as shown,
+            self._heard(shown) as topic,
+        ):
             try:
                 for task in waiting:
                     futures[self._submit(task, keys[task.name], topic)] = task

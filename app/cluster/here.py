@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 
-from shapeshift.app.cluster.board import Board, board
+from shapeshift.app.cluster.board import Board, Shown, board
 from shapeshift.app.cluster.run_task import TaskFailed, run_task
 from shapeshift.app.cluster.task import Task
 
 
 class Here:
     """Runs tasks without a cluster."""
+
+    def __init__(self, shown: Shown = board) -> None:
+        self.shown = shown
 
     def run(self, tasks: Sequence[Task]) -> None:
         """Returns when all are done.  A task that fails is said at once, and the others go on.
@@ -18,7 +21,7 @@ class Here:
         keys = check_tasks(tasks)
         failed: list[TaskFailed] = []
         open_tasks = [task for task in tasks if not task.is_done(keys[task.name])]
-        with board(len(tasks), len(tasks) - len(open_tasks)) as shown:
+        with self.shown(len(tasks), len(tasks) - len(open_tasks)) as shown:
             for task in open_tasks:
                 self._run_one(task, keys[task.name], shown, failed)
         raise_failed(failed, len(tasks))

@@ -4,11 +4,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.command_line import EXPERT, Opt
 from shapeshift.app.errors import UsageError
+
+if TYPE_CHECKING:
+    from shapeshift.app.cluster.board import Shown
 
 NONE = "none"
 
@@ -53,9 +56,11 @@ def check_cluster(options: ClusterOptions) -> None:
 
 @contextmanager
 def open_cluster(
-    where: str = NONE, certificates: Path | None = None, gpus: int = 0
-) -> Iterator[Cluster]:
-    """What runs tasks where --cluster says.  Raises UsageError."""
+    where: str = NONE, certificates: Path | None = None, gpus: int = 0,
+    shown: "Shown | None" = None,
+) -> Iterator[Cluster]:  # fmt: skip
+    """What runs tasks where --cluster says; shown: instead of a bar.  Raises UsageError."""
+    from shapeshift.app.cluster.board import board
     from shapeshift.app.cluster.here import Here
     from shapeshift.app.cluster.place import read_place
 
@@ -66,7 +71,7 @@ def open_cluster(
             "machines `cluster worker --gpus` says how many there are."
         )
     if place.kind == "none":
-        yield Here()
+        yield Here(shown or board)
         return
     from shapeshift.app.cluster.certificates import require_dask
 
@@ -82,4 +87,5 @@ def open_cluster(
 
         opened = slurm_cluster(place.file, certificates)
     with opened as cluster:
+        cluster.shown = shown or board
         yield cluster

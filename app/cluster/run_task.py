@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import queue
 import signal
 import socket
 import subprocess
@@ -158,31 +159,36 @@ def start(task: Task, words: tuple[str, ...], note: int) -> subprocess.Popen[byt
 def follow(
     child: subprocess.Popen[bytes], command: str, hear: Hear, wanted: Callable[[], bool]
 ) -> str:
-    """Its last line that is no progress, once it has ended."""
-    last = ""
+    """Its last line that is no progress, once it has ended; all are heard in this thread."""
+    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def read() -> None:
-        nonlocal last
         assert child.stderr is not None
         with child.stderr:
             for raw in child.stderr:
                 if line := raw.decode("utf-8", "replace").strip():
-                    last = line if progress_words(line, command) is None else last
-                    hear(line)
+                    lines.put(line)
 
-    reader = threading.Thread(target=read, name="a task's lines", daemon=True)
+    def hear_next(wait_s: float) -> str:
+        """The last line so far."""
+        with contextlib.suppress(queue.Empty):
+            line = lines.get(timeout=wait_s)
+            hear(line)
+            return line if progress_words(line, command) is None else last
+        return last
+
+    reader, last = threading.Thread(target=read, name="a task's lines", daemon=True), ""
     reader.start()
     try:
         while child.poll() is None:
-            reader.join(LOOK_S)
+            last = hear_next(LOOK_S)
             if not wanted():
                 raise TaskStopped(command)
-            if not reader.is_alive():
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    child.wait(LOOK_S)
     finally:
         end(child)
-        reader.join(LOOK_S)
+        reader.join(LOOK_S)  # longer only where others hold the pipe
+        while not lines.empty():
+            last = hear_next(0)
     return last
 
 

@@ -23,7 +23,8 @@ DONE, BEGUN = ".done.json", ".begun.json"  # notes beside the first file that is
 
 @dataclass(frozen=True)
 class Task:
-    """`launch.py argv...`, run once anywhere that sees the same files.
+    """`launch.py argv...`, or `python3 argv...` where the first word is a program NAME.py, run once
+    anywhere that sees the same files.
 
     All paths are absolute and stand in `argv` as they do in `reads` and `writes`.
     """

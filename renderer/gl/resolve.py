@@ -1,19 +1,14 @@
 """resolve: a float image over a background, palette applied, into any framebuffer."""
 
-from ctypes import c_int, c_uint, c_void_p
-
 import moderngl
 import numpy as np
 
-from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
 from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.window.window_bytes import WindowBytes
 from shapeshift.scene.appearance import Background, Sky, up_of_eye
 from shapeshift.scene.pose import View
 
 STEPS = 256  # colours of a palette
-GL_TEXTURE0, GL_TEXTURE_2D, GL_RGBA, GL_BGRA = 0x84C0, 0x0DE1, 0x1908, 0x80E1
-GL_UNSIGNED_INT_8_8_8_8_REV, GL_NEAREST, GL_COLOR_BUFFER_BIT = 0x8367, 0x2600, 0x4000
-GL_READ_FRAMEBUFFER = 0x8CA8
 
 
 class Resolve:
@@ -148,70 +143,6 @@ class Resolve:
 
     def __exit__(self, *failure) -> None:
         self.release()
-
-
-class WindowBytes:
-    """Bytes on their way to a window, in a texture laid out as the window's memory is: of no stated
-    size, and given blue first.  Blitted upside down they need no turn, since GL counts rows from
-    below and a window's memory from above.
-    """
-
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
-        self._source: moderngl.Framebuffer | None = None
-        try:
-            self._functions: GlFunctions | None = GlFunctions()
-        except NoFunction:
-            self._functions = None
-
-    @property
-    def works(self) -> bool:
-        """Whether there are the functions that this needs; GL's own order of bytes does without."""
-        return self._functions is not None
-
-    def copy(self, pixels: np.ndarray, framebuffer: moderngl.Framebuffer) -> None:
-        """Fills the viewport of a framebuffer, which is bound, with (H, W, 4) uint8 of its size."""
-        height, width = pixels.shape[:2]
-        data = np.ascontiguousarray(pixels).ctypes.data
-        if self._source is None or self._source.size != (width, height):
-            self.release()
-            self._source = self._gpu.ctx.framebuffer([self._gpu.ctx.texture((width, height), 4)])
-            self._gpu.allocations += 1
-            self._write(None, width, height)
-        self._write(data, width, height)
-        left, below = framebuffer.viewport[:2]
-        shown = (left, below + height, left + width, below)  # upside down
-        self._call("glBindFramebuffer", (c_uint, c_uint), GL_READ_FRAMEBUFFER, self._source.glo)
-        sides = (0, 0, width, height, *shown)
-        how = (GL_COLOR_BUFFER_BIT, GL_NEAREST)
-        self._call("glBlitFramebuffer", (c_int,) * 8 + (c_uint,) * 2, *sides, *how)
-
-    def _write(self, data: int | None, width: int, height: int) -> None:
-        """Into the texture; None: lays it out."""
-        assert self._source is not None
-        (texture,) = self._source.color_attachments
-        unit = GL_TEXTURE0 + self._gpu.ctx.default_texture_unit  # where moderngl writes, too
-        self._call("glActiveTexture", (c_uint,), unit)
-        self._call("glBindTexture", (c_uint, c_uint), GL_TEXTURE_2D, texture.glo)
-        order = (GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, data)
-        if data is None:
-            kinds = (c_uint, *(c_int,) * 5, c_uint, c_uint, c_void_p)
-            self._call("glTexImage2D", kinds, GL_TEXTURE_2D, 0, GL_RGBA, width, height, 0, *order)
-        else:
-            kinds = (c_uint, *(c_int,) * 5, c_uint, c_uint, c_void_p)
-            place = (0, 0, 0, width, height)
-            self._call("glTexSubImage2D", kinds, GL_TEXTURE_2D, *place, *order)
-
-    def _call(self, name: str, kinds: tuple, *arguments) -> None:
-        assert self._functions is not None
-        self._functions.call(name, None, kinds, *arguments)
-
-    def release(self) -> None:
-        if self._source is not None:
-            for texture in self._source.color_attachments:
-                texture.release()
-            self._source.release()
-            self._source = None
 
 
 def set_background(program: moderngl.Program, background: Background, view: View | None) -> None:

@@ -58,9 +58,8 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
         turn = ours_from_world(reading)
     else:
         up = data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None)
-        turn = flipped(reading) @ CaptureWorld.of(np.array(cameras), (0, 0, 1), up, where).turned(
-            np.eye(4)
-        )
+        world = CaptureWorld.of(np.array(cameras), (0, 0, 1), up, where)
+        turn = flipped(reading) @ world.ours_from_file
     views, names = [], []
     for entry, camera, at in zip(entries, cameras, frames, strict=True):
         views.append(view_of(entry, turn @ camera, files[0].parent, reading, notes, at))

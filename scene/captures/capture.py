@@ -9,6 +9,8 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
 from shapeshift.scene.pose import View
 
+ORIGIN = "origin"  # in the notes: metres, our axes, that were taken off all places
+
 
 @dataclass(frozen=True)
 class Photo:
@@ -51,3 +53,8 @@ class Capture:
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """Metres, our axes: where its zero lies in the file's world; zeros nearly always."""
+        return self.notes.get(ORIGIN, (0.0, 0.0, 0.0))

@@ -16,17 +16,13 @@ from shapeshift.app.paths import plain
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
+    from shapeshift.app.training.blocks.outcome import TrainOutcome
     from shapeshift.decomposition.poses.pose_report import PoseReport
-    from shapeshift.scene.captures.capture import Capture
-    from shapeshift.training.photo_store.open_photos import PhotoRoom
     from shapeshift.training.run import Progress
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
 
-BLOCKS = (
-    "blocks are trained by the command, `launch.py train CAPTURE --out NAME.blocks --blocks "
-    "{blocks}`; ss.load opens what it writes."
-)
+OF_BLOCKS = ("coarse_iterations", "block_photos", "cluster", "certificates", "gpus")
 NO_OUT = "resume goes on from the checkpoint beside out; give out, too."
 SAVE_EVERY_S = 60.0  # between checkpoints
 Kind = Literal["cpu", "gpu"]
@@ -41,15 +37,15 @@ class TrainedScene(Scene):
     model.psnr_db  # {"RGB": 31.2, "Thermal": 33.0}
     """
 
-    def __init__(self, model: AnchorModel, path: Path | None, trainer: "Trainer") -> None:
+    def __init__(self, model: AnchorModel, path: Path | None, outcome: "TrainOutcome") -> None:
         super().__init__(Document.of(model), path)
-        self.steps: int = trainer.iteration
-        self.seconds: float = trainer.seconds  # with ...
-        self.start_seconds: float = trainer.start_s  # ... what went by before the first step
-        self.anchors: int = trainer.anchors_count
+        self.steps: int = outcome.steps
+        self.seconds: float = outcome.seconds  # with ...
+        self.start_seconds: float = outcome.start_seconds  # ... what passed before the first step
+        self.anchors: int = outcome.anchors
         # held-out photos: decibels of each modality, {} where none is held out
-        self.psnr_db: dict[str, float] = trainer.held_out_psnr(most=len(trainer.held_out))
-        self.warnings: tuple[str, ...] = tuple(trainer.warnings)  # about the capture, in sentences
+        self.psnr_db: dict[str, float] = outcome.psnr_db
+        self.warnings: tuple[str, ...] = outcome.warnings  # about the capture, in sentences
 
 
 def train(
@@ -63,7 +59,8 @@ def train(
     calibrate: str | None = None,
     pace: bool = True,
     photo_mb: float | None = None,
-    progress: "Callable[[Progress], object] | None" = None,
+    blocks: int | str = 1,
+    progress: "Callable[[Any], object] | None" = None,
     **settings: Any,
 ) -> TrainedScene:
     """Trains a shape-shifting scene of posed photos of one or several modalities (docs/capture.md).
@@ -79,20 +76,64 @@ def train(
     anchors); False from it ends the run with what there is.  settings: any field of
     `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
 
+    blocks: as --blocks of the command (docs/training.md, "Blocks"), a number, "auto" or a grid such
+    as "4x2"; out is a folder NAME.blocks, with the command's bytes, and after any end the same call
+    goes on.  settings may have coarse_iterations, block_photos, cluster, certificates and gpus then
+    and progress gets sentences, on a cluster from another thread; figures are of all runs together.
+
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
         model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
-    from shapeshift.app.training.saving import check_writable, room_of
+    path = None if out is None else plain(str(out))
+    settings |= {"iterations": iterations, "seconds": seconds}
+    if str(blocks).strip() != "1":
+        more = {"device": device, "calibrate": calibrate, "photo_mb": photo_mb}
+        return train_in_blocks(capture, path, str(blocks), settings, more, pace, progress)
+    for name in settings.keys() & OF_BLOCKS:
+        raise UsageError(f"{name} is of blocks; give blocks, or leave it out.")
+    trainer = trainer_of(capture, path, settings, resume, device, calibrate, photo_mb)
+    run(trainer, path, progress)
+    return finished(trainer, path, pace)
+
+
+def train_in_blocks(
+    capture: PathText, out: Path | None, blocks: str, settings: dict[str, Any],
+    more: dict[str, Any], pace: bool, progress: "Callable[[Any], object] | None",
+) -> TrainedScene:  # fmt: skip
+    """As train --blocks.  more: other options of the command."""
+    from shapeshift.app.training.blocks.outcome import train_quietly
+    from shapeshift.app.training.train_options import EXPERTS, USUAL, Options
+
+    if out is None:
+        raise UsageError("blocks wants out, a folder NAME.blocks.")
+    given = {name: value for name, value in settings.items() if value is not None}
+    more |= {name: given.pop(name) for name in OF_BLOCKS if name in given}
+    if "certificates" in more:
+        more["certificates"] = plain(str(more["certificates"]))
+    settings_of(given, None)  # refused now, not after the run of the whole
+    for name in given:
+        if name not in (*USUAL, *EXPERTS):
+            raise UsageError(f"{name}: blocks are trained by commands, which have no such option.")
+    options = Options(plain(str(capture)), out, given, blocks=blocks, **more)
+    return TrainedScene(*train_quietly(options, pace, progress))
+
+
+def trainer_of(
+    capture: PathText, path: Path | None, settings: dict[str, Any], resume: bool,
+    device: Kind | None, calibrate: str | None, photo_mb: float | None,
+) -> "Trainer":  # fmt: skip
+    """The run before its first step."""
+    from shapeshift.app.training.saving import check_writable, memory_for_training, room_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
-    from shapeshift.training.calibration.extrinsics import rig_json
+    from shapeshift.training.calibration.extrinsics import rig_json, with_extrinsics
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.train import Trainer
 
-    path = None if out is None else plain(str(out))
     if path is not None:
         check_writable(path)
         refuse_foreign(path)
@@ -100,7 +141,6 @@ def train(
         raise UsageError(NO_OUT)
     room = room_of(path, photo_mb, "photo_mb")
     before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
-    settings |= {"iterations": iterations, "seconds": seconds}
     wished = settings_of(settings, before[1]["settings"] if before else None)
     found, on = read_capture(plain(str(capture))), open_device(device)
     if calibrate is not None:
@@ -108,21 +148,8 @@ def train(
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
         offset = calibrate_cameras(on, found, wished, calibrate, report=lambda what, part: None)
         wished = replace(wished, rig=rig_json(calibrate, offset))
-    trainer = trainer_of(on, found, wished, before, room)
-    run(trainer, path, progress)
-    return finished(trainer, path, pace)
-
-
-def trainer_of(
-    device, capture: "Capture", wished: "TrainSettings", before: tuple | None, room: "PhotoRoom"
-) -> "Trainer":
-    """The run before its first step; photos that do not fit into memory lie in `room`."""
-    from shapeshift.app.training.saving import memory_for_training
-    from shapeshift.training.calibration.extrinsics import with_extrinsics
-    from shapeshift.training.train import Trainer
-
     with memory_for_training():
-        return Trainer(device, with_extrinsics(capture, wished.rig), wished, before, room=room)
+        return Trainer(on, with_extrinsics(found, wished.rig), wished, before, room=room)
 
 
 def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
@@ -138,8 +165,6 @@ def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
     known = [field.name for field in fields(TrainSettings)]
     for name in asked:
         if name not in known:
-            if name == "blocks":
-                raise UsageError(BLOCKS.format(blocks=asked[name]))
             if now := left_setting(name):
                 raise UsageError(f"{name} left the program: {now}.")
             meant = nearest(name, known)
@@ -180,6 +205,7 @@ def run(
 
 def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
     """The scene of a run that has ended, written where it was asked for."""
+    from shapeshift.app.training.blocks.outcome import TrainOutcome
     from shapeshift.app.training.saving import save
     from shapeshift.renderer.pace import measure_pace
     from shapeshift.runtime_models.package.write_package import write_package
@@ -193,7 +219,12 @@ def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
         model = replace(model, pace=measure_pace(model))
         if path is not None:
             write_package(model, path)
-    scene = TrainedScene(model, path, trainer)
+    psnr_db = trainer.held_out_psnr(most=len(trainer.held_out))
+    outcome = TrainOutcome(
+        trainer.iteration, trainer.seconds, trainer.start_s, trainer.anchors_count,
+        tuple(trainer.warnings), psnr_db,
+    )  # fmt: skip
+    scene = TrainedScene(model, path, outcome)
     trainer.photos.close()
     return scene
 

@@ -4,12 +4,14 @@ import gc
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pyopencl.tools import ImmediateAllocator, MemoryPool
 
-from shapeshift.rasterizer.device import INSTALL, NoDevice, open_device
+from shapeshift.rasterizer.device import INSTALL, NoDevice, open_device, with_small_pool
 from shapeshift.rasterizer.program import BuildError, read_source
 from tests.support.renderer.rasterizer_scenes import device
 
@@ -102,6 +104,29 @@ def test_freed_arrays_are_used_again():
     for _ in range(20):
         d.zeros((1000, 1000))
     assert d.pool.managed_bytes == held
+
+
+def test_a_small_pool_keeps_less_of_sizes_that_change():
+    """Sizes of three octaves at random, a dozen at a time, as lists of a step: a pool keeps what
+    was in use at once in each of its classes of size, of which the small one has a quarter.
+    """
+    d, rng = device(), np.random.default_rng(1)
+    kept = []
+    usual = replace(d, pool=MemoryPool(ImmediateAllocator(d.queue)))
+    for mine in (with_small_pool(d), usual):
+        for _ in range(200):
+            arrays = [mine.empty(int(n), np.uint8) for n in 1e5 * 8 ** rng.random(12)]
+        assert mine.pool.active_bytes >= sum(array.nbytes for array in arrays)
+        kept.append(mine.pool.managed_bytes)
+    assert kept[0] < 0.7 * kept[1], kept
+    small = with_small_pool(d)
+    np.testing.assert_array_equal(small.download(small.upload(np.arange(1537))), np.arange(1537))
+    for size, taken in ((1025, 1536), (1500, 1536), (1537, 2048), (2049, 3072)):
+        before = small.pool.managed_bytes
+        array = small.empty(size, np.uint8)
+        assert taken - 1 <= small.pool.managed_bytes - before <= taken
+        del array
+        small.pool.free_held()
 
 
 def test_programs_are_built_once_for_each_set_of_defines(tmp_path):

@@ -234,8 +234,6 @@ def test_ctrl_c_loses_nothing(capture, tmp_path):
 def test_what_a_training_does_not_know_is_refused(capture, tmp_path):
     with pytest.raises(ss.UsageError, match="no setting 'anchor' of a training; did you mean"):
         ss.train(capture, anchor=60)
-    with pytest.raises(ss.UsageError, match=r"^blocks are trained by the command.* --blocks 2x2`"):
-        ss.train(capture, tmp_path / "a.blocks", blocks="2x2")
     with pytest.raises(ss.UsageError, match="iterations is 0"):
         ss.train(capture, iterations=0)
     with pytest.raises(ss.BadFile, match="does not exist"):

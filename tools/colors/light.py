@@ -17,7 +17,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "training")]
 
-from ways import Turn, asked, parser_of, settings_of, table, turns  # noqa: E402
+from ways import Turn, asked, measure_ways, parser_of, settings_of  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.package.write_package import write_package  # noqa: E402
@@ -33,13 +33,12 @@ COLUMNS = (
 
 
 def main() -> None:
-    options, device = asked(parser_of(__doc__, WAYS)), open_device()
-    with table(options, COLUMNS, device) as add:
-        for turn in turns(options, settings_of(options), WAYS):
-            add(turn.about | {"budget_s": options.seconds} | row for row in measured(device, turn))
+    options = asked(parser_of(__doc__, WAYS))
+    measure_ways(options, COLUMNS, settings_of(options), WAYS, rows_of)
 
 
-def measured(device, turn: Turn) -> list[dict]:
+def rows_of(turn: Turn) -> list[dict]:
+    device = open_device()
     trainer = Trainer(device, turn.capture, turn.settings, loaded=turn.photos)
     for _ in trainer.steps():
         pass
@@ -49,7 +48,8 @@ def measured(device, turn: Turn) -> list[dict]:
         scores = evaluate_model(device, read_model(path), turn.capture, trainer.factor)
     found = {name: score.psnr_db for name, score in scores.items()}
     found["mean"] = float(np.mean(list(found.values())))
-    shared = {
+    shared = turn.about | {
+        "budget_s": turn.settings.seconds,
         "steps": trainer.iteration,
         "step_ms": f"{1e3 * trainer.elapsed / trainer.iteration:.1f}",
         "anchors": trainer.anchors_count,

@@ -11,16 +11,16 @@ started, until the first step; seconds does not count them.
 """
 
 import argparse
-import csv
 import resource
-import shlex
 import sys
-import tempfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
+
+from ways import add_sweep, captures_of, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import BadFile  # noqa: E402
@@ -109,37 +109,34 @@ def asked() -> argparse.Namespace:
     parser.add_argument("--models", nargs="+", default=["anchors", "splats"])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--downscale", type=int, nargs="+", help="one a capture; default: usual")
+    add_sweep(parser)
     return parser.parse_args()
 
 
-def command() -> str:
-    """As it was typed, without the places where the files lie."""
-    return shlex.join(Path(w).name if Path(w).exists() else w for w in sys.argv[1:])
+def measured(
+    folder: Path, options: argparse.Namespace, points: str, model: str, factor: int | None
+) -> list[dict]:
+    capture = stripped(read_capture(folder))
+    run = {"anchors": anchors, "splats": splats}[model]
+    try:
+        found = rows_of(run(open_device("cpu"), capture, options, points, factor))
+    except BadFile as why:
+        found = [{"origin": str(why).replace(str(capture.folder), capture.folder.name)}]
+    what = {"capture": folder.name, "points": points, "model": model, "seed": options.seed}
+    return [what | row for row in found]
 
 
 def main() -> None:
-    options, device = asked(), open_device("cpu")
+    options = asked()
     factors = options.downscale or [None] * len(options.captures)
-    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(f"# python3 tools/training/bare.py {command()}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
-        rows.writeheader()
-        for name, factor in zip(options.captures, factors, strict=True):
-            made = name == "workshop"
-            there = make_workshop(Path(folder), **WORKSHOP, processes=1) if made else name
-            capture = stripped(there if made else read_capture(Path(name)))
-            for points in options.points:
-                for model in options.models:
-                    run = {"anchors": anchors, "splats": splats}[model]
-                    try:
-                        found = rows_of(run(device, capture, options, points, factor))
-                    except BadFile as why:
-                        words = str(why).replace(str(capture.folder), capture.folder.name)
-                        found = [{"origin": words}]
-                    what = {"capture": Path(name).name, "points": points, "model": model}
-                    rows.writerows(what | {"seed": options.seed} | row for row in found)
-                    file.flush()
+    places = captures_of(options, {"workshop": partial(make_workshop, **WORKSHOP, processes=1)})
+    runs = {
+        f"{folder.name} {points} {model}": partial(measured, folder, options, points, model, factor)
+        for folder, factor in zip(places.values(), factors, strict=True)
+        for points in options.points
+        for model in options.models
+    }
+    sweep(options, COLUMNS, runs, places, "cpu")
 
 
 if __name__ == "__main__":

@@ -11,16 +11,16 @@ again, so an interrupted run goes on where it was.
 """
 
 import argparse
-import csv
-import io
 import sys
 from dataclasses import asdict
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1])]
+sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
-from shapeshift.app.charts.chart_rows import RowsFile, write_text  # noqa: E402
+from ways import add_cluster, write_rows  # noqa: E402
+
+from shapeshift.app.charts.chart_rows import RowsFile  # noqa: E402
 from shapeshift.app.training.table import Options, run  # noqa: E402
 from shapeshift.app.training.table_rows import TableRow, VggRow  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
@@ -41,6 +41,7 @@ def main() -> int:
     parser.add_argument("--csv", type=Path, required=True)
     parser.add_argument("--vgg", type=Path)
     parser.add_argument("--downscale", type=int)
+    add_cluster(parser)
     asked = parser.parse_args()
     rows, head = [], [command_of(asked)]
     for name in asked.captures:
@@ -51,7 +52,8 @@ def main() -> int:
             asked_of, of_splats = caps(size, asked)
             options = Options(
                 folder, out, asked_of, seconds=seconds, methods=methods, vgg=asked.vgg,
-                splats=of_splats,
+                splats=of_splats, cluster=asked.cluster, certificates=asked.certificates,
+                gpus=asked.gpus,
             )  # fmt: skip
             if code := run(options):
                 return code
@@ -59,7 +61,7 @@ def main() -> int:
             head = [*head[:1], machine]
             about = {"capture": folder.name, "budget_s": seconds, "size": size}
             rows += [about | asdict(row) for row in found]
-            write_rows(asked.csv, head, rows)
+            write_rows(asked.csv, head, tuple(rows[0]), rows)
     return 0
 
 
@@ -122,15 +124,6 @@ def command_of(asked: argparse.Namespace) -> str:
     words += [f"--downscale {asked.downscale}"] if asked.downscale else []
     words += [f"--vgg {asked.vgg.name}"] if asked.vgg else []
     return " ".join([*words, "--out WORK --csv FILE"])
-
-
-def write_rows(path: Path, head: list[str], rows: list[dict]) -> None:
-    text = io.StringIO()
-    text.writelines(f"# {line}\n" for line in head)
-    table = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    table.writeheader()
-    table.writerows(rows)
-    write_text(path, text.getvalue())
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
+from ways import Turn, asked, measure_ways, parser_of, settings_of  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
@@ -34,14 +34,16 @@ PLACES = np.linspace(0, 1, 11)[1:-1]  # of the way between two stops
 def main() -> None:
     parser = parser_of(__doc__, WAYS)
     parser.add_argument("--views", type=int, default=3, help="to look from")
-    options, device = asked(parser), open_device()
-    with table(options, COLUMNS, device) as add:
-        for turn in turns(options, settings_of(options), WAYS):
-            trainer = Trainer(device, turn.capture, turn.settings, loaded=turn.photos)
-            for _ in trainer.steps():
-                pass
-            shared = {"steps": trainer.iteration, "seconds": f"{trainer.elapsed:.1f}"}
-            add(turn.about | shared | row for row in measured(trainer, options.views))
+    options = asked(parser)
+
+    def rows_of(turn: Turn) -> list[dict]:
+        trainer = Trainer(open_device(), turn.capture, turn.settings, loaded=turn.photos)
+        for _ in trainer.steps():
+            pass
+        shared = {"steps": trainer.iteration, "seconds": f"{trainer.elapsed:.1f}"}
+        return [turn.about | shared | row for row in measured(trainer, options.views)]
+
+    measure_ways(options, COLUMNS, settings_of(options), WAYS, rows_of)
 
 
 def measured(trainer: Trainer, views: int) -> list[dict]:

@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
-from ways import Turn, asked, parser_of, settings_of, table, turns  # noqa: E402
+from ways import Turn, asked, measure_ways, parser_of, settings_of  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
@@ -48,9 +48,9 @@ def darkened(photos: list[LoadedPhoto], spread: float) -> list[LoadedPhoto]:
     return out
 
 
-def rows_of(device, turn: Turn, spread: float) -> Iterator[dict]:
+def rows_of(turn: Turn, spread: float) -> Iterator[dict]:
     photos = turn.photos | {"train": darkened(turn.photos["train"], spread)}
-    trainer = Trainer(device, turn.capture, turn.settings, loaded=photos)
+    trainer = Trainer(open_device(), turn.capture, turn.settings, loaded=photos)
     evened = turn.about["way"] == "evened"
     if not evened:
         trainer.exposures.begin = np.inf  # of the run: never
@@ -81,11 +81,13 @@ def figures_of(trainer: Trainer, photo: LoadedPhoto, background) -> tuple[float,
 def main() -> None:
     parser = parser_of(__doc__, WAYS)
     parser.add_argument("--spreads", type=float, nargs="+", default=[0.0, 0.08, 0.2])
-    options, device = asked(parser), open_device()
-    with table(options, COLUMNS, device) as add:
-        for turn in turns(options, settings_of(options), WAYS):
-            for spread in options.spreads:
-                add(rows_of(device, turn, spread))
+    options = asked(parser)
+
+    def all_spreads(turn: Turn) -> Iterator[dict]:
+        for spread in options.spreads:
+            yield from rows_of(turn, spread)
+
+    measure_ways(options, COLUMNS, settings_of(options), WAYS, all_spreads)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
+from ways import Turn, asked, measure_ways, parser_of, settings_of  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.rasterizer.project import LEAST_ALPHA  # noqa: E402
@@ -46,12 +46,14 @@ def main() -> None:
     parser = parser_of(__doc__, WAYS)
     parser.add_argument("--max-mb", type=float)
     parser.add_argument("--grow-every", type=int, default=100, help="steps")
-    options, device = asked(parser), open_device()
+    options = asked(parser)
     settings = replace(settings_of(options), max_mb=options.max_mb, grow_every=options.grow_every)
-    with table(options, COLUMNS, device) as add:
-        for turn in turns(options, settings, WAYS):
-            trainer = Trainer(device, turn.capture, turn.settings, loaded=turn.photos)
-            add(turn.about | row for row in measured(trainer))
+    measure_ways(options, COLUMNS, settings, WAYS, rows_of)
+
+
+def rows_of(turn: Turn) -> list[dict]:
+    trainer = Trainer(open_device(), turn.capture, turn.settings, loaded=turn.photos)
+    return [turn.about | row for row in measured(trainer)]
 
 
 def measured(trainer: Trainer) -> list[dict]:

@@ -13,17 +13,17 @@ means of what is left then.  psnr_db is of held-out photos from their stated pos
 there through that similarity.
 """
 
+import argparse
 import sys
-import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 
-from ways import asked, parser_of, settings_of, table  # noqa: E402
+from ways import asked, captures_of, parser_of, settings_of, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402
@@ -131,11 +131,20 @@ def run(device, capture: Capture, settings, photos: dict, turn: float, percent: 
     }  # fmt: skip
 
 
-def captures(names: list[str], folder: Path) -> Iterator[tuple[str, Capture]]:
-    for name in names:
-        if name == "workshop":
-            make_workshop(folder / name, **WORKSHOP, processes=1)
-        yield Path(name).name, read_capture(folder / name if name == "workshop" else Path(name))
+def rows_of(
+    folder: Path, options: argparse.Namespace, seed: int, turn: float, way: str
+) -> list[dict]:
+    capture = read_capture(folder)
+    part = one_modality(capture, options.modality) if options.modality else capture
+    factor = options.downscale or choose_downscale(part.photos)
+    photos = {s: load_photos(part, s, factor, "object") for s in ("train", "test")}
+    percent = options.percent * turn / 0.3
+    settings = replace(settings_of(options), seed=seed, **WAYS[way])
+    about = {
+        "capture": folder.name, "planted_deg": turn, "poses": way, "seed": seed,
+        "planted_percent": f"{percent:g}",
+    }  # fmt: skip
+    return [about | run(open_device(), part, settings, photos, turn, percent)]
 
 
 def main() -> None:
@@ -143,22 +152,16 @@ def main() -> None:
     parser.add_argument("--planted", type=float, nargs="+", default=[0.0, 0.3], help="degrees")
     parser.add_argument("--percent", type=float, default=0.5, help="for each 0.3 degrees")
     parser.add_argument("--modality", help="default: all of the capture")
-    options, device = asked(parser), open_device()
-    with table(options, COLUMNS, device) as add, tempfile.TemporaryDirectory() as folder:
-        for name, capture in captures(options.captures, Path(folder)):
-            part = one_modality(capture, options.modality) if options.modality else capture
-            factor = options.downscale or choose_downscale(part.photos)
-            photos = {s: load_photos(part, s, factor, "object") for s in ("train", "test")}
-            for seed in options.seeds:
-                for turn in options.planted:
-                    for way in options.ways:
-                        percent = options.percent * turn / 0.3
-                        settings = replace(settings_of(options), seed=seed, **WAYS[way])
-                        about = {
-                            "capture": name, "planted_deg": turn, "poses": way, "seed": seed,
-                            "planted_percent": f"{percent:g}",
-                        }  # fmt: skip
-                        add([about | run(device, part, settings, photos, turn, percent)])
+    options = asked(parser)
+    places = captures_of(options, {"workshop": partial(make_workshop, **WORKSHOP, processes=1)})
+    runs = {
+        f"{folder.name} {seed} {turn:g} {way}": partial(rows_of, folder, options, seed, turn, way)
+        for folder in places.values()
+        for seed in options.seeds
+        for turn in options.planted
+        for way in options.ways
+    }
+    sweep(options, COLUMNS, runs, places)
 
 
 if __name__ == "__main__":

@@ -29,17 +29,19 @@ what a capture does not have are left out.
 """
 
 import argparse
-import csv
-import shlex
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
+
+from ways import add_sweep, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402
@@ -249,32 +251,25 @@ def depth_error(trainer: Trainer, drawing, photo: LoadedPhoto) -> float:
     return float(np.where(covered[known] >= COVERED, away, 1).mean())
 
 
-def captures(options: argparse.Namespace, folder: Path) -> Iterator[tuple[str, Capture]]:
-    for name, modality in zip(options.captures[::2], options.captures[1::2], strict=True):
-        whole = bench(folder) if name == "bench" else read_capture(Path(name))
-        yield Path(name).name, one_modality(whole, modality)
-
-
-def runs(options: argparse.Namespace, device, folder: Path) -> Iterator[dict]:
-    for name, whole in captures(options, folder):
-        (stop,) = whole.stops
-        for photos in options.photos:
-            part = part_of(whole, photos)
-            for seed in options.seeds:
-                settings = TrainSettings(
-                    iterations=options.iterations, max_anchors=options.max_anchors, seed=seed,
-                    downscale=options.downscale or choose_downscale(whole.photos),
-                )  # fmt: skip
-                loaded = {
-                    split: load_photos(part, split, settings.downscale or 1, settings.masks)
-                    for split in ("train", "test")
-                }
-                for way in options.ways:
-                    if not has(part, WAYS[way]):
-                        continue
-                    row = measured(device, part, WAYS[way], settings, loaded)
-                    about = {"capture": name, "modality": stop.name, "photos": photos}
-                    yield about | {"way": way, "seed": seed} | row
+def rows_of(
+    word: str, options: argparse.Namespace, modality: str, photos: int, seed: int, way: str
+) -> Iterator[dict]:
+    """One, or none where the capture has not what the way is about."""
+    with tempfile.TemporaryDirectory() as folder:
+        whole = bench(Path(folder)) if word == "bench" else read_capture(Path(word))
+        part = part_of(one_modality(whole, modality), photos)
+        settings = TrainSettings(
+            iterations=options.iterations, max_anchors=options.max_anchors, seed=seed,
+            downscale=options.downscale or choose_downscale(whole.photos),
+        )  # fmt: skip
+        loaded = {
+            split: load_photos(part, split, settings.downscale or 1, settings.masks)
+            for split in ("train", "test")
+        }
+        if has(part, WAYS[way]):
+            about = {"capture": Path(word).name, "modality": modality, "photos": photos}
+            row = measured(open_device(), part, WAYS[way], settings, loaded)
+            yield about | {"way": way, "seed": seed} | row
 
 
 def measured(
@@ -306,16 +301,17 @@ def main() -> None:
     parser.add_argument("--downscale", type=int)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
-    options, device = parser.parse_args(), open_device()
-    words = [Path(w).name if Path(w).is_dir() else w for w in sys.argv[1:]]
-    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(f"# python3 tools/training/sparse.py {shlex.join(words)}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        rows.writeheader()
-        for row in runs(options, device, Path(folder)):
-            rows.writerow(row)
-            file.flush()
+    add_sweep(parser)
+    options = parser.parse_args()
+    pairs = zip(options.captures[::2], options.captures[1::2], strict=True)
+    runs, places = {}, {}
+    for word, modality in pairs:
+        if word != "bench":
+            places[word] = Path(word).absolute()
+        for photos, seed, way in product(options.photos, options.seeds, options.ways):
+            name = f"{Path(word).name} {modality} {photos} {seed} {way}"
+            runs[name] = partial(rows_of, word, options, modality, photos, seed, way)
+    sweep(options, COLUMNS, runs, places)
 
 
 if __name__ == "__main__":

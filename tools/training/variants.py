@@ -1,6 +1,6 @@
 """One model with n variants of an object beside n models of it: bytes and decibels.
 
-    python tools/training/variants.py --out docs/bench/variants.csv --work FOLDER
+    python tools/training/variants.py --out docs/bench/variants.csv
 
 The object is the ray-traced balls and box; a variant has its photos in other colours, by turns of
 the hue and swapped channels, so that each is as hard as the other.  `joint`: one model, a stop a
@@ -11,10 +11,11 @@ own, without their photos.  Decibels are of held-out photos, steps the same a va
 
 import argparse
 import colorsys
-import platform
 import resource
 import sys
+import tempfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
+
+from ways import add_sweep, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, Stop  # noqa: E402
@@ -35,7 +38,7 @@ from shapeshift.training.styles.style_views import resized_views  # noqa: E402
 from shapeshift.training.synthetic.balls import make_balls  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 
-COLUMNS = "variants,way,bytes,times_joint,psnr_db,worst_db,cpu_s"
+COLUMNS = ("variants", "way", "bytes", "times_joint", "psnr_db", "worst_db", "cpu_s")
 SIZE, VIEWS, TESTS = 96, 24, 4
 STEPS, ANCHORS = 240, 2500  # steps a variant
 TRAINED = 2
@@ -99,59 +102,54 @@ def decibels(device, model: AnchorModel, capture: Capture) -> list[float]:
     return [score.psnr_db for score in evaluate_model(device, model, capture).values()]
 
 
-def rows_for(device, base: Capture, count: int, work: Path, own: dict) -> list[str]:
-    """The three ways for so many variants; own: what was trained alone, by variant."""
+def rows_for(count: int) -> list[dict]:
+    """The three ways for so many variants."""
+    with tempfile.TemporaryDirectory() as folder:
+        return rows_in(open_device(), Path(folder), count)
+
+
+def rows_in(device, work: Path, count: int) -> list[dict]:
+    base = make_balls(work / "balls", SIZE, VIEWS, TESTS)
+    base = replace(base, photos=tuple(p for p in base.photos if p.modality == "RGB"))
     capture, began = capture_of(base, list(range(count))), cpu_s()
     joint = trained(device, capture)
     spent = cpu_s() - began
     size = write_package(joint, work / "joint.shift", EXACT)
     rows = [row(count, "joint", size, size, decibels(device, joint, capture), spent)]
-    chosen = [0, count - 1][:TRAINED]
-    for variant in chosen:
-        if variant not in own:
-            alone, began = capture_of(base, [variant]), cpu_s()
-            model = trained(device, alone)
-            took = cpu_s() - began
-            bytes_ = write_package(model, work / "alone.shift", EXACT)
-            own[variant] = model, bytes_, decibels(device, model, alone)[0], took
-    found = [own[variant] for variant in chosen]
-    whole = round(count * float(np.mean([f[1] for f in found])))
-    took = count * float(np.mean([f[3] for f in found]))
-    rows.append(row(count, "separate", whole, size, [f[2] for f in found], took))
+    models, sizes, figures, times = [], [], [], []
+    for variant in [0, count - 1][:TRAINED]:
+        alone, began = capture_of(base, [variant]), cpu_s()
+        models.append(trained(device, alone))
+        times.append(cpu_s() - began)
+        sizes.append(write_package(models[-1], work / "alone.shift", EXACT))
+        figures += decibels(device, models[-1], alone)
+    whole, took = round(count * float(np.mean(sizes))), count * float(np.mean(times))
+    rows.append(row(count, "separate", whole, size, figures, took))
     views = resized_views([p.view for p in base.photos if p.split == "train"], SIZE)[:16]
-    styled, began = own[0][0], cpu_s()
+    styled, began = models[0], cpu_s()
     for variant in range(1, count):
         style = NewStyle(f"V{variant}", "V0", steps=STEPS)
         styled = add_style(device, styled, style, Recoloured(variant), views)
     took = cpu_s() - began
     weight = write_package(styled, work / "styled.shift", EXACT)
-    rows.append(row(count, "style", weight, size, decibels(device, styled, capture), took))
-    return rows
+    return [*rows, row(count, "style", weight, size, decibels(device, styled, capture), took)]
 
 
-def row(count: int, way: str, size: int, joint: int, db: list[float], took: float) -> str:
-    line = f"{count},{way},{size},{size / joint:.2f},{np.mean(db):.2f},{min(db):.2f},{took:.1f}"
-    print(line, flush=True)  # noqa: T201
-    return line
+def row(count: int, way: str, size: int, joint: int, db: list[float], took: float) -> dict:
+    return {
+        "variants": count, "way": way, "bytes": size, "times_joint": f"{size / joint:.2f}",
+        "psnr_db": f"{np.mean(db):.2f}", "worst_db": f"{min(db):.2f}", "cpu_s": f"{took:.1f}",
+    }  # fmt: skip
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--work", type=Path, required=True)
     parser.add_argument("--counts", nargs="*", type=int, default=list(COUNTS))
-    arguments = parser.parse_args()
-    arguments.work.mkdir(parents=True, exist_ok=True)
-    device = open_device()
-    base = make_balls(arguments.work / "balls", SIZE, VIEWS, TESTS)
-    base = replace(base, photos=tuple(p for p in base.photos if p.modality == "RGB"))
-    own: dict = {}
-    lines: list[str] = []
-    for count in arguments.counts:
-        lines += rows_for(device, base, count, arguments.work, own)
-        command = "# python tools/training/variants.py --out docs/bench/variants.csv --work FOLDER"
-        machine = f"# {platform.machine()}, {device.name}, {device.platform}"
-        arguments.out.write_text("\n".join([command, machine, COLUMNS, *lines]) + "\n")
+    add_sweep(parser)
+    options = parser.parse_args()
+    runs = {f"{count} variants": partial(rows_for, count) for count in options.counts}
+    sweep(options, COLUMNS, runs, {})
 
 
 if __name__ == "__main__":

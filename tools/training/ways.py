@@ -1,25 +1,42 @@
-"""What tables of ways to train share: options, captures by name, and runs of which ways take turns.
+"""What programs with rows of trainings share: their runs as tasks, and ways that are compared.
 
-Imported by growth.py, blended_shapes.py and ../colors/light.py, which have put the project's folder
-on the path.
+Each run is its program again, with --only, done by who --cluster says; rows of runs lie in OUT.runs
+until all are there, so the same command goes on after Ctrl-C and trains nothing twice.  Imported by
+programs that have put the project's folder on the path.
 """
 
 import argparse
 import csv
+import io
+import json
 import shlex
+import shutil
 import sys
-import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
+from shapeshift.app.charts.chart_rows import write_text
+from shapeshift.app.cluster.open_cluster import open_cluster
+from shapeshift.app.cluster.run_task import BAD_INPUT
+from shapeshift.app.cluster.task import Task, forget
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import file_name
+from shapeshift.app.progress import lines
+from shapeshift.app.terminal import say
+from shapeshift.rasterizer.device import open_device
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.synthetic.workshop import make_workshop
+
+ROOT = Path(__file__).resolve().parents[2]
+PLACES = ("--out", "--cluster", "--certificates", "--gpus")  # none of which changes a row
+Rows = Iterable[dict[str, object]]  # by column
 
 
 @dataclass(frozen=True)
@@ -43,6 +60,7 @@ def parser_of(doc: str, ways: dict[str, dict]) -> argparse.ArgumentParser:
     parser.add_argument("--ways", nargs="+", choices=list(ways), default=list(ways))
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--size", type=int, default=200, help="pixels of the photos of balls")
+    add_sweep(parser)
     return parser
 
 
@@ -61,53 +79,159 @@ def settings_of(options: argparse.Namespace) -> TrainSettings:
     )  # fmt: skip
 
 
-def turns(
-    options: argparse.Namespace, settings: TrainSettings, ways: dict[str, dict]
-) -> Iterator[Turn]:
-    """Every capture with every seed with every way; the photos of a capture are read once."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name in options.captures:
-            capture = read_capture(made(name, Path(folder), options.size))
-            factor = options.downscale or choose_downscale(capture.photos)
-            photos = {
-                split: load_photos(capture, split, factor, settings.masks)
-                for split in ("train", "test")
-            }
-            for seed in options.seeds:
-                for way in options.ways:
-                    about = {"capture": Path(name).name, "way": way, "seed": seed}
-                    changed = replace(settings, seed=seed, **ways[way])
-                    yield Turn(about, capture, changed, photos)
+def measure_ways(
+    options: argparse.Namespace, columns: tuple[str, ...], settings: TrainSettings,
+    ways: dict[str, dict], rows_of: Callable[[Turn], Rows],
+) -> None:  # fmt: skip
+    """Rows of every capture with every seed with every way into --out, by who --cluster says."""
+    made = {
+        "balls": partial(make_balls, size=options.size), "workshop": make_workshop,
+        "rig": partial(make_balls, size=options.size, rig=True),
+    }  # fmt: skip
+    places, runs = captures_of(options, made), {}
+    for folder in places.values():
+        for seed in options.seeds:
+            for way in options.ways:
+                about = {"capture": folder.name, "way": way, "seed": seed}
+                changed = replace(settings, seed=seed, **ways[way])
+                runs[" ".join(map(str, about.values()))] = partial(
+                    rows_of_turn, about, folder, options.downscale, changed, rows_of
+                )
+    sweep(options, columns, runs, places)
 
 
-def made(name: str, folder: Path, size: int) -> Path:
-    """The folder of a capture, which is made first where the name is that of one of ours."""
-    if name == "balls":
-        make_balls(folder / name, size)
-    elif name == "rig":
-        make_balls(folder / name, size, rig=True)
-    elif name == "workshop":
-        make_workshop(folder / name)
-    else:
-        return Path(name)
-    return folder / name
+def rows_of_turn(
+    about: dict, folder: Path, downscale: int | None, settings: TrainSettings,
+    rows_of: Callable[[Turn], Rows],
+) -> Rows:  # fmt: skip
+    capture = read_capture(folder)
+    factor = downscale or choose_downscale(capture.photos)
+    photos = {
+        split: load_photos(capture, split, factor, settings.masks) for split in ("train", "test")
+    }
+    return rows_of(Turn(about, capture, settings, photos))
 
 
-@contextmanager
-def table(
-    options: argparse.Namespace, columns: tuple[str, ...], device
-) -> Iterator[Callable[[Iterable[dict]], None]]:
-    """Rows into --out, a run at a time, below the command and the machine."""
-    with options.out.open("w", newline="") as file:
-        words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
-        program = Path(sys.argv[0]).resolve().relative_to(Path(__file__).resolve().parents[2])
-        file.write(f"# python3 {program} {shlex.join(words)}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, columns, lineterminator="\n")
-        rows.writeheader()
+def add_cluster(parser: argparse.ArgumentParser) -> None:
+    """Who does the runs: as of the commands."""
+    parser.add_argument("--cluster", default="none", help="who does the runs: docs/cluster.md")
+    parser.add_argument("--certificates", type=Path, help="for a cluster of other machines")
+    parser.add_argument("--gpus", type=int, default=0, help="that local workers share")
 
-        def add(found: Iterable[dict]) -> None:
-            rows.writerows(found)
-            file.flush()
 
-        yield add
+def add_sweep(parser: argparse.ArgumentParser) -> None:
+    """The same for programs that `sweep`."""
+    add_cluster(parser)
+    parser.add_argument("--only", default="", help="this run alone; --out is then its rows as JSON")
+
+
+def runs_folder(out: Path) -> Path:
+    return out.absolute().with_name(out.name + ".runs")
+
+
+def captures_of(
+    options: argparse.Namespace, made: Mapping[str, Callable[[Path], object]]
+) -> dict[str, Path]:
+    """The folder of each capture by its word; made: writes those of ours, unless they are there."""
+    places = {}
+    for word in options.captures:
+        places[word] = Path(word).absolute()
+        if word in made:
+            places[word] = runs_folder(options.out) / "captures" / word
+            if not (places[word] / "transforms.json").is_file():
+                made[word](places[word])
+    if len({place.name for place in places.values()}) < len(options.captures):
+        raise SystemExit("two captures have one name; give each once, in a folder of its own name.")
+    return places
+
+
+def sweep(
+    options: argparse.Namespace, columns: tuple[str, ...],
+    runs: Mapping[str, Callable[[], Rows]], captures: Mapping[str, Path], device: str | None = None,
+) -> None:  # fmt: skip
+    """Writes the rows of all runs to --out, in their order; with --only those of one as JSON.
+
+    runs: by name, what measures; captures: words of the command line, and the folders that they
+    stand for; device: the kind that measures.  Exits with a sentence where a run fails.
+    """
+    if options.only:
+        write_one(options.out, runs[options.only], device)
+        return
+    folder = runs_folder(options.out)
+    tasks = [task_of(options, name, folder, captures) for name in runs]
+    kept = f"What is done lies in {folder}; the same command goes on."
+    try:
+        with lines("sweep"), open_cluster(
+            options.cluster, options.certificates, options.gpus
+        ) as cluster:  # fmt: skip
+            cluster.run(tasks)
+    except UsageError as error:
+        raise SystemExit(f"{error}  {kept}") from None
+    except KeyboardInterrupt:
+        say(kept)
+        raise SystemExit(130) from None
+    found = [json.loads(Path(task.writes[0]).read_text()) for task in tasks]
+    machines = dict.fromkeys(facts["machine"] for facts in found)
+    head = [f"python3 {program().relative_to(ROOT)} {command(captures)}", *machines]
+    write_rows(options.out, head, columns, [row for facts in found for row in facts["rows"]])
+    for task in tasks:
+        Path(task.writes[0]).unlink()
+    forget(tasks)
+    shutil.rmtree(folder)
+
+
+def write_one(out: Path, run: Callable[[], Rows], device: str | None) -> None:
+    """Rows of a run, and what they were made by.  Exits with a sentence where it is refused."""
+    try:
+        rows = [{k: "" if v is None else str(v) for k, v in row.items()} for row in run()]
+    except (BadFile, UsageError) as error:
+        say(str(error))
+        raise SystemExit(BAD_INPUT) from None
+    opened = open_device(device)
+    facts = {"machine": f"{opened.name}, {opened.platform}", "rows": rows}
+    write_text(out, json.dumps(facts) + "\n")
+
+
+def program() -> Path:
+    return Path(sys.argv[0]).resolve()
+
+
+def task_of(
+    options: argparse.Namespace, name: str, folder: Path, captures: Mapping[str, Path]
+) -> Task:
+    """The program with the same words, but for where its captures lie, and --only."""
+    words, given = [], iter(sys.argv[1:])
+    for word in given:
+        if word in PLACES:
+            next(given)
+        elif word.partition("=")[0] not in PLACES:
+            words.append(str(captures.get(word, word)))
+    out = str(folder / f"{file_name(name)}.json")
+    read = dict.fromkeys(
+        [str(program()), str(Path(__file__).resolve()), *map(str, captures.values())]
+    )
+    argv = (str(program()), *words, "--out", out, "--only", name)
+    slots = {"gpu": 1} if options.gpus else {}
+    return Task(name, argv, tuple(read), (out,), slots)
+
+
+def command(captures: Mapping[str, Path]) -> str:
+    """As it was typed, without the places where captures lie and without who did the runs."""
+    words, given = [], iter(sys.argv[1:])
+    for word in given:
+        if word == "--out":
+            words += [word, next(given)]
+        elif word in PLACES:
+            next(given)
+        elif word.partition("=")[0] not in PLACES:
+            words.append(Path(word).name if word in captures else word)
+    return shlex.join(words)
+
+
+def write_rows(path: Path, head: list[str], columns: tuple[str, ...], rows: list[dict]) -> None:
+    text = io.StringIO()
+    text.writelines(f"# {line}\n" for line in head)
+    table = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    write_text(path, text.getvalue())

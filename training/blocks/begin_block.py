@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from shapeshift.rasterizer.device import with_small_pool
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blocks.block_start import ADVICE, BlockStart
@@ -29,4 +30,5 @@ def begin_block(
         else:
             capture = replace(capture, background=tuple(color))
     given = with_extrinsics(capture, settings.rig)
+    device = with_small_pool(device)
     return BlockTrainer(device, start, given, settings, resume, room)

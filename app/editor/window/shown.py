@@ -47,27 +47,35 @@ class Shown:
         self._comparison = Comparison()
         self._drawn: tuple | None = None  # what the splats on screen were drawn from
         self._kept: Scene | None = None  # whose id is part of that
+        self._presented: tuple = ()  # how the splats were last put on the screen
         self._stale_when = 0.0
 
-    def draw(self, request: FrameRequest, screen: moderngl.Framebuffer, force: bool) -> bool:
-        """Fills the screen; True when the splats had to be drawn anew."""
+    def draw(
+        self, request: FrameRequest, screen: moderngl.Framebuffer, force: bool,
+        again: Callable[[], bool] = lambda: False,
+    ) -> bool:  # fmt: skip
+        """Fills the screen; True when the splats had to be drawn anew.
+
+        again: fills it with the last picture, where that was kept, and says whether it did.
+        """
         settings = request.settings if request.moving else rested(request.settings)
         wanted = picture_key(request.scene, request.view, settings)
         self._renderer.settings = settings
         if request.beside is not None:
-            return self._draw_two(request, request.beside, wanted, screen, force)
+            return self._draw_two(request, request.beside, wanted, screen, force, again)
         fresh = force or self._renderer.streaming.due or not same_picture(self._drawn, wanted)
         if fresh:
             self._renderer.update(request.scene)
             self._readings.stats = self._renderer.draw([request.view], screen)
             self._drawn = wanted
-        else:
+        elif not (self._presented == (settings, None) and again()):
             self._renderer.present(screen)
+        self._presented = (settings, None)
         return fresh
 
     def _draw_two(
         self, request: FrameRequest, beside: Beside, key: tuple, screen: moderngl.Framebuffer,
-        force: bool,
+        force: bool, again: Callable[[], bool],
     ) -> bool:  # fmt: skip
         """Each side of the line in its part of the screen and no more of it; both from one sort
         where nothing but colours differs.
@@ -95,6 +103,10 @@ class Shown:
                     return self.draw(replace(request, beside=None), screen, True)
                 right.draw([parts[1]])
             self._drawn, self._kept = wanted, beside.scene
+        presented = (renderer.settings, beside.cut)
+        if not fresh and self._presented == presented and again():
+            return False
+        self._presented = presented
         whole = screen.viewport
         screen.viewport = (0, 0, beside.cut, height)
         renderer.present(screen, 0)

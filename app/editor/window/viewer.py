@@ -39,7 +39,7 @@ from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.inspection.attach_inspection import attach_inspection
 from shapeshift.app.editor.window.inspection.attach_ruler import attach_ruler
-from shapeshift.app.editor.window.inspection.mouse_marks import Seen
+from shapeshift.app.editor.window.inspection.picture_under import Seen
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
 from shapeshift.app.editor.window.parts import attach_parts
@@ -315,7 +315,10 @@ class Viewer:
             self.state.measure_now = False
             self.shown.measure(request)
         force = self.options.screenshot is not None or self.frames < WARM_UP
-        fresh = self.shown.draw(request, self.window.screen(), force)
+        screen, presented = self.window.screen(), self.window.presented
+        fresh = self.shown.draw(request, screen, force, presented.show_picture_again)
+        if not fresh:
+            presented.keep_picture()
         for draw in self.hooks.over:
             draw(request)
         if fresh:

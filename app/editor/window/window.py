@@ -7,7 +7,6 @@ import glfw
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
-from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
@@ -20,6 +19,7 @@ from shapeshift.app.editor.window.monitor import (
     open_window,
     put_window,
 )
+from shapeshift.app.editor.window.overlay.presented import Presented
 from shapeshift.app.paths import plain
 from shapeshift.runtime_models.files.plain_text import one_line
 
@@ -115,8 +115,8 @@ class Window:
         self._monitor_size = self._size_for_monitor()
         theme.apply(self.ui_scale, self._window.pixel_ratio)
         self._restyle = False  # the next frame's type has another size
-        self._overlay = ModernGLRenderer(wnd=None, ctx=self.ctx, display_size=self.logical_size)
-        self.textures = Textures(self.ctx, self._overlay)
+        self.presented = Presented(self.ctx, self.logical_size, lambda: self.size)
+        self.textures = Textures(self.ctx, self.presented.renderer)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
         self.popup_open = False  # a list or a box is open, and the next click is for it
         self._raw: list[Event] = []
@@ -133,7 +133,7 @@ class Window:
         return self
 
     def __exit__(self, *failure) -> None:
-        self._overlay.shutdown()
+        self.presented.release()
         imgui.destroy_context(self._imgui)
         self._window.destroy()
 
@@ -251,7 +251,7 @@ class Window:
         if self._restyle:
             self._restyle = False
             theme.apply(self.ui_scale, self._window.pixel_ratio)
-            self._overlay.refresh_font_texture()
+            self.presented.renderer.refresh_font_texture()
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*self.logical_size)
         density = self._window.pixel_ratio
@@ -273,22 +273,18 @@ class Window:
         """Draws the overlay over whatever the scene has drawn into `screen()`."""
         self.popup_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
         imgui.render()
-        self.screen().use()
-        self._overlay.render(imgui.get_draw_data())
+        self.presented.lay_over(imgui.get_draw_data())
 
     def screen(self) -> moderngl.Framebuffer:
         """The window's framebuffer with the viewport on all of it."""
-        self.ctx.screen.viewport = (0, 0, *self.size)
-        return self.ctx.screen
+        return self.presented.screen()
 
     def swap(self) -> None:
-        glfw.swap_buffers(self.handle)
+        self.presented.swap(self.handle)
 
     def picture(self) -> np.ndarray:
         """(H, W, 3) uint8 of all that has been drawn and not yet swapped, row 0 on top."""
-        width, height = self.size
-        data = self.ctx.screen.read(viewport=(0, 0, width, height), components=3, alignment=1)
-        return np.frombuffer(data, np.uint8).reshape(height, width, 3)[::-1]
+        return self.presented.read()
 
     def _listen(self) -> None:
         """Registers the callbacks; each only notes what happened."""
@@ -300,14 +296,19 @@ class Window:
         glfw.set_scroll_callback(handle, self.on_scroll)
         # The annotations of glfw say (window, int, str); what comes is (window, list of paths).
         glfw.set_drop_callback(handle, self.on_drop)  # type: ignore[arg-type]
-        glfw.set_window_refresh_callback(handle, lambda _: self._note())
-        glfw.set_framebuffer_size_callback(handle, lambda *_: self._note())
+        glfw.set_window_refresh_callback(handle, lambda _: self.expose())
+        glfw.set_framebuffer_size_callback(handle, lambda *_: self.expose())
         glfw.set_window_content_scale_callback(handle, self._on_content_scale)
 
     def _note(self, event: Event | None = None) -> None:
         self._unsettled = SETTLE_FRAMES
         if event is not None:
             self._raw.append(event)
+
+    def expose(self) -> None:
+        """The screen has lost what the window showed."""
+        self.presented.due = True
+        self._note()
 
     def on_key(self, handle, key: int, scancode: int, action: int, mods: int) -> None:
         io = imgui.get_io()

@@ -1,7 +1,7 @@
 """launch.py train --blocks: a coarse run of the whole, its cut, a task a block, one scene."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +16,7 @@ from shapeshift.app.terminal import say
 from shapeshift.app.training.train_options import Asked, Options
 
 if TYPE_CHECKING:
+    from shapeshift.app.cluster.board import Shown
     from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.blocks.cut import Wanted
@@ -28,73 +29,90 @@ COARSE, CUT = "coarse.shift", "cut"  # in the folder of the work
 
 def run_blocks(options: Options) -> int:
     """Raises UsageError, BadFile; a second start goes on where the first was ended."""
+    found, model = train_blocks(options, say)
+    say(*summary(options, found, model))
+    return 0
+
+
+def train_blocks(
+    options: Options, hear: Callable[..., object], shown: "Shown | None" = None, said: str = "--",
+    pace: bool = True,
+) -> "tuple[CutList, AnchorModel]":  # fmt: skip
+    """The cut and the scene, which is written.  Raises UsageError, BadFile.
+
+    hear: told what a person should know; shown: instead of a bar; said: what stands before the
+    name of an option where it is typed; pace: measure how evenly the slider moves.
+    """
     from shapeshift.app.cluster.open_cluster import open_cluster
     from shapeshift.app.training.saving import check_writable, room_of
     from shapeshift.runtime_models.blocks.write_blocks import refuse_foreign_folder
     from shapeshift.training.blocks.starts import read_cut
 
-    wanted = wanted_of(options.blocks)
-    refuse_options(options)
+    wanted = wanted_of(options.blocks, said)
+    refuse_options(options, said)
     check_writable(options.out)
     refuse_foreign_folder(options.out)
     capture = open_capture(options.capture, options.memory)
     if wanted.count is None and wanted.grid is None:
-        refuse_one(options, capture)
+        refuse_one(options, capture, said)
     work = work_folder(options.out)
     work.mkdir(parents=True, exist_ok=True)
     room_of(options.out, options.photo_mb)  # refused now, not after the run of the whole
-    with open_cluster(options.cluster, options.certificates, options.gpus) as cluster:
+    with open_cluster(options.cluster, options.certificates, options.gpus, shown) as cluster:
         cluster.run([coarse_task(options, work)])
         cluster.run([cut_task(options, work)])
         found = read_cut(work / CUT)
-        say(*describe_cut(found))
+        hear(*describe_cut(found))
         cluster.run([block_task(options, work, n, row) for n, row in trained(found)])
-    model = join(work, found, options.out)
-    say(*summary(options, found, model))
-    return 0
+    return found, join(work, found, options.out, pace)
 
 
-def wanted_of(text: str) -> "Wanted":
+def wanted_of(text: str, said: str = "--") -> "Wanted":
     from shapeshift.training.blocks.cut import Wanted
 
     try:
         return Wanted.of(text)
     except ValueError as error:
-        raise UsageError(f"--{error}") from None
+        raise UsageError(f"{said}{error}") from None
 
 
-def refuse_options(options: Options) -> None:
+def refuse_options(options: Options, said: str) -> None:
     """Raises UsageError for what cannot go with --blocks."""
     if options.out.suffix != ENDING:
         raise UsageError(
-            f"--out is {options.out.name}; --blocks writes a folder, name it "
+            f"{said}out is {options.out.name}; {said}blocks writes a folder, name it "
             f"{options.out.stem}{ENDING}."
         )
     if options.asked.get("seconds") is not None:
         raise UsageError(
-            "--seconds: blocks are counted in steps, so that an ended run goes on to the same "
-            "bits; give --iterations and --coarse-iterations."
+            f"{said}seconds: blocks are counted in steps, so that an ended run goes on to the same "
+            f"bits; give {said}iterations and {typed('coarse_iterations', said)}."
         )
     if options.asked.get("poses") == "refine":
         raise UsageError(
-            "--poses refine: blocks keep the poses that are stated; refine them in a run without "
-            "--blocks first."
+            f"{said}poses refine: blocks keep the poses that are stated; refine them in a run "
+            f"without {said}blocks first."
         )
     if options.model == "splats" or options.separate:
         raise UsageError("--blocks: plain splats and --separate are trained as a whole; leave it.")
     for name in options.splats:
-        raise UsageError(f"--{name.replace('_', '-')} is of plain splats; leave it out.")
+        raise UsageError(f"{typed(name, said)} is of plain splats; leave it out.")
 
 
-def refuse_one(options: Options, capture: "Capture") -> None:
+def typed(name: str, said: str) -> str:
+    """An option as it is given: on the command line, or in Python."""
+    return said + (name.replace("_", "-") if said else name)
+
+
+def refuse_one(options: Options, capture: "Capture", said: str) -> None:
     """Raises UsageError where --blocks auto would cut nothing: before the coarse run, not after."""
     from shapeshift.training.blocks.starts import expected_anchors
 
     count, most = len(expected_anchors(capture)), most_anchors(options)
     if count <= most:
         raise UsageError(
-            f"--blocks auto: {count:,} anchors are expected, {most:,} fit into one block "
-            "(--max-anchors); leave out --blocks, or give a number."
+            f"{said}blocks auto: {count:,} anchors are expected, {most:,} fit into one block "
+            f"({typed('max_anchors', said)}); leave out {said}blocks, or give a number."
         )
 
 
@@ -194,8 +212,8 @@ def describe_cut(found: "CutList") -> list[str]:
     return lines
 
 
-def join(work: Path, found: "CutList", out: Path) -> "AnchorModel":
-    """Writes the scene of all blocks, with a pace that is measured on the whole."""
+def join(work: Path, found: "CutList", out: Path, pace: bool = True) -> "AnchorModel":
+    """Writes the scene of all blocks; pace: with one that is measured on the whole."""
     from shapeshift.app.pace import with_pace
     from shapeshift.runtime_models.blocks.block_model import joined
     from shapeshift.runtime_models.blocks.read_blocks import BlockList, ListedBlock
@@ -211,7 +229,7 @@ def join(work: Path, found: "CutList", out: Path) -> "AnchorModel":
         names, paths = [*names, found.far], [*paths, work / CUT / found.far]
     models = [replace(read_package(path), pace=()) for path in paths]
     whole: AnchorModel = joined(models, names)
-    if len(whole.stops) > 1:
+    if pace and len(whole.stops) > 1:
         whole = with_pace(whole)
     blocks = tuple(
         ListedBlock(name, row.box) for name, row in zip(names, found.blocks, strict=False)

@@ -176,6 +176,8 @@ def test_one_that_is_not_wanted_any_more_ends_and_goes_on_later(counting):
 
     def hear(line: str) -> None:
         heard.append(line)
+        while not Path(task.checkpoint).exists():
+            time.sleep(0.01)
         began.set()
 
     with pytest.raises(TaskStopped):

@@ -122,3 +122,66 @@ def test_the_whole_way_ended_and_begun_again_gives_the_same_bytes(capture, tmp_p
     scene = ss.load(tmp_path / "b.blocks")
     assert isinstance(scene.model, BlockModel) and len(scene.stops) == 2
     assert np.isfinite(scene.render(size=(40, 30))).all()
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"blocks": "2x2", "out": None}, "blocks wants out, a folder NAME.blocks"),
+        ({"blocks": 2, "out": "a.shift"}, "^out is a.shift; blocks writes .* a.blocks"),
+        ({"blocks": 0}, "^blocks is '0'"),
+        ({"blocks": 2, "seconds": 5}, "^seconds: .* give iterations and coarse_iterations"),
+        ({"blocks": 2, "poses": "refine"}, "^poses refine"),
+        ({"blocks": 2, "grow": False}, "^grow: blocks are trained by commands"),
+        ({"blocks": 2, "anchor": 9}, "no setting 'anchor'"),
+        ({"blocks": 2, "iterations": 0}, "iterations is 0"),
+        ({"blocks": 2, "cluster": "moon"}, "--cluster is 'moon'"),
+        ({"blocks": "auto", "max_anchors": 99999}, r"^blocks auto: .*max_anchors\); leave out"),
+        ({"coarse_iterations": 9}, "coarse_iterations is of blocks"),
+        ({"cluster": "local:2"}, "cluster is of blocks"),
+        ({"block_photos": 9, "blocks": "1"}, "block_photos is of blocks"),
+    ],
+)
+def test_python_refuses_in_its_own_words(capture, tmp_path, capfd, more, said):
+    given = {"out": "a.blocks"} | more
+    out = given.pop("out")
+    with pytest.raises(ss.UsageError, match=said):
+        ss.train(capture, None if out is None else tmp_path / out, **given)
+    assert not [path for path in tmp_path.iterdir() if path.suffix == ".blocks"]
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.slow
+def test_python_trains_blocks_to_the_bytes_of_the_command(capture, tmp_path, capfd):
+    """Ended in a block and called again; what the command has done already it does not do."""
+    lengths = {"iterations": 60, "max_anchors": 200}
+    heard: list[str] = []
+
+    def hear(line: str) -> None:
+        heard.append(line)
+        if line.startswith("block 1: ") and "steps" in line and not begun:
+            begun.append(line)
+            raise KeyboardInterrupt
+
+    begun: list[str] = []
+    how = {"blocks": 2, "coarse_iterations": 30, "block_photos": 4, "progress": hear}
+    with pytest.raises(KeyboardInterrupt):
+        ss.train(capture, tmp_path / "a.blocks", **lengths, **how)
+    assert not (tmp_path / "a.blocks").exists()
+    scene = ss.train(capture, tmp_path / "a.blocks", **lengths, **how)
+    assert capfd.readouterr() == ("", "")
+    assert scene.steps == 30 + 2 * 60 and scene.seconds > scene.start_seconds > 0
+    assert scene.anchors == len(scene.model.anchors) and set(scene.psnr_db) == {"RGB", "Thermal"}
+    assert any(line.startswith("block 0: ") for line in heard) and scene.warnings == ()
+    scores = ss.evaluate(tmp_path / "a.blocks", capture)["modalities"]
+    for name, found in scores.items():  # which are rounded to four places
+        assert scene.psnr_db[name] == pytest.approx(found["psnr_db"], abs=6e-5)
+    again = ss.load(tmp_path / "a.blocks")
+    assert isinstance(again.model, BlockModel)
+    assert np.array_equal(again.render(size=(40, 30)), scene.render(size=(40, 30)))
+    times = {p: p.stat().st_mtime_ns for p in (tmp_path / "a.blocks.work").iterdir()}
+    before = files_of(tmp_path / "a.blocks")
+    words = ["train", str(capture), "--out", str(tmp_path / "a.blocks"), *SMALL]
+    assert cli.main([*words, "--coarse-iterations", "30", "--iterations", "60"]) == 0
+    assert times == {p: p.stat().st_mtime_ns for p in (tmp_path / "a.blocks.work").iterdir()}
+    assert files_of(tmp_path / "a.blocks") == before

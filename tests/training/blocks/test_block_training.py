@@ -122,6 +122,21 @@ def test_a_block_goes_on_and_keeps_to_its_box(block, cut):
     assert own.provenance.get("view") == start.provenance.get("view")
 
 
+def test_a_block_has_the_bits_of_a_run_that_keeps_all_in_memory(
+    device, capture, block, cut, monkeypatch
+):
+    """It keeps no photo ready for the loss and lends memory in other sizes, and that is all."""
+    assert not block.targets.kept and block.device.pool is not device.pool
+    monkeypatch.setattr("shapeshift.training.blocks.begin_block.with_small_pool", lambda d: d)
+    start = BlockStart.read(cut / "0.start.npz")
+    usual = begin_block(device, start, capture, settings_of(start))
+    usual.targets.most = 1 << 30
+    for _ in usual.steps():
+        pass
+    assert len(usual.targets.kept) == len({photo.path for photo in start.photos}) - 2  # held out
+    assert package_files(usual.model(), "exact") == package_files(block.model(), "exact")
+
+
 def test_a_block_learns(device, capture, block, cut):
     start = BlockStart.read(cut / "0.start.npz")
     first = begin_block(device, start, capture, settings_of(start)).held_out_psnr(9)

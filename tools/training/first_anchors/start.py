@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[n]) for n in (1, 3)]
 
-from ways import Turn, asked, parser_of, settings_of, table, turns  # noqa: E402
+from ways import Turn, asked, measure_ways, parser_of, settings_of  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.training.first_anchors import triangulation  # noqa: E402
@@ -31,11 +31,11 @@ WAYS: dict[str, dict] = {"chosen": {}, "whole": {}}
 CHOOSE = triangulation.choose_effort
 
 
-def rows_of(device, turn: Turn) -> Iterator[dict]:
+def rows_of(turn: Turn) -> Iterator[dict]:
     whole = turn.about["way"] == "whole"
     triangulation.choose_effort = lambda photos, seconds: CHOOSE(photos, None if whole else seconds)
     capture = replace(turn.capture, points=None, point_colors=None)
-    trainer = Trainer(device, capture, turn.settings, loaded=turn.photos)
+    trainer = Trainer(open_device(), capture, turn.settings, loaded=turn.photos)
     first = trainer.anchors_count
     for _ in trainer.steps():
         pass
@@ -50,10 +50,8 @@ def rows_of(device, turn: Turn) -> Iterator[dict]:
 
 
 def main() -> None:
-    options, device = asked(parser_of(__doc__, WAYS)), open_device()
-    with table(options, COLUMNS, device) as add:
-        for turn in turns(options, settings_of(options), WAYS):
-            add(rows_of(device, turn))
+    options = asked(parser_of(__doc__, WAYS))
+    measure_ways(options, COLUMNS, settings_of(options), WAYS, rows_of)
 
 
 if __name__ == "__main__":

@@ -35,9 +35,10 @@ def axes_of(
     yaw: float, pitch: float, roll: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Right, up and forward (3,) of an eye; yaw 0 looks along -Z, positive turns to the left."""
-    right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
-    forward = np.array([-np.sin(yaw) * np.cos(pitch), np.sin(pitch), -np.cos(yaw) * np.cos(pitch)])
-    up = np.cross(right, forward)
+    rx, rz = np.cos(yaw), -np.sin(yaw)
+    fx, fy, fz = rz * np.cos(pitch), np.sin(pitch), -rx * np.cos(pitch)
+    right, forward = np.array([rx, 0.0, rz]), np.array([fx, fy, fz])
+    up = np.array([-rz * fy, rz * fx - rx * fz, rx * fy])  # np.cross takes longer than all else
     cosine, sine = np.cos(roll), np.sin(roll)
     return cosine * right + sine * up, cosine * up - sine * right, forward
 

@@ -13,7 +13,8 @@ from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
-from shapeshift.app.editor.window.inspection.mouse_marks import KEYS, MouseMarks, Seen
+from shapeshift.app.editor.window.inspection.mouse_marks import KEYS, MouseMarks
+from shapeshift.app.editor.window.inspection.picture_under import Seen
 from shapeshift.app.editor.window.window import Window
 from shapeshift.app.inspection.inspect_view import first_photo, inspect_view
 from shapeshift.renderer.settings import RenderSettings

@@ -17,8 +17,8 @@ from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.inspection.attach_inspection import REPORT_PX
-from shapeshift.app.editor.window.inspection.mouse_marks import Seen
 from shapeshift.app.editor.window.inspection.mouse_ruler import KEYS, MouseRuler
+from shapeshift.app.editor.window.inspection.picture_under import Seen
 from shapeshift.app.editor.window.window import Window
 from shapeshift.app.inspection.inspect_view import length_words
 from shapeshift.app.inspection.length_report import SeenLengths, length_report

@@ -1,9 +1,5 @@
 """The mouse and the keys of the tool "Inspect", and when a view is measured."""
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-
 import glfw
 import numpy as np
 from imgui_bundle import imgui
@@ -19,10 +15,9 @@ from shapeshift.app.editor.panels.scale_bar import handle_at, has_scale, height_
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.inspecting import Inspecting
-from shapeshift.app.editor.state.layout import Layout
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.texts.table import said
-from shapeshift.app.editor.window.hands import TURN
+from shapeshift.app.editor.window.inspection.picture_under import PictureUnder, Seen
 from shapeshift.app.editor.window.window import (
     CLICK_PIXELS,
     DoubleClick,
@@ -35,11 +30,8 @@ from shapeshift.app.editor.window.window import (
     Window,
 )
 from shapeshift.app.inspection.draw_values import draw_values
-from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.marks import Kind
-from shapeshift.scene.pose import View
 
 KEYS = (
     ("Y", "lay marks, on and off"),
@@ -51,19 +43,6 @@ KEYS = (
     ("scale", "drag a handle: an end of the palette"),
 )
 PHOTOS = (".jpg", ".jpeg", ".png")  # that are dropped onto the window while a mark is chosen
-STILL_S = 0.25  # so long nothing must move before a view is measured
-MOST_PX = 640  # longer side of the picture that is measured
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What the tool needs of the window's own drawing."""
-
-    renderer: Renderer
-    forget: Callable[[], None]  # the renderer has drawn something else meanwhile
-    moving: Callable[[], bool]
-    layout: Callable[[], Layout]
-    unit: Callable[[], str]  # of temperature, that is wanted
 
 
 class MouseMarks:
@@ -75,12 +54,11 @@ class MouseMarks:
     ) -> None:  # fmt: skip
         self._tool, self._state, self._window = tool, state, window
         self._viewpoint, self._parts, self._seen = viewpoint, parts, seen
+        self._under = PictureUnder(window, viewpoint, seen)
         self._handle: int | None = None  # of the scale, that the mouse holds
         self._pressed: tuple[float, float] | None = None  # logical pixels
         self._end: tuple[float, float] | None = None  # of a drag; None: still a click
         self._kind: Kind = "box"  # that a drag lays
-        self._key: tuple = ()  # of what is seen, and since when
-        self._since = 0.0
         self._measured: tuple = ()  # key of what was measured last
         self._models: tuple = ()  # of that: no other gets the id of one of them
         self._cursor = window.cursor  # where the mouse was looked up last
@@ -114,8 +92,7 @@ class MouseMarks:
                 self._let_go(self._pressed, self._end)
                 self._pressed = self._end = None
             case Drag(button="right"):
-                self._viewpoint.leave_camera()
-                self._viewpoint.camera.turn(-event.dx * TURN, -event.dy * TURN)
+                self._under.turn(event)
             case DoubleClick():
                 pass  # two clicks: the camera stays
             case Drop(paths=(path,)) if self._tool.chosen and path.suffix.lower() in PHOTOS:
@@ -187,28 +164,16 @@ class MouseMarks:
             return
         self._measure()
         kind: Kind = self._kind if end is not None else "spot"
-        tool.lay(kind, self._pixel(start), self._pixel(end or start))
+        tool.lay(kind, self._under.pixel(start), self._under.pixel(end or start))
 
     def _mark_at(self, place: tuple[float, float]) -> str:
         """The name of a mark whose middle is seen there, logical pixels; "": none is."""
         marks = self._tool.file.marks
         if not marks or self._tool.picture is None:
             return ""
-        through = replace(self._tool.picture, view=self._logical_view())
-        pixels, _ = through.pixel_of(np.array([mark.place for mark in marks]))
-        away = np.nan_to_num(np.linalg.norm(pixels - place, axis=1), nan=np.inf)
-        nearest = int(np.argmin(away))
-        return marks[nearest].name if away[nearest] <= 2 * CLICK_PIXELS else ""
-
-    def _logical_view(self) -> View:
-        width, height = self._window.logical_size
-        return replace(self._viewpoint.view(), size=(int(width), int(height)))
-
-    def _pixel(self, place: tuple[float, float]) -> tuple[float, float]:
-        """A place in logical pixels as one of the picture that is measured."""
-        width, height = self._window.logical_size
-        columns, rows = measured_size(self._window.size)
-        return place[0] * columns / width, place[1] * rows / height
+        places = np.array([mark.place for mark in marks])
+        number = self._under.point_at(self._tool.picture, places, place)
+        return "" if number is None else marks[number].name
 
     # ---- frames
 
@@ -222,20 +187,19 @@ class MouseMarks:
             tool.on = False
         if not state.has_legend or tool.thermal is None:
             return False
-        key, now = self._seen_now(), time.perf_counter()
-        if key != self._key:
-            self._key, self._since = key, now
+        key = self._seen_now()
+        still = self._under.is_still(key)
         tool.is_current = self._measured == key
         cursor, on_scene = self._window.cursor, self._window.on_scene
         moved, self._cursor = cursor != self._cursor, cursor
         shows = state.overlay and on_scene and has_scale(state.scene)
         asks = tool.on or bool(tool.file.marks or tool.file.isotherms) or (shows and moved)
         waits = asks and not tool.is_current and not self._seen.moving()
-        if waits and now - self._since >= STILL_S:
+        if waits and still:
             self._measure()
             waits = False
         pointing = tool.is_current and on_scene and (tool.on or shows)
-        tool.point(self._pixel(cursor) if pointing else None)
+        tool.point(self._under.pixel(cursor) if pointing else None)
         if waits and shows:
             self._cursor = (-1.0, -1.0)  # it has moved: asked until it is answered
         return waits
@@ -249,20 +213,16 @@ class MouseMarks:
 
     def _measure(self) -> None:
         """Values and depths of what is seen now, unless they are there."""
-        tool, view, key = self._tool, self._viewpoint.view(), self._seen_now()
-        if tool.thermal is None or (self._measured == key and tool.picture is not None):
+        tool, thermal, key = self._tool, self._tool.thermal, self._seen_now()
+        if thermal is None or (self._measured == key and tool.picture is not None):
             return
-        renderer = self._seen.renderer
-        renderer.settings = RenderSettings()
         self._measured = key
         self._models = tuple(obj.model for obj in self._state.scene.objects)
         try:
-            small = replace(view, size=measured_size(view.size))
-            tool.saw(draw_values(renderer, tool.thermal, small))
+            tool.saw(self._under.draw(lambda renderer, view: draw_values(renderer, thermal, view)))
         except BadFile as error:
             tool.on = False
             self._state.problem = str(error)
-        self._seen.forget()
 
     def forget(self) -> None:
         """Another scene."""
@@ -282,7 +242,7 @@ class MouseMarks:
             return
         if tool.is_current and tool.picture is not None and tool.file.isotherms:
             self._draw_alarms()
-        view, unit = self._logical_view(), self._seen.unit()
+        view, unit = self._under.logical_view(), self._seen.unit()
         for mark in tool.file.marks:
             reading = tool.readings.get(mark.name) if tool.is_current else None
             words = ""
@@ -324,9 +284,3 @@ class MouseMarks:
         width, height = self._window.logical_size
         corner, end = imgui.ImVec2(0, 0), imgui.ImVec2(width, height)
         imgui.get_background_draw_list().add_image(number, corner, end)
-
-
-def measured_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Of the picture that is measured of a view of `size` pixels (W, H)."""
-    part = min(1.0, MOST_PX / max(size))
-    return max(round(size[0] * part), 1), max(round(size[1] * part), 1)

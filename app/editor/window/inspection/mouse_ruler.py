@@ -1,8 +1,6 @@
 """The mouse and the keys of the tool "Measure", and when the depths of a view are drawn."""
 
-import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import glfw
 import numpy as np
@@ -14,8 +12,7 @@ from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.ruler import Ruler
 from shapeshift.app.editor.texts.table import said
-from shapeshift.app.editor.window.hands import TURN
-from shapeshift.app.editor.window.inspection.mouse_marks import STILL_S, Seen, measured_size
+from shapeshift.app.editor.window.inspection.picture_under import PictureUnder, Seen
 from shapeshift.app.editor.window.window import (
     CLICK_PIXELS,
     DoubleClick,
@@ -27,9 +24,7 @@ from shapeshift.app.editor.window.window import (
     Window,
 )
 from shapeshift.app.inspection.draw_values import depth_picture
-from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.pose import View
 
 KEYS = (
     ("Shift+Y", "measure lengths, on and off"),
@@ -52,11 +47,9 @@ class MouseRuler:
     ) -> None:  # fmt: skip
         self._ruler, self._inspecting, self._state = ruler, inspecting, state
         self._window, self._viewpoint, self._parts, self._seen = window, viewpoint, parts, seen
-        self._unit = unit
+        self._unit, self._under = unit, PictureUnder(window, viewpoint, seen)
         self._pressed: tuple[float, float] | None = None  # logical pixels
         self._drags = False
-        self._key: tuple = ()  # of what is seen, and since when
-        self._since = 0.0
         self._drawn: tuple = ()  # key of what the ruler's picture is of
         self._scene: object = None  # of that: no other gets its id
         self._was_on = False
@@ -76,8 +69,7 @@ class MouseRuler:
                 x, y = self._pressed
                 self._drags |= abs(event.x - x) + abs(event.y - y) > CLICK_PIXELS
                 if self._drags:
-                    self._viewpoint.leave_camera()
-                    self._viewpoint.camera.turn(-event.dx * TURN, -event.dy * TURN)
+                    self._under.turn(event)
             case Release(button="left") if self._pressed is not None:
                 place, self._pressed = self._pressed, None
                 if not self._drags:
@@ -96,10 +88,11 @@ class MouseRuler:
         self.measure()
         if len(ruler.points) > 1 and ruler.kind in OPEN_KINDS:
             end = ruler.points[-1 if ruler.kind == "polyline" else 0].metres
-            if self._near(end, place):
+            picture = ruler.picture
+            if picture is not None and self._under.point_at(picture, end[None], place) == 0:
                 ruler.finish()
                 return
-        ruler.pick(self._pixel(place))
+        ruler.pick(self._under.pixel(place))
 
     def _press_key(self, event: KeyDown) -> bool:
         ruler = self._ruler
@@ -148,15 +141,14 @@ class MouseRuler:
         ruler.pointed = None
         if not ruler.on:
             return False
-        key, now = self._seen_now(), time.perf_counter()
-        if key != self._key:
-            self._key, self._since = key, now
+        key = self._seen_now()
+        still = self._under.is_still(key)
         waits = self._drawn != key and not self._seen.moving()
-        if waits and now - self._since >= STILL_S:
+        if waits and still:
             self.measure()
             waits = False
         if self._drawn == key and ruler.picture is not None and self._window.on_scene:
-            there = ruler.picture.pick(self._pixel(self._window.cursor))
+            there = ruler.picture.pick(self._under.pixel(self._window.cursor))
             ruler.pointed = there if np.isfinite(there).all() else None
         return waits
 
@@ -171,16 +163,14 @@ class MouseRuler:
         ruler, key = self._ruler, self._seen_now()
         if self._drawn == key and ruler.picture is not None:
             return
-        view, renderer = self._viewpoint.view(), self._seen.renderer
-        renderer.settings = RenderSettings()
         self._drawn, self._scene = key, self._state.scene
         try:
-            small = replace(view, size=measured_size(view.size))
-            ruler.picture = depth_picture(renderer, self._state.scene, small)
+            ruler.picture = self._under.draw(
+                lambda renderer, view: depth_picture(renderer, self._state.scene, view)
+            )
         except BadFile as error:
             ruler.on = False
             self._state.problem = str(error)
-        self._seen.forget()
 
     def forget(self) -> None:
         """Another scene."""
@@ -200,7 +190,7 @@ class MouseRuler:
         ruler = self._ruler
         if not self._state.overlay or not (ruler.lengths or ruler.points):
             return
-        view, unit = self._logical_view(), self._unit()
+        view, unit = self._under.logical_view(), self._unit()
         for each in ruler.lengths:
             words = f"{each.name}  {ruler.measured(each).words(unit)}"
             chosen = each.name == ruler.chosen
@@ -209,21 +199,3 @@ class MouseRuler:
             places, found = ruler.being_laid()
             words = found.words(unit) if found is not None else ""
             draw_length(ruler.kind, places, view, words, True, ui_scale)
-
-    def _logical_view(self) -> View:
-        width, height = self._window.logical_size
-        return replace(self._viewpoint.view(), size=(int(width), int(height)))
-
-    def _pixel(self, place: tuple[float, float]) -> tuple[float, float]:
-        """A place in logical pixels as one of the picture of depths."""
-        width, height = self._window.logical_size
-        columns, rows = measured_size(self._window.size)
-        return place[0] * columns / width, place[1] * rows / height
-
-    def _near(self, point: np.ndarray, place: tuple[float, float]) -> bool:
-        """Whether a point of the world is seen at a place in logical pixels."""
-        if self._ruler.picture is None:
-            return False
-        through = replace(self._ruler.picture, view=self._logical_view())
-        (pixel,), _ = through.pixel_of(point[None])
-        return bool(np.linalg.norm(pixel - place) <= 2 * CLICK_PIXELS)

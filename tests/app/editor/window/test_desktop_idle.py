@@ -80,7 +80,8 @@ def test_an_event_draws_the_overlay_and_then_it_rests_again(viewer, monkeypatch)
     rounds = Rounds(viewer, monkeypatch)
     viewer.window.on_key(viewer.window.handle, glfw.KEY_F9, 0, glfw.PRESS, 0)  # a key of nothing
     frames, draws, presents = rounds.go()
-    assert 0 < frames < WAITS / 2 and draws == 0 and presents == frames
+    assert 0 < frames < WAITS / 2 and draws == 0
+    assert presents == (0 if viewer.window.presented.keeps else frames)  # kept: not even resolved
 
 
 def hide(viewer, display) -> None:

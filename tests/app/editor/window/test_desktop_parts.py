@@ -4,30 +4,21 @@ The renderer is one that draws nothing, except where a picture is what is asked.
 """
 
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.desktop import Options, Viewer
-from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.open_scene import opened_scene
-from shapeshift.app.editor.state.files.opened import OpenedFiles, read_files
+from shapeshift.app.editor.state.files.opened import OpenedFiles
 from shapeshift.app.editor.state.parts.selecting import ALL
 from shapeshift.app.paths import DEMO
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.document.scene_file import BACKGROUND
 from shapeshift.training.synthetic.labels import LABELS, labels_of_places
 from tests.support.desktop.desktop_stand import PlainRenderer, run_frames
 from tests.support.desktop.objects_stand import names, place_of
 from tests.support.desktop.real_hands import RealHands
+from tests.support.desktop.scene_stand import hands_on, read, viewer_on
 from tests.support.desktop.widgets import Widgets
-
-
-def read(path: Path) -> OpenedFiles:
-    return read_files([path], lambda path, told: read_model(path), CameraReading(), None)
 
 
 @pytest.fixture(scope="module")
@@ -41,32 +32,17 @@ def truth(demo) -> np.ndarray:
     return labels_of_places(demo.sources[0].model.anchors.astype(np.float64))[0]
 
 
-def viewer_of(window, found: OpenedFiles, folder: Path, renderer) -> Viewer:
-    state = EditorState(read_model)
-    scene, edited = opened_scene(found)
-    state.open_sources(found.sources, scene, None, edited)
-    state.bodies.follow = lambda edited: None  # a collider of the demo takes ten seconds
-    viewer = Viewer(window, renderer, state, Options(pictures=folder / "pictures"))
-    run_frames(viewer, 4)
-    return viewer
-
-
 @pytest.fixture
 def viewer(window, demo, tmp_path):
-    viewer = viewer_of(window, demo, tmp_path, PlainRenderer(window.ctx))
+    viewer = viewer_on(window, PlainRenderer(window.ctx), demo, tmp_path / "pictures")
     yield viewer
     viewer.parts.finder.close()
 
 
 @pytest.fixture
 def hands(viewer, display):
-    with RealHands(viewer, display) as hands:
-        hands.move(2, 2)
+    with hands_on(viewer, display, (2, 2)) as hands:
         yield hands
-        hands.button(False)
-        for name in ("Shift_L", "Alt_L", "Control_L", "b"):
-            hands.hold_key(name, False)
-        hands.move(600, 20)
 
 
 def settle(viewer) -> None:
@@ -251,7 +227,7 @@ def test_the_window_never_waits_for_a_walk(viewer, hands, truth, monkeypatch):
 def test_what_is_made_is_saved_and_opened_again(window, demo, display, truth, tmp_path):
     """The picture before and after, drawn."""
     with Renderer(window.ctx) as renderer:
-        viewer = viewer_of(window, demo, tmp_path, renderer)
+        viewer = viewer_on(window, renderer, demo, tmp_path / "pictures")
         before = window_picture(viewer)
         with RealHands(viewer, display) as hands:
             hands.key("o")
@@ -274,7 +250,7 @@ def test_what_is_made_is_saved_and_opened_again(window, demo, display, truth, tm
         assert {file.suffix for file in path.parent.iterdir()} == {".shift", ".json"}
         changed = np.abs(lit.astype(int) - before).max(axis=2) > 40
         assert 200 < changed.sum() < 6000  # the mug, and not the rest
-        again = viewer_of(window, read(path), tmp_path, renderer)
+        again = viewer_on(window, renderer, read(path), tmp_path / "pictures")
         again.viewpoint.camera = viewer.viewpoint.camera
         again.state.chosen = viewer.state.chosen
         run_frames(again, 3)

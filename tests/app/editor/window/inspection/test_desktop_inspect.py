@@ -11,20 +11,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.panels.scale_bar import height_of
-from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.open_scene import opened_scene
-from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from tests.support.desktop.desktop_stand import run_frames
 from tests.support.desktop.objects_stand import place_of
-from tests.support.desktop.real_hands import RealHands
+from tests.support.desktop.scene_stand import hands_on, viewer_on_wall
 from tests.support.desktop.widgets import Widgets
 from tests.support.scene.warm_wall import STOPS, celsius_at, write_wall
 
@@ -43,33 +37,17 @@ def wall(tmp_path) -> Path:
     return write_wall(tmp_path / "wall")
 
 
-def viewer_of(window, renderer, wall: Path, x: str = "Thermal") -> Viewer:
-    found = read_files([wall], lambda path, told: read_model(path), CameraReading(), None)
-    state = EditorState(read_model)
-    scene, edited = opened_scene(found, x)
-    state.open_sources(found.sources, scene, None, edited)
-    state.bodies.follow = lambda edited: None
-    viewer = Viewer(window, renderer, state, Options(pictures=wall.parent / "work" / "pictures"))
-    viewer.shell.actions.sections.update({"Stops": False, "Look": False, "Camera": False})
-    run_frames(viewer, 4)
-    return viewer
-
-
 @pytest.fixture
 def viewer(window, renderer, wall):
-    viewer = viewer_of(window, renderer, wall)
+    viewer = viewer_on_wall(window, renderer, wall, "Thermal")
     yield viewer
     viewer.parts.finder.close()
 
 
 @pytest.fixture
 def hands(viewer, display):
-    with RealHands(viewer, display) as hands:
-        hands.move(600, 20)
+    with hands_on(viewer, display) as hands:
         yield hands
-        hands.button(False)
-        hands.hold_key("Shift_L", False)
-        hands.move(600, 20)
 
 
 def settle(viewer) -> None:
@@ -219,7 +197,7 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
     (report,) = (wall.parent / "work" / "exports").glob("*.html")
     text = report.read_text()
     assert "Motor" in text and text.count("data:image/png") == 2 and "Ar1" in text
-    again = viewer_of(window, renderer, wall)
+    again = viewer_on_wall(window, renderer, wall, "Thermal")
     assert [m.name for m in again.inspecting.file.marks] == ["Motor", "Ar1"]
     assert not again.inspecting.unsaved and again.may_close()
     again.parts.finder.close()
@@ -313,7 +291,7 @@ def test_the_handles_of_the_scale_are_level_and_span(viewer, hands, monkeypatch)
 
 def test_a_scene_without_heat_has_no_such_section(window, renderer, tmp_path):
     wall = write_wall(tmp_path / "plain", STOPS[:1])
-    viewer = viewer_of(window, renderer, wall, "RGB")
+    viewer = viewer_on_wall(window, renderer, wall, "RGB")
     section = next(s for s in viewer.hooks.sections if s.name == "Inspect")
     assert not section.shown() and viewer.inspecting.thermal is None
     viewer.parts.finder.close()

@@ -8,17 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.desktop import Options, Viewer
-from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.open_scene import opened_scene
-from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from tests.support.desktop.desktop_stand import run_frames
 from tests.support.desktop.objects_stand import place_of
-from tests.support.desktop.real_hands import RealHands
+from tests.support.desktop.scene_stand import hands_on, viewer_on_wall
 from tests.support.desktop.widgets import Widgets
 from tests.support.scene.warm_wall import STOPS, write_wall
 
@@ -36,32 +30,17 @@ def wall(tmp_path) -> Path:
     return write_wall(tmp_path / "wall", STOPS[:1])  # photos alone: no heat is needed
 
 
-def viewer_of(window, renderer, wall: Path) -> Viewer:
-    found = read_files([wall], lambda path, told: read_model(path), CameraReading(), None)
-    state = EditorState(read_model)
-    scene, edited = opened_scene(found, "")
-    state.open_sources(found.sources, scene, None, edited)
-    state.bodies.follow = lambda edited: None
-    viewer = Viewer(window, renderer, state, Options(pictures=wall.parent / "work" / "pictures"))
-    viewer.shell.actions.sections.update({"Stops": False, "Look": False, "Camera": False})
-    run_frames(viewer, 4)
-    return viewer
-
-
 @pytest.fixture
 def viewer(window, renderer, wall):
-    viewer = viewer_of(window, renderer, wall)
+    viewer = viewer_on_wall(window, renderer, wall)
     yield viewer
     viewer.parts.finder.close()
 
 
 @pytest.fixture
 def hands(viewer, display):
-    with RealHands(viewer, display) as hands:
-        hands.move(600, 20)
+    with hands_on(viewer, display) as hands:
         yield hands
-        hands.button(False)
-        hands.move(600, 20)
 
 
 def test_lengths_are_clicked_scaled_noted_kept_and_reported(
@@ -154,7 +133,7 @@ def test_lengths_are_clicked_scaled_noted_kept_and_reported(
     text = report.read_text()
     assert ">Q<" in text and "bent" in text and text.count("data:image/png") == 1
     assert f"{ruler.measured(ruler.lengths[0]).words('m')}" in text and not state.problem
-    again = viewer_of(window, renderer, wall)
+    again = viewer_on_wall(window, renderer, wall)
     assert again.ruler.measured(again.ruler.lengths[0]).value == pytest.approx(values[0], abs=1e-4)
     assert not again.inspecting.unsaved and again.may_close()
     again.parts.finder.close()

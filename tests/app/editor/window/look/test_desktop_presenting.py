@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from shapeshift.renderer.gl.functions import NoFunction
+from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.resolve import GlFunctions, Resolve
+from shapeshift.renderer.gl.resolve import Resolve
 
 
 def shown_in(window) -> np.ndarray:
