@@ -12,7 +12,13 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
 
-MODELS = ("sparse/0", "sparse", "colmap/sparse/0", ".")  # where a folder may hold its model
+MODELS = (
+    "sparse/0",
+    "sparse",
+    "colmap/sparse/0",
+    "dense/sparse",
+    ".",
+)  # where a folder may hold its model
 TABLES = ("cameras", "images", "points3D")
 LONGEST_NAME = 4096  # bytes of an image's name
 # name, how many focal lengths, how many parameters; COLMAP's src/colmap/sensor/models.h
