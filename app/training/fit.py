@@ -12,7 +12,7 @@ from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf, 
 from shapeshift.app.terminal import open_console, print_json, say
 from shapeshift.app.training.train_options import Asked, MachineOptions
 from shapeshift.training.left_options import LEFT
-from shapeshift.training.settings import TrainSettings
+from shapeshift.training.settings import TrainSettings, suited
 
 if TYPE_CHECKING:
     from shapeshift.training.fit.ablation import Ablation, Trial
@@ -62,6 +62,7 @@ class Options(ClusterOptions, MachineOptions):
 
 
 TRIAL = 600  # steps
+WRITTEN = "the fitted model of the first seed with this report in it"
 CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
 
 
@@ -99,6 +100,7 @@ def run(options: Options) -> int:
     longer = options.final_iterations, options.final_seconds
     last = None if longer == (None, None) else settings_of(options.asked | budget(*longer))
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
+    settings = suited(settings, options.asked, len(capture.stops))
     if options.calibrate is not None:
         if options.cluster == NONE:
             settings = calibrated(device, capture, settings, options.calibrate)
@@ -117,8 +119,7 @@ def run(options: Options) -> int:
     noted = with_pace(replace(model, provenance=report))
     size = write_package(noted, options.out, need.fitted.storage)
     print_report(need)
-    what = "the fitted model of the first seed with this report in it"
-    say(f"{full(options.out)}: {size:,} bytes, {what}")
+    say(f"{full(options.out)}: {size:,} bytes, {WRITTEN}")
     if options.json == Path("-"):
         print_json(result)
     elif options.json is not None:

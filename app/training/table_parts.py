@@ -123,12 +123,15 @@ def train_part(part: TablePart, device, capture: "Capture", asked: TrainOptions,
 
 def run_of(part: TablePart, capture: "Capture", asked: TrainOptions, rig: str) -> ModelRun:
     from shapeshift.runtime_models.package.write_package import refuse_foreign
+    from shapeshift.training.settings import suited
 
     if part.method == "splats":
         plain = share_of(plain_settings(asked), capture)
         return splats_run(plain, asked.asked | asked.splats)
     refuse_foreign(part.file)
-    settings = replace(settings_of(asked.asked), rig=rig)
+    given = asked.asked
+    settings = suited(settings_of(given), given, len(capture.stops))  # of one model and of several
+    settings = replace(settings, rig=rig)
     return anchors_run(share_of(settings, capture) if part.modality else settings, asked.asked)
 
 

@@ -54,6 +54,7 @@ def run_whole(options: Options) -> int:
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.settings import suited
     from shapeshift.training.train import Trainer
 
     room = room_of(options.out, options.photo_mb)
@@ -68,6 +69,8 @@ def run_whole(options: Options) -> int:
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options.asked, resume[1]["settings"] if resume else None)
     capture = open_capture(options.capture, options.memory)
+    if resume is None:
+        settings = suited(settings, options.asked, len(capture.stops))
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:

@@ -70,12 +70,15 @@ def run_baseline(options: Options, room: "PhotoRoom") -> int:
     """room: for the photos of each model in turn."""
     from shapeshift.rasterizer.device import open_device
     from shapeshift.training.calibration.extrinsics import with_extrinsics
+    from shapeshift.training.settings import suited
 
     if options.separate and options.model == "splats":
         raise UsageError("plain splats are one model a modality already; leave out --separate.")
     plain = plain_settings(options) if options.model == "splats" else None
     settings = settings_of(options.asked) if plain is None else None
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
+    if settings is not None:
+        settings = suited(settings, options.asked, len(capture.stops))
     say(f"{device.name}, {device.platform}")
     if settings is not None and options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)

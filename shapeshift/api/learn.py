@@ -132,6 +132,7 @@ def trainer_of(
     from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
     from shapeshift.training.calibration.extrinsics import rig_json, with_extrinsics
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.settings import suited
     from shapeshift.training.train import Trainer
 
     if path is not None:
@@ -143,6 +144,9 @@ def trainer_of(
     before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
     wished = settings_of(settings, before[1]["settings"] if before else None)
     found, on = read_capture(plain(str(capture))), open_device(device)
+    if before is None:
+        given = [name for name, value in settings.items() if value is not None]
+        wished = suited(wished, given, len(found.stops))
     if calibrate is not None:
         if resume:
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")

@@ -1,5 +1,7 @@
 """The parts of training that are plain numpy: first points, photos, growing, schedule, Adam."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -21,7 +23,14 @@ from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.schedule import Budget, Schedule
-from shapeshift.training.settings import LONG, SHORT, TrainSettings, adjusted
+from shapeshift.training.settings import (
+    LONG,
+    ONE_MODALITY,
+    SHORT,
+    TrainSettings,
+    adjusted,
+    suited,
+)
 from shapeshift.training.supervision.backgrounds import choose_background
 
 RNG = np.random.default_rng
@@ -198,6 +207,28 @@ def test_settings_name_the_networks():
     assert TrainSettings().layout(16) == HeadLayout(5)
     with pytest.raises(ValueError, match="no head 'shape' to fix; they are offset"):
         TrainSettings(fixed="shape")
+
+
+@pytest.mark.parametrize(
+    ("asked", "modalities", "own"),
+    [
+        ((), 1, True),
+        (("iterations", "points", "seed", "features", "downscale"), 1, True),
+        ((), 2, False),
+        ((), 9, False),
+        *(((name,), 1, False) for name in (*ONE_MODALITY, "max_mb")),
+    ],
+)
+def test_a_scene_that_never_changes_has_more_anchors_with_light(asked, modalities, own):
+    """Unless somebody says how many or of what kind; nothing else differs."""
+    settings = TrainSettings(seed=7, iterations=300)
+    found = suited(settings, asked, modalities)
+    if not own:
+        assert found == settings
+        return
+    assert found == replace(settings, **ONE_MODALITY)
+    assert found.max_anchors * found.splats_per_anchor == 60000  # as many splats as without
+    assert found.layout(2).per_anchor[-1] == "light"
 
 
 def test_rates_decay_further_in_long_runs():

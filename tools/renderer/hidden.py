@@ -214,6 +214,9 @@ def main() -> int:
         work(options.leg, options.work, not options.whole)
         return 0
     here = HERE.parents[2]
+    sys.path.insert(0, str(here))
+    from shapeshift.app.charts.chart_rows import write_lines
+
     trees = {"now": here, "whole": here}
     if options.before:
         trees["before"] = options.before
@@ -226,11 +229,7 @@ def main() -> int:
         if case.splats <= options.most:
             rows.append(measure(options.leg, case, trees))
             sys.stderr.write(rows[-1] + "\n")
-    text = "\n".join(rows) + "\n"
-    if options.out:
-        options.out.write_text(text)
-    else:
-        sys.stdout.write(text)
+    write_lines(options.out, rows)
     return 0
 
 

@@ -24,6 +24,7 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
 from peers import make_views  # noqa: E402
 
+from shapeshift.app.charts.chart_rows import write_lines  # noqa: E402
 from shapeshift.rasterizer.bin import bin_tiles, sort_order  # noqa: E402
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.rasterizer.pack import pack  # noqa: E402
@@ -258,11 +259,7 @@ def main() -> int:
     rows = [f"# {words}", f"# {device.platform}, {device.units} units; {load}", COLUMNS]
     for name, model in (("leg SH3", leg), ("3 legs SH0", three)):
         rows += rows_of(name, Arena.of(device, model), options.poses, prototype)
-    text = "\n".join(rows) + "\n"
-    if options.out:
-        options.out.write_text(text)
-    else:
-        sys.stdout.write(text)
+    write_lines(options.out, rows)
     return 0
 
 

@@ -28,7 +28,7 @@ from shapeshift.scene.captures.capture import Capture  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.training.baselines.plain import PlainTrainer, one_modality  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
-from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.settings import TrainSettings, suited  # noqa: E402
 from shapeshift.training.synthetic.workshop import make_workshop  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 
@@ -69,6 +69,7 @@ def anchors(device, capture: Capture, options: argparse.Namespace, points: str, 
     settings = TrainSettings(
         iterations=None, seconds=options.seconds, seed=options.seed, points=points, downscale=factor
     )
+    settings = suited(settings, (), len(capture.stops))
     psnr, said = train(lambda: Trainer(device, capture, settings))
     return [(name, db, said) for name, db in psnr.items()]
 

@@ -77,12 +77,17 @@ def plan(
 
 
 def caps(size: float, asked: argparse.Namespace) -> tuple[dict[str, int], dict[str, int]]:
-    """What is asked of anchors and of plain splats: caps at a share of the usual ones."""
+    """What is asked of anchors and of plain splats: caps at a share of the usual ones.
+
+    Of the whole size nothing is asked, unless --max-anchors is: captures of one modality then have
+    anchors of their own kind.
+    """
     most, most_splats = (
         max(round(size * number), 1) for number in (asked.max_anchors, PlainSettings().max_splats)
     )
     smaller = {"downscale": asked.downscale} if asked.downscale else {}
-    return {"max_anchors": most} | smaller, {"max_splats": most_splats}
+    usual = most == TrainSettings().max_anchors
+    return ({} if usual else {"max_anchors": most}) | smaller, {"max_splats": most_splats}
 
 
 def made(name: str, work: Path) -> Path:

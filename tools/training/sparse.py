@@ -1,7 +1,7 @@
 """Few photos: what the defaults give with 3, 6, 12 of them, and what priors and ways to train add.
 
     python3 tools/training/sparse.py CAPTURE MODALITY [CAPTURE MODALITY ...]
-        --out docs/bench/sparse.csv [--photos 3 6 12 0] [--iterations 600] [--max-anchors 6000]
+        --out docs/bench/sparse.csv [--photos 3 6 12 0] [--iterations 600] [--max-anchors 7500]
         [--downscale N] [--seeds 0] [--ways default ...]
 
 CAPTURE is a folder of posed photos, or `bench` RGB: the demo's closed bench with true depth and
@@ -11,7 +11,7 @@ psnr_db, ssim and depth_error (of what is seen, where the capture knows it) are 
 photos, train_db of up to 8 of the photos that were learned from.  Ways take turns; those that want
 what a capture does not have are left out.
 
-  default        as `train` does it, without depth and normals
+  default        as `train` does it for one modality, without depth and normals
   depth          with depth photos (--depth-share 0.3)
   normals        with normal maps (--normal-share 0.1)
   both           with both
@@ -21,7 +21,7 @@ what a capture does not have are left out.
   rough both     both of these
   seen points    depth at the points that were triangulated out of these photos, alone
   alike          colours that do not see the eye (view_dependent)
-  light          light by direction (--anchor-attributes frame,color,light)
+  five           fewer anchors of 5 splats each, as many splats, without light by direction
   half           half of the anchors
   left out       each step leaves out a tenth of the anchors, drawn by chance (DropGaussian, 2025)
   early          half of the steps
@@ -55,7 +55,7 @@ from shapeshift.training.photos import (  # noqa: E402
     choose_downscale,
     load_photos,
 )
-from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.settings import TrainSettings, suited  # noqa: E402
 from shapeshift.training.synthetic import one_shape, workshop  # noqa: E402
 from shapeshift.training.synthetic.tracer import depth_under, look, pixel_rays  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
@@ -115,7 +115,7 @@ WAYS = {
     "rough both": Way(priors=("depth", "normals"), rough=True),
     "seen points": Way(priors=("points",)),
     "alike": Way({"view_dependent": False}),
-    "light": Way({"anchor_attributes": "frame,color,light"}),
+    "five": Way({"splats_per_anchor": 5, "max_anchors": 0.4, "anchor_attributes": "frame,color"}),
     "half": Way({"max_anchors": 0.5}),
     "left out": Way(left_out=0.1),
     "early": Way({"iterations": 0.5}),
@@ -259,9 +259,10 @@ def rows_of(
         whole = bench(Path(folder)) if word == "bench" else read_capture(Path(word))
         part = part_of(one_modality(whole, modality), photos)
         settings = TrainSettings(
-            iterations=options.iterations, max_anchors=options.max_anchors, seed=seed,
+            iterations=options.iterations, seed=seed,
             downscale=options.downscale or choose_downscale(whole.photos),
         )  # fmt: skip
+        settings = replace(suited(settings, (), 1), max_anchors=options.max_anchors)
         loaded = {
             split: load_photos(part, split, settings.downscale or 1, settings.masks)
             for split in ("train", "test")
@@ -297,7 +298,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--photos", type=int, nargs="+", default=[3, 6, 12, 0])
     parser.add_argument("--iterations", type=int, default=600)
-    parser.add_argument("--max-anchors", type=int, default=6000)
+    parser.add_argument("--max-anchors", type=int, default=7500)
     parser.add_argument("--downscale", type=int)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))

@@ -165,7 +165,8 @@ def coarse_task(options: Options, work: Path) -> Task:
     from shapeshift.training.checkpoint import checkpoint_path
 
     capture, out = capture_path(options), work / COARSE
-    asked = {n: v for n, v in options.asked.items() if n != "iterations"}
+    asked = {"max_anchors": most_anchors(options)} | options.asked  # as blocks have
+    asked.pop("iterations", None)
     if options.coarse_iterations is not None:
         asked["iterations"] = options.coarse_iterations
     reads = [capture]
