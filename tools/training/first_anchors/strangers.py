@@ -1,6 +1,6 @@
 """Captures that nothing was tuned on: anchors beside plain splats, with the defaults alone.
 
-    python3 tools/training/strangers.py --out docs/bench/strangers.csv [--seconds 20] \
+    python3 tools/training/first_anchors/strangers.py --out docs/bench/strangers.csv [--seconds 20] \
         [--kinds room aerial ...] [--seeds 0] [--models anchors splats]
 
 Kinds are those of training/synthetic/strangers.py, each another place for another seed, made on the
@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
+sys.path[:0] = [str(HERE.parents[2]), str(HERE.parent)]
 
 from bare import processor_s  # noqa: E402
 
@@ -94,7 +94,9 @@ def asked() -> argparse.Namespace:
 def main() -> None:
     options, device = asked(), open_device("cpu")
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(f"# python3 tools/training/strangers.py {shlex.join(sys.argv[1:])}\n")
+        file.write(
+            f"# python3 tools/training/first_anchors/strangers.py {shlex.join(sys.argv[1:])}\n"
+        )
         file.write(f"# {device.name}, {device.platform}\n")
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
         rows.writeheader()
