@@ -1,7 +1,7 @@
 """Captures that nothing was tuned on: anchors beside plain splats, with the defaults alone.
 
-    python3 tools/training/first_anchors/strangers.py --out docs/bench/strangers.csv [--seconds 20] \
-        [--kinds room aerial ...] [--seeds 0] [--models anchors splats]
+    python3 tools/training/first_anchors/strangers.py --out docs/bench/strangers.csv \
+        [--seconds 20] [--kinds room aerial ...] [--seeds 0] [--models anchors splats]
 
 Kinds are those of training/synthetic/strangers.py, each another place for another seed, made on the
 spot and read as a stranger's files are.  Both models have the same processor seconds of one core
