@@ -14,6 +14,7 @@ from shapeshift.runtime_models.model import (
     Stop,
 )
 from shapeshift.runtime_models.rotation import normalize
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
 from shapeshift.training.heads.networks import HeadLayout
 
@@ -23,6 +24,11 @@ ACTIVATION = {
 # The hidden units of a gated base colour c, of a stop of weight w: how much of c, of M w and of M
 # each has, and what it adds to the output; see with_gates.
 GATE = ((1, 1, -1, 0.5), (-1, 1, -1, -0.5), (1, 1, 0, 0.5), (1, -1, 0, -0.5))
+
+
+def origin_in(capture: Capture) -> dict[str, object]:
+    """What a package says of where its zero lies in the world of its capture, if elsewhere."""
+    return {"origin_m": list(capture.origin)} if any(capture.origin) else {}
 
 
 def model_of(

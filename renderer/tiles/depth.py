@@ -30,8 +30,11 @@ def blend_depth(
 
     arena: mean_opacity, covariance, object_index, pages.
     """
-    posed = (world_from_objects, camera_of(view))
-    surfaces = surface_arena(device, arena[0], arena[1], arena[2], *posed, projected, arena[3])
+    camera = camera_of(view)
+    opacity, covariance, object_index, pages = arena
+    surfaces = surface_arena(
+        device, opacity, covariance, object_index, world_from_objects, camera, projected, pages
+    )
     return rasterize_depth(device, projected, tiles, surfaces, view.size)
 
 
