@@ -165,7 +165,7 @@ def coarse_task(options: Options, work: Path) -> Task:
     from shapeshift.training.checkpoint import checkpoint_path
 
     capture, out = capture_path(options), work / COARSE
-    asked = {"max_anchors": most_anchors(options)} | options.asked  # as blocks have
+    asked: Asked = {"max_anchors": most_anchors(options)} | options.asked  # as blocks have
     asked.pop("iterations", None)
     if options.coarse_iterations is not None:
         asked["iterations"] = options.coarse_iterations
