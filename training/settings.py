@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.heads.networks import HeadLayout
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ class TrainSettings:
     """Train for this many steps; the same number gives the same bits."""
     max_anchors: int = 12000
     """Most anchors; as far as there are points, a run starts with that many.  A capture of one
-    modality has 30000 of 2 splats with light by direction instead, where none of --max-anchors,
-    --splats-per-anchor, --anchor-attributes and --max-mb is given."""
+    modality with 16 or more training photos has 30000 of 2 splats with light by direction instead,
+    where none of --max-anchors, --splats-per-anchor, --anchor-attributes and --max-mb is given."""
     max_mb: float | None = None
     """Most megabytes of the package on disk, from the start on.  Default: no limit."""
     points: str = "auto"
@@ -161,15 +162,15 @@ class TrainSettings:
 ONE_MODALITY: dict[str, Any] = {
     "splats_per_anchor": 2, "max_anchors": 30000, "anchor_attributes": "frame,color,light",
 }  # fmt: skip
+MANY_PHOTOS = 16  # to train on: twelve do not hold so much freedom, docs/bench/sparse.csv
 SIZES = (*ONE_MODALITY, "max_mb")  # who gives one of these means all of them
 
 
-def suited(settings: TrainSettings, asked: Iterable[str], modalities: int) -> TrainSettings:
-    """New settings of a run as they suit a capture of so many modalities.
-
-    asked: fields that somebody gave.
-    """
-    if modalities > 1 or not set(asked).isdisjoint(SIZES):
+def suited(settings: TrainSettings, asked: Iterable[str], capture: Capture) -> TrainSettings:
+    """New settings of a run as they suit a capture.  asked: fields that somebody gave."""
+    photos = sum(photo.split == "train" for photo in capture.photos)
+    many = len(capture.stops) == 1 and photos >= MANY_PHOTOS
+    if not many or not set(asked).isdisjoint(SIZES):
         return settings
     return replace(settings, **ONE_MODALITY)
 
