@@ -212,7 +212,7 @@ def _opened(device: "cl.Device") -> Device:
 def with_small_pool(device: Device) -> Device:
     """The device with a pool of its own that keeps less for arrays whose sizes change all the time.
 
-    Sizes are rounded up to 1, 1.5, 2, 3, 4, ... times a power of two, not to eighths, so that fewer
+    Sizes are rounded up to 1 or 1.5 times a power of two, not to sixteenths of it, so that fewer
     sizes are kept unused; arrays take a fifth more in the mean.  Contents are the same to the bit.
     """
     from pyopencl.tools import ImmediateAllocator, MemoryPool

@@ -94,7 +94,7 @@ def project_arena(
     if into is None or not _fits(into, count, orders, grids):
         into = _room(device, count, orders, grids)
     poses = _poses(cameras, sort, world_from_object)
-    variant = {"VIEWS": views, "ORDERS": orders} | defines_of_pages(pages)
+    variant = {"VIEWS": views, "ORDERS": orders, **lanes_of(device)} | defines_of_pages(pages)
     if second_color is not None and views == 2:
         variant["OWN_COLORS"] = 1
     if any(antialiased):
@@ -132,6 +132,11 @@ def clusters_unseen(
     find_unseen(device, clusters, len(cameras), poses[0].size, frame, unseen, False)
     found: np.ndarray = device.view(unseen) != 0
     return found
+
+
+def lanes_of(device: Device) -> dict[str, int]:
+    """LANES of kernels/common/vector.cl, where they are not eight."""
+    return {"LANES": 16} if device.lanes >= 16 else {}
 
 
 def _fits(earlier: list[Projected], count: int, orders: int, grids: list) -> bool:

@@ -20,6 +20,7 @@ OCTREE_RULES = ("round", "floor", "ceil", "progressive")
 STOP_KINDS = ("rgb", "thermal", "layer", "style")
 BETWEEN_STOPS = ("blend", "encoding")
 MOST_LABEL = 254  # of an object; 255 of a label map says nothing of a pixel
+FARTHEST_ORIGIN = 1e12  # metres
 LONGEST_SENTENCE = 600  # letters of a refusal, whatever of a file's words is in it
 
 
@@ -141,6 +142,17 @@ class AnchorModel:
     @property
     def splat_count(self) -> int:
         return len(self.anchors) * self.splats_per_anchor
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """Metres, float64: where its zero lies in the world of its capture; zeros nearly always."""
+        said = self.provenance.get("origin_m")
+        if not (isinstance(said, list | tuple) and len(said) == 3):
+            return (0.0, 0.0, 0.0)
+        if not all(isinstance(c, int | float) and abs(c) <= FARTHEST_ORIGIN for c in said):
+            return (0.0, 0.0, 0.0)
+        x, y, z = map(float, said)
+        return (x, y, z)
 
     def with_coarser(self, coarser: tuple[CoarserAnchors, ...]) -> "AnchorModel":
         """The same with levels of detail, the finest of them first.  They are kept by `replace` as

@@ -10,6 +10,7 @@ from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.lenses.panorama import is_panorama
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.undistort import is_straight, pinhole_of
 from shapeshift.scene.pose import View
@@ -98,7 +99,11 @@ def doubts_of(
             f"{len(no_normals)} normal maps are not there, for example of "
             f"{path_end(no_normals[0])}; those photos are used without."
         )
-    bent = [photo for photo in photos if photo.lens is not None]
+    faces = [photo for photo in photos if is_panorama(photo.lens)]
+    if faces:
+        count = len({photo.path for photo in faces})
+        said.append(f"{count} panoramas are read as {len(faces) // count} straight photos each.")
+    bent = [p for p in photos if p.lens is not None and not is_panorama(p.lens)]
     if bent:
         models = ", ".join(sorted({photo.lens.model for photo in bent if photo.lens is not None}))
         said.append(f"{len(bent)} photos are undistorted as they are read ({models}).")

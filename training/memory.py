@@ -7,7 +7,7 @@ from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, CHUNKS, HeadLayo
 
 FLOAT = 4  # bytes; every array of a step has entries of 4
 SPLAT = 14  # floats: mean 3, scale 3, quaternion 4, opacity, colour 3
-EVIDENCE = 2  # floats a splat that densification sums up, and an anchor, twice and more
+EVIDENCE = 2  # floats a splat and stop that densification sums up, and an anchor, twice and more
 LISTS = 12  # ints a splat that sorting and binning hold: keys, orders, places
 
 
@@ -31,12 +31,13 @@ def step_memory(layout: HeadLayout, form: str = "cpu") -> StepMemory:
     """By the shapes of the arrays; the pool that lends them rounds each up by an eighth at most."""
     features, k = padded(layout.features), layout.splats
     units = 5 * padded(layout.hidden) * (2 if form == "gpu" else 1)
-    own = sum(ATTRIBUTE_WIDTH[name] for name in layout.per_anchor[2:])
+    own = sum(layout.own_widths.values())
+    seen = sum(ATTRIBUTE_WIDTH[name] for name in layout.own)  # base colours of one stop
     by_anchor = 3 * (3 + features + own)  # values with their two moments
-    by_anchor += 2 * (3 + features + own)  # their gradients, and those that a view shows
+    by_anchor += 2 * (3 + features + seen)  # their gradients, and those that a view shows
     by_anchor += units + 2 * layout.raw_at[-1]  # raw outputs and gradients
     by_anchor += 2 * EVIDENCE + 3  # of one stop; reach, rows
-    by_splat = 2 * SPLAT + 2 * RECORD + 1 + LISTS + EVIDENCE
+    by_splat = 2 * SPLAT + 2 * RECORD + 1 + LISTS + layout.stops * EVIDENCE
     weights = layout.weights_at[-1]
     loss_planes = {"cpu": 18, "gpu": 24}[form]  # windowed maps, and a value a pixel
     return StepMemory(

@@ -125,7 +125,7 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
         if values is not None:
             values[~seen] = 0
     view, masked = photo.view.divided(factor), mask is not None
-    return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth, masked, normals)
+    return LoadedPhoto(view, photo.modality, rgba, weight, photo.name, depth, masked, normals)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from shapeshift.runtime_models.model import HEADS
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
-from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, HeadLayout
+from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.losses.min_opacity import MIN_OPACITY
 
 
@@ -77,14 +77,22 @@ def light_of(light: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def decode_reference(
-    layout: HeadLayout, parameters: dict[str, np.ndarray], control, eye, voxel: float
-) -> tuple:
-    """The splats of an optimiser's values: weights (flat), anchors (A, 3), features (A, F)."""
+    layout: HeadLayout, parameters: dict[str, np.ndarray], control, eye, voxel: float,
+    stop: int = 0,
+) -> tuple:  # fmt: skip
+    """The splats of an optimiser's values: weights (flat), anchors (A, 3), features (A, F).
+
+    stop: whose base colours they have, where anchors have some for each.
+    """
     anchors = np.asarray(parameters["anchors"], np.float64)
     features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
     networks = layout.unpack(parameters["weights"])
     heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
-    own = {n: np.asarray(parameters[n], np.float64) for n in ATTRIBUTE_WIDTH if n in parameters}
+    of_color = layout.color_groups
+    groups = dict(zip(layout.own, layout.own, strict=True))
+    if of_color:
+        groups["colors"] = of_color[stop if len(of_color) > 1 else 0]
+    own = {name: np.asarray(parameters[group], np.float64) for name, group in groups.items()}
     raw = {name: outputs for name, (_, outputs) in heads.items()}
     return activate_reference(raw, anchors, voxel, **own, direction=directions(anchors, eye))
 

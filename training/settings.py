@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+import numpy as np
+
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.heads.networks import HeadLayout
 
@@ -36,6 +38,20 @@ class Rates:
 SHORT = Rates(0.02, 0.02, 0.02, 0.01, 0.04, 0.0375, 0.01, 0.02, decay=0.1)
 LONG = replace(SHORT, decay=0.03)
 SHORT_RUN = 4000  # iterations
+
+
+def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str, np.ndarray]:
+    """Rates as the optimiser takes them: one a weight, one for each group of what anchors have."""
+    flat = np.zeros(layout.weights_at[-1], np.float32)
+    heads = (rates.offset, rates.scale, rates.rotation, rates.opacity, rates.color)
+    for start, stop, rate in zip(layout.weights_at, layout.weights_at[1:], heads, strict=False):
+        flat[start:stop] = rate
+    each = {
+        "anchors": rates.anchor * voxel, "features": rates.feature, "frames": rates.frame,
+        "light": rates.color,
+    } | dict.fromkeys(("colors", *layout.color_groups), rates.color)  # fmt: skip
+    shared = {name: np.array([rate], np.float32) for name, rate in each.items()}
+    return {"weights": flat * layout.rate_shares()} | shared
 
 
 def check_numbers(settings: object, least: dict[str, float], shares: tuple[str, ...]) -> None:
@@ -113,9 +129,10 @@ class TrainSettings:
     makes the picture between two stops their cross-fade."""
     view_dependent: bool = True
     """Let colours depend on the direction from which one looks."""
-    anchor_attributes: str = "frame,color"
-    """What each anchor has besides its features, as frame,color,light: sizes and axes; a base
-    colour; light by direction, which makes it lighter or darker by the side it is seen from."""
+    anchor_attributes: str = "frame,stop_color"
+    """What each anchor has besides its features, as frame,stop_color,light: sizes and axes; a base
+    colour, one for all stops (color) or one for each (stop_color); light by direction, which makes
+    it lighter or darker by the side it is seen from."""
     grow: bool = True
     """Add anchors and move the least useful ones to where pictures need them."""
     grow_every: int = 100
@@ -135,8 +152,8 @@ class TrainSettings:
         if self.iterations is None and self.seconds is None:
             raise ValueError("A run needs an end: give iterations or seconds.")
 
-    def layout(self, units: int) -> HeadLayout:
-        """The networks that are asked for, for so many units of the control encoding.
+    def layout(self, units: int, stops: int = 1) -> HeadLayout:
+        """The networks that are asked for, for so many units of the control encoding and stops.
 
         Raises ValueError where there are none such.
         """
@@ -146,7 +163,7 @@ class TrainSettings:
         )
         return HeadLayout(
             self.splats_per_anchor, self.features, self.hidden, units, fixed, self.view_dependent,
-            attributes,
+            attributes, stops,
         )  # fmt: skip
 
     def rates(self, iterations: int) -> Rates:
@@ -158,7 +175,7 @@ class TrainSettings:
 
 
 # A scene that never changes: the networks have nothing to share between stops, so more anchors with
-# fewer splats each, and light of their own, gain 0.2 to 1 dB for two to three times the bytes.
+# fewer splats each, and light of their own, gain 0.4 to 1 dB for two to three times the bytes.
 ONE_MODALITY: dict[str, Any] = {
     "splats_per_anchor": 2, "max_anchors": 30000, "anchor_attributes": "frame,color,light",
 }  # fmt: skip

@@ -18,16 +18,23 @@ from shapeshift.training.losses.min_opacity import SHARE, add_min_opacity_gradie
 from shapeshift.training.losses.min_scale import MinScale
 from shapeshift.training.losses.normal_loss import ShapeTerm
 
+SAME_STOP = 1e-6  # of Psi: between its own and a blend's rounding
+
 
 class TrainingStep:
     """Draws the model that an optimiser holds and learns from a target."""
 
-    def __init__(self, device, layout: HeadLayout, voxel: float, adam: Adam) -> None:
-        self.device, self.layout, self.adam = device, layout, adam
+    def __init__(
+        self, device, layout: HeadLayout, voxel: float, adam: Adam,
+        controls: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        """controls: (stops, d) Psi of each stop, where anchors have base colours for each."""
+        self.device, self.layout, self.adam, self.controls = device, layout, adam, controls
         self.heads = Heads(device, layout)
         self.activation = Activation(device, layout, voxel)
         self.rows = None  # (R,) int32 on the device: the anchors of the last drawing; None: all
-        self.gathered: dict[str, object] = {}  # what the optimiser has of these, by group
+        self.gathered: dict[str, object] = {}  # what the optimiser has of these, by kernels' names
+        self.groups: dict[str, str] = {}  # from which of its groups that is
         self.min_scale: MinScale | None = None  # where splats have a least size
         self.pose_gradient: PoseGradient | None = None  # where poses are refined
         self.ms: dict[str, float] | None = None  # of each pass, summed; a dict switches it on ...
@@ -49,12 +56,28 @@ class TrainingStep:
         """
         adam, self.rows = self.adam, rows
         with self.timed("heads"):
-            self.gathered = {n: adam.gather(n, rows) for n in self.layout.per_anchor}
+            self.groups = self.groups_at(control)
+            self.gathered = {name: adam.gather(g, rows) for name, g in self.groups.items()}
             raw = self.heads.forward(
                 adam["weights"], self.gathered["anchors"], self.gathered["features"], control, eye
             )
         with self.timed("activate"):
             return self.activation.forward(raw, self.gathered, eye)
+
+    def groups_at(self, control: np.ndarray) -> dict[str, str]:
+        """The optimiser's groups that a drawing at Psi `control` reads, by the kernels' names.
+
+        Raises ValueError for colours between stops, where anchors have base colours for each.
+        """
+        names = ("anchors", "features", *self.layout.own)
+        groups, of_color = dict(zip(names, names, strict=True)), self.layout.color_groups
+        if len(of_color) > 1:
+            assert self.controls is not None
+            away = np.abs(self.controls - np.atleast_2d(control)[-1]).max(axis=1)
+            if not away.min() < SAME_STOP:
+                raise ValueError("base colours are those of a stop, and this is between two")
+            groups["colors"] = of_color[int(away.argmin())]
+        return groups
 
     def draw(
         self, view: View, control: np.ndarray, background: Color, with_depth: bool = False,
@@ -105,8 +128,10 @@ class TrainingStep:
         weights, features = self.heads.backward(
             self.adam["weights"], there["anchors"], there["features"], grad_raw, found["anchors"]
         )
-        return {"weights": weights, "features": features} | found
+        own = {self.groups[name]: grad_own for name, grad_own in found.items()}
+        return {"weights": weights, "features": features} | own
 
     def update(self, grads: dict[str, object], rate_scale: float) -> None:
+        """Groups without a gradient, base colours of other stops, rest."""
         with self.timed("adam"):
             self.adam.step(grads, rate_scale, dict.fromkeys(self.layout.per_anchor, self.rows))

@@ -22,17 +22,18 @@ from shapeshift.training.density.density_budget import anchor_cap
 from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
 from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color, camera_of
-from shapeshift.training.export import model_of
-from shapeshift.training.first_anchors.first_anchors import first_anchors
+from shapeshift.training.export import model_of, origin_in
+from shapeshift.training.first_anchors.first_anchors import base_colors, first_anchors
 from shapeshift.training.first_anchors.initial import Report, initial_points
-from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
+from shapeshift.training.heads.networks import initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.min_opacity import min_opacity_share
 from shapeshift.training.losses.min_scale import MinScale
 from shapeshift.training.photo_store.open_photos import PhotoRoom, TrainingPhotos, open_photos
 from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale
 from shapeshift.training.run import SETTLE, Run
 from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
-from shapeshift.training.settings import Rates, TrainSettings
+from shapeshift.training.settings import Rates, TrainSettings, parameter_rates
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.supervision.backgrounds import (
     background_warning,
@@ -47,20 +48,6 @@ from shapeshift.training.visibility import Visibility
 GROW_FROM, GROW_UNTIL = 0.05, 0.8  # of the run
 EMPTY_PHOTO = 0.002  # mean contrast below which a photo shows nothing but background
 FEATURE_SPREAD = 0.1  # standard deviation of the first features
-
-
-def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str, np.ndarray]:
-    """Rates as the optimiser takes them: one a weight, one for each group of what anchors have."""
-    flat = np.zeros(layout.weights_at[-1], np.float32)
-    heads = (rates.offset, rates.scale, rates.rotation, rates.opacity, rates.color)
-    for start, stop, rate in zip(layout.weights_at, layout.weights_at[1:], heads, strict=False):
-        flat[start:stop] = rate
-    each = {
-        "anchors": rates.anchor * voxel, "features": rates.feature, "frames": rates.frame,
-        "colors": rates.color, "light": rates.color,
-    }  # fmt: skip
-    shared = {name: np.array([rate], np.float32) for name, rate in each.items()}
-    return {"weights": flat * layout.rate_shares()} | shared
 
 
 class Trainer(Run):
@@ -133,11 +120,12 @@ class Trainer(Run):
     def lay_out(self) -> None:
         """What the networks are like, and how many anchors there may be."""
         self.encoding = encoding_for([stop.x for stop in self.stops])
-        self.layout = self.settings.layout(self.encoding.d)
+        self.layout = self.settings.layout(self.encoding.d, len(self.stops))
         self.anchor_cap = anchor_cap(self.settings, self.layout, self.encoding, self.stops)
 
     def new_step(self) -> TrainingStep:
-        return TrainingStep(self.device, self.layout, self.voxel, self.adam)
+        controls = np.stack([self.encoding.encode(stop.x) for stop in self.stops])
+        return TrainingStep(self.device, self.layout, self.voxel, self.adam, controls)
 
     def initialise(self, photos: list[LoadedPhoto], report: Report | None) -> None:
         """Anchors, features and weights of a new run."""
@@ -153,7 +141,12 @@ class Trainer(Run):
             rng.normal(size=(count, settings.features)) * FEATURE_SPREAD
         )
         values = {"weights": initial_weights(self.layout, rng), "features": features}
-        values |= {n: getattr(start, n) for n in self.layout.per_anchor if n != "features"}
+        values |= {n: getattr(start, n) for n in ("anchors", *self.layout.own)}
+        if len(groups := self.layout.color_groups) > 1:
+            del values["colors"]
+            for group, stop in zip(groups, self.stops, strict=True):
+                of_stop = [photo for photo in photos if photo.modality == stop.name]
+                values[group] = base_colors(start.anchors, of_stop, background)
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.rate_scale, self.run_length = 1.0, settings.iterations
         self.adam = Adam(self.device, values, self.all_rates())
@@ -256,7 +249,9 @@ class Trainer(Run):
             )
         target = self.target(photo, background, shapes is None)
         loss = self.targets.loss(photo)
-        return self.step.gradients(self.drawing, loss, target, self.stats, depth)
+        done = self.budget.fraction(self.iteration, self.elapsed)
+        share = min_opacity_share(len(self.stops), self.settings.blended_shapes, done)
+        return self.step.gradients(self.drawing, loss, target, self.stats, depth, share)
 
     def probe_pose(self, photo: LoadedPhoto, background: Color, fraction: float) -> None:
         """Now and then, before a photo's step, its gradient by a pose a little beside its own."""
@@ -381,7 +376,7 @@ class Trainer(Run):
         return out
 
     def model(self) -> AnchorModel:
-        provenance = {
+        provenance = origin_in(self.capture) | {
             "trained_by": "shapeshift train",
             "capture": self.capture.folder.name,
             "settings": self.settings.as_dict(),

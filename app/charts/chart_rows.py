@@ -2,6 +2,7 @@
 
 import csv
 import io
+import sys
 from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
@@ -68,6 +69,15 @@ class RowsFile(Generic[Row]):
             raise UsageError(
                 f"{self.path} holds rows of another form; choose another --out, or delete it."
             ) from None
+
+
+def write_lines(out: Path | None, lines: list[str]) -> None:
+    """Into a file, or onto the terminal where none is named."""
+    text = "".join(f"{line}\n" for line in lines)
+    if out is None:
+        sys.stdout.write(text)
+    else:
+        write_text(out, text)
 
 
 def write_text(path: Path, text: str) -> None:

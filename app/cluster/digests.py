@@ -24,15 +24,20 @@ def code_digest() -> str:
 
     A file is read again where it has changed.
     """
-    rows = [[path.relative_to(ROOT).as_posix(), digest_of(path)] for path in sorted(code_files())]
+    root = str(ROOT)
+    packages = [folder.path for folder in os.scandir(root)
+                if os.path.isfile(os.path.join(folder.path, "__init__.py"))]  # fmt: skip
+    paths = sorted(path for package in packages for path in code_files(package))
+    rows = [[path[len(root) :], digest_of_file(path)] for path in paths]
     return hashlib.sha256(json.dumps([version(), rows]).encode()).hexdigest()
 
 
-def code_files() -> Iterator[Path]:
-    packages = [folder for folder in ROOT.iterdir() if (folder / "__init__.py").is_file()]
-    for package in packages:
-        for folder, _, names in os.walk(package):
-            yield from (Path(folder, name) for name in names if name.endswith(CODE))
+def code_files(folder: str) -> Iterator[str]:
+    for entry in os.scandir(folder):
+        if entry.name.endswith(CODE):
+            yield entry.path
+        elif entry.is_dir() and entry.name != "__pycache__":
+            yield from code_files(entry.path)
 
 
 def digest_of(path: Path) -> str:
@@ -41,9 +46,13 @@ def digest_of(path: Path) -> str:
         found = sorted(file for file in path.rglob("*") if file.is_file())
         rows = [[file.relative_to(path).as_posix(), digest_of(file)] for file in found]
         return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
-    stat = path.stat()
-    known = (str(path), stat.st_size, stat.st_mtime_ns)
+    return digest_of_file(str(path))
+
+
+def digest_of_file(path: str) -> str:
+    stat = os.stat(path)
+    known = (path, stat.st_size, stat.st_mtime_ns)
     if known not in _digests:
-        with path.open("rb") as file:
+        with open(path, "rb") as file:
             _digests[known] = hashlib.file_digest(file, "sha256").hexdigest()
     return _digests[known]

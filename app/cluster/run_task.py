@@ -30,8 +30,8 @@ LOOK_S = 0.5  # between looks at what else may end a task
 CREATE_NO_WINDOW = 0x08000000  # of Windows
 BAD_INPUT, FAULT = 2, 3  # exit codes with a sentence
 OTHER_CODE = (
-    "the program's code on {host} is another than that of the command that hands out the tasks; "
-    "have the same on all machines, and start the command again."
+    "the program's code on {host} is another than where and when the command began that hands out "
+    "the tasks; start it again, with the same code on all machines."
 )
 Hear = Callable[[str], None]  # a line of the task's standard error
 
@@ -160,7 +160,7 @@ def follow(
     child: subprocess.Popen[bytes], command: str, hear: Hear, wanted: Callable[[], bool]
 ) -> str:
     """Its last line that is no progress, once it has ended; all are heard in this thread."""
-    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+    lines: queue.SimpleQueue[str] = queue.SimpleQueue()  # "" is the end
 
     def read() -> None:
         assert child.stderr is not None
@@ -168,27 +168,30 @@ def follow(
             for raw in child.stderr:
                 if line := raw.decode("utf-8", "replace").strip():
                     lines.put(line)
+        lines.put("")
 
-    def hear_next(wait_s: float) -> str:
-        """The last line so far."""
+    def hear_next(wait_s: float) -> None:
+        nonlocal last
         with contextlib.suppress(queue.Empty):
-            line = lines.get(timeout=wait_s)
-            hear(line)
-            return line if progress_words(line, command) is None else last
-        return last
+            if line := lines.get(timeout=wait_s):
+                last = line if progress_words(line, command) is None else last
+                hear(line)
+            else:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    child.wait(wait_s)
 
     reader, last = threading.Thread(target=read, name="a task's lines", daemon=True), ""
     reader.start()
     try:
         while child.poll() is None:
-            last = hear_next(LOOK_S)
+            hear_next(LOOK_S)
             if not wanted():
                 raise TaskStopped(command)
     finally:
         end(child)
         reader.join(LOOK_S)  # longer only where others hold the pipe
         while not lines.empty():
-            last = hear_next(0)
+            hear_next(0)
     return last
 
 

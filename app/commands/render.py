@@ -376,7 +376,6 @@ def draw_all(
     from shapeshift.app.commands.picture_legend import with_legend
     from shapeshift.app.drawing import save_png
     from shapeshift.app.progress import tracked
-    from shapeshift.renderer.colors.heat_over_shape import heat_over_shape
     from shapeshift.renderer.debug.debug import debug_legend
     from shapeshift.scene.stereo import stereo_pair
 
@@ -389,6 +388,8 @@ def draw_all(
             stats = renderer.draw(eyes)
             parts.append([renderer.resolved(i).copy() for i in range(len(eyes))])
         if shape is not None:
+            from shapeshift.renderer.colors.heat_over_shape import heat_over_shape
+
             pairs = zip(*parts, strict=True)
             parts[0] = [heat_over_shape(heat, photo, detail) for heat, photo in pairs]
         picture = np.concatenate(parts[0], axis=1)

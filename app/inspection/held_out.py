@@ -47,7 +47,7 @@ def held_out_error(
     errors = []
     for photo in tracked(photos, "comparing with held-out photos"):
         loaded = read(photo, factor, "object")
-        (view,) = moved([loaded.view], (-document.origin).tolist())
+        (view,) = moved([loaded.view], (np.array(capture.origin) - document.origin).tolist())
         values = draw_values(renderer, thermal, view)
         colors = loaded.rgba[..., :3] / 255.0
         share = value_of_colors(colors, thermal.colors)[0] if thermal.colors else colors @ LUMINANCE

@@ -14,6 +14,7 @@ MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 12 minutes of a core
 MOST_ANCHORS = 18000
 BLENDED_SHAPES = 0.5  # see TrainSettings
+ATTRIBUTES = "frame,color"  # what the bundled package was made with
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,12 @@ def run(options: Options) -> int:
         train.Options(
             capture=folder,
             out=package,
-            asked={"max_anchors": MOST_ANCHORS, "blended_shapes": BLENDED_SHAPES} | length,
+            asked={
+                "max_anchors": MOST_ANCHORS,
+                "blended_shapes": BLENDED_SHAPES,
+                "anchor_attributes": ATTRIBUTES,
+            }
+            | length,
         )
     )
     if code == 0 and options.package is not None:

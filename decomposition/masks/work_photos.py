@@ -16,6 +16,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.lenses.panorama import is_panorama
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.undistort import pinhole_of
 from shapeshift.scene.pose import View
@@ -70,6 +71,8 @@ def work_photos(capture: Capture, stops: Sequence[Stop]) -> list[WorkPhoto]:
     found: list[WorkPhoto] = []
     refusal: BadFile | None = None
     for photo in capture.photos:
+        if is_panorama(photo.lens):
+            raise BadFile(f"{photo.path} is a panorama; objects are marked in straight photos.")
         try:
             stop = stop_of(photo, tuple(stops))
         except BadFile as error:

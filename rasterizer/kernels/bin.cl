@@ -7,10 +7,101 @@
 // Writes:  tile_bounds (N, 2), order, and starts (tiles + 1) and intersections: the lists, tile by
 //          tile.
 // Units:   pixels and tiles; depths in metres, sorted as the bits of floats above 0.
-#include "common/tile_bounds_of_eight.cl"
+#include "common/tile_bounds_of_lanes.cl"
 #define AHEAD 24  // splats: the next tile bounds are fetched while these are counted
 #define SOON 8    // splats: the ends of lists are fetched while these are written
 #define SPARE 16  // ints of a cache line: chunks must not write to the same one
+
+// What a chunk gathers: its visible splats, packed at its start, and a histogram of low digits.
+typedef struct {
+  __global uint2* tile_bounds;
+  __global uint2* pairs;  // splat, depth key
+  __global int* bins;
+  int next;               // where its next visible splat goes
+  int8 intersections;     // of each lane, summed at the end; so with the range of keys
+  uint8 min_key, max_key;
+} Chunk;
+
+// A chunk's slice of the pairs begins where its splats do, so that chunks need no common counter.
+inline Chunk open_chunk(int first, __global uint2* tile_bounds, __global uint2* pairs,
+                        __global int* bins) {
+  const Chunk chunk = {tile_bounds, pairs, bins, first, 0, 0xffffffffu, 0};
+  for (int b = 0; b < LOW_BINS; b++) bins[b] = 0;
+  return chunk;
+}
+
+// The status of a chunk: visible splats, intersections, least and largest key.
+inline uint4 close_chunk(const Chunk* chunk, int first) {
+  return (uint4)(chunk->next - first, sum_ints(chunk->intersections), min_uints(chunk->min_key),
+                 max_uints(chunk->max_key));
+}
+
+// Enters `n` splats from number i on; depth: their eight depths.
+inline void enter_eight(Chunk* chunk, int i, int n, const TileBoundsV* p, float8 depth) {
+  // Depths are above 0, and such floats sort as their bits do.
+  const uint8 c = p->corner, m = p->mask, key = as_uint8(depth);
+  const int8 visible = p->count > 0;
+  chunk->intersections += p->count;
+  // Lanes that are not visible give all ones and zeros: neither least nor largest.
+  chunk->min_key = min(chunk->min_key, key | ~as_uint8(visible));
+  chunk->max_key = max(chunk->max_key, key & as_uint8(visible));
+  if (n == LANES && all(visible)) {
+    // The common case, eight visible splats: whole vectors of pairs and bounds are stored.
+    vstore16((uint16)(i, key.s0, i + 1, key.s1, i + 2, key.s2, i + 3, key.s3, i + 4, key.s4, i + 5,
+                      key.s5, i + 6, key.s6, i + 7, key.s7),
+             0, (__global uint*)(chunk->pairs + chunk->next));
+    vstore16((uint16)(c.s0, m.s0, c.s1, m.s1, c.s2, m.s2, c.s3, m.s3, c.s4, m.s4, c.s5, m.s5, c.s6,
+                      m.s6, c.s7, m.s7), 0, (__global uint*)(chunk->tile_bounds + i));
+    chunk->next += LANES;
+    // The histogram of the first digit is counted here, so the sort's first pass reads nothing
+    // twice.
+    uint low[LANES];
+    vstore8(key & (LOW_BINS - 1), 0, low);
+    for (int lane = 0; lane < LANES; lane++) chunk->bins[low[lane]]++;
+    return;
+  }
+  uint keys[LANES], corner[LANES], mask[LANES];
+  vstore8(key, 0, keys);
+  vstore8(c, 0, corner);
+  vstore8(m, 0, mask);
+  for (int lane = 0; lane < n; lane++) {
+    chunk->tile_bounds[i + lane] = (uint2)(corner[lane], mask[lane]);
+    // Written over by the next one unless visible.
+    chunk->pairs[chunk->next] = (uint2)(i + lane, keys[lane]);
+    // MASKED and BOX lie above all columns and rows, a culled splat's word is 0.
+    const int here = corner[lane] >= MASKED;
+    chunk->next += here;
+    chunk->bins[keys[lane] & (LOW_BINS - 1)] += here;
+  }
+}
+
+// columns_of_row() of tiles.cl for eight rows of a BOX from `first` on: the same operations.
+IN_PLACE void columns_of_eight_rows(const EllipseRows* s, int first, int* start, int* end) {
+  const float8 row = convert_float8((int8)(0, 1, 2, 3, 4, 5, 6, 7) + first);
+  const float8 top = s->top + row * (float)TILE, bottom = top + (TILE - 1);
+  const float8 y_right = fmin(fmax((float8)(s->y_extreme), top), bottom),
+      y_left = fmin(fmax((float8)(-s->y_extreme), top), bottom);
+  const float8 half_right = sqrt(
+      fmax(fma(-y_right * y_right, (float8)(s->inv_yy), (float8)(s->threshold)), 0.0f) * s->inv_a);
+  const float8 half_left = sqrt(
+      fmax(fma(-y_left * y_left, (float8)(s->inv_yy), (float8)(s->threshold)), 0.0f) * s->inv_a);
+  const float8 slope = s->slope;
+  const float8 right = fma(slope, y_right, half_right) - s->left + s->rounding;
+  const float8 left = fma(slope, y_left, -half_left) - s->left - s->rounding;
+  const float width = (float)(s->columns * TILE);
+  // What is not a number leaves nothing out.
+  const int8 in_box = right < width;
+  const float8 within = select((float8)(0), right, in_box & (right >= 0.0f));
+  int8 after = (convert_int8(within) >> 4) + 1;
+  after = select(after, (int8)(0), ~(right >= 0.0f));
+  after = select((int8)(s->columns), after, in_box);
+  const int8 beyond = left > (float)(TILE - 1), meets = left < width;
+  const int8 from = convert_int8(ceil(select((float8)(0), left, beyond & meets))) >> 4;
+  int8 before = select((int8)(s->columns), from, meets);
+  before = select((int8)(0), before, beyond);
+  vstore8(min(before, after), 0, start);
+  vstore8(after, 0, end);
+}
 
 // Per splat its tile bounds; per chunk the (splat, depth key) pairs of its visible splats, packed
 // at the chunk's start, and the histogram of their low digits.  status: visible, intersections, key
@@ -46,7 +137,7 @@ __kernel void find_tile_bounds(int count, int chunk, int tiles_x, int tiles_y,
     e.power_threshold = vload8(0, column[7]);
     // Positive, so that NaN fails, as everywhere.
     e.seen = (e.half_x > 0.0f) & ((int8)(0, 1, 2, 3, 4, 5, 6, 7) < n);
-    const TileBounds8 p = tile_bounds_of_eight(&e, tiles_x, tiles_y);
+    const TileBoundsV p = tile_bounds_of_lanes(&e, tiles_x, tiles_y);
     enter_eight(&mine, i, n, &p, vload8(0, z));
   }
   status[c] = close_chunk(&mine, first);
@@ -195,9 +286,14 @@ __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int tot
     const uint2 here = sorted_bounds[i];
     const int tile = BOUNDS_ROW(here) * tiles_x + BOUNDS_COLUMN(here);
     // Stores leave in order, and each list's end is a cache line of its own: those of a splat that
-    // comes soon are asked for now.
-    const uint2 soon = sorted_bounds[min(i + SOON, last - 1)];
+    // comes soon are asked for now, and the record that a box needs.
+    const int ahead = min(i + SOON, last - 1);
+    const uint2 soon = sorted_bounds[ahead];
     const int its_tile = BOUNDS_ROW(soon) * tiles_x + BOUNDS_COLUMN(soon);
+    // Of a splat that is no box the first record, which is there: no branch.
+    __global const float* its_box = record + (soon.x & BOX ? (size_t)RECORD * order[ahead] : 0);
+    PREFETCH(its_box);
+    PREFETCH(its_box + RECORD - 1);
     PREFETCH_TO_WRITE(intersections + next[its_tile]);
     PREFETCH_TO_WRITE(intersections + next[its_tile + 1]);
     PREFETCH_TO_WRITE(intersections + next[its_tile + tiles_x]);

@@ -123,21 +123,26 @@ inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
   // From the mean to the first row of pixel centres in the strip.
   float16 top = -y;
   uint16 mask = 0;
+  const float16 zero = 0, end = TILE;
   for (int row = 0; row < SIDE; row++) {
     const float16 bottom = top + (SIDE - 1);
-    const float16 y_right = fmin(fmax(y_extreme, top), bottom),
-        y_left = fmin(fmax(-y_extreme, top), bottom);
+    const float16 y_right = MINIMUM(MAXIMUM(y_extreme, top), bottom),
+        y_left = MINIMUM(MAXIMUM(-y_extreme, top), bottom);
     const float16 right_x =
-        x + slope * y_right + sqrt(fmax(threshold - y_right * y_right * inv_yy, 0.0f));
+        x + slope * y_right + sqrt(MAXIMUM(threshold - y_right * y_right * inv_yy, zero));
     const float16 left_x =
-        x + slope * y_left - sqrt(fmax(threshold - y_left * y_left * inv_yy, 0.0f));
-    // Clamped before the conversion, since an ellipse may be as wide as any; >> 2 is / SIDE,
-    // downwards.
-    const int16 right = convert_int16(floor(fmin(fmax(right_x, -1.0f), TILE - 1.0f))) >> 2;
-    const int16 left = convert_int16(ceil(fmin(fmax(left_x, 0.0f), (float)TILE))) >> 2;
-    // Blocks up to `right`, less those before `left`.
-    const uint16 until = ((uint16)1 << as_uint16(right + 1)) - 1u;
-    const uint16 before = ((uint16)1 << as_uint16(left)) - 1u;
+        x + slope * y_left - sqrt(MAXIMUM(threshold - y_left * y_left * inv_yy, zero));
+    // Clamped before the conversion, since an ellipse may be as wide as any; >> 2 is / SIDE.  Both
+    // are shifted so that a conversion, which cuts towards 0, rounds down and up: 4 + floor(right)
+    // and 16 - ceil(left).  What the sums round, rounds to the next block's side.
+    // The pixels that the strip's ellipse reaches, of the tile's sixteen.
+    const float16 last_x = MINIMUM(MAXIMUM(right_x, zero - 1.0f), end - 1.0f),
+        first_x = MINIMUM(MAXIMUM(left_x, zero), end);
+    const int16 after = convert_int16(last_x + SIDE) >> 2;
+    const int16 first = (TILE - convert_int16(end - first_x)) >> 2;
+    // Blocks before `after`, less those before `first`.
+    const uint16 until = ((uint16)1 << as_uint16(after)) - 1u;
+    const uint16 before = ((uint16)1 << as_uint16(first)) - 1u;
     // A strip above or below the ellipse: its roots were held at 0 and mean nothing.
     const int16 meets = (top <= ey) & (bottom >= -ey);
     mask |= (until & ~before & as_uint16(meets)) << (uint16)(SIDE * row);
@@ -149,17 +154,16 @@ inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
 // Fills a batch from the list [p, end) and returns how many it got.
 inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
                  __global const float* record, Batch* batch) {
-  // The next batch's records are asked for now.
   const int n = min(BATCH, end - p), ahead = min(BATCH, end - p - n);
-  for (int j = 0; j < ahead; j++) {  // of the next batch: the drawing of this one hides the misses
-    __global const float* from = record + (size_t)RECORD * intersections[p + n + j];
-    PREFETCH(from);
-    PREFETCH(from + RECORD - 1);
-  }
   // Records go to the batch scaled for exp2, and their shapes to columns for the masks.
   Columns e;
   const float h = -HALF_LOG2E;
   for (int j = 0; j < n; j++) {
+    if (j < ahead) {  // of the next batch: the drawing of this one hides the misses
+      __global const float* next = record + (size_t)RECORD * intersections[p + n + j];
+      PREFETCH(next);
+      PREFETCH(next + RECORD - 1);
+    }
     __global const float* from = record + (size_t)RECORD * intersections[p + j];
     const float8 s = vload8(0, from);
     const float4 t = vload4(0, from + 8);
@@ -201,7 +205,9 @@ inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int 
   const int columns = min(SIDE, width - x0);
   for (int i = 0; i < SIDE && y0 + i < height; i++) {
     __global float* to = image + 4 * ((size_t)(y0 + i) * width + x0);
-    if (columns == SIDE)
+    if (columns == SIDE && width % SIDE == 0)  // a cache line, aligned
+      STREAM(vload16(i, rows), (__global float16*)to);
+    else if (columns == SIDE)
       vstore16(vload16(i, rows), 0, to);
     else
       for (int j = 0; j < columns; j++) vstore4(vload4(SIDE * i + j, rows), j, to);

@@ -1,5 +1,5 @@
 // project_arena: splats of many posed objects -> records, tile bounds and sort keys, for drawing
-// alone. A work-item owns a chunk and takes eight splats at a time as vectors.  Memory is the limit
+// alone. A work-item owns a chunk and takes LANES splats at a time as vectors.  Memory is the limit
 // here: a splat is read once for all views, the tile bounds are found while the ellipses are at
 // hand (bin.cl's find_tile_bounds reads them again), and what no view can see is dropped before its
 // covariance is read.
@@ -24,36 +24,36 @@
 #include "common/limits.cl"
 #include "common/pages.cl"
 #include "common/eight_rows.cl"
-#include "common/tile_bounds_of_eight.cl"
+#include "common/tile_bounds_of_lanes.cl"
 
 typedef struct {
-  float8 x, y, z, opacity;        // mean in the object, metres
-  float8 xx, xy, xz, yy, yz, zz;  // covariance in the object, m^2
-  float8 red, green, blue;
-  float8 power_threshold;  // 2 ln(opacity / min alpha)
-} Eight;
+  floatv x, y, z, opacity;        // mean in the object, metres
+  floatv xx, xy, xz, yy, yz, zz;  // covariance in the object, m^2
+  floatv red, green, blue;
+  floatv power_threshold;  // 2 ln(opacity / min alpha)
+} Splats;
 
 // Blocks of 12 floats an object: camera_from_object of each view, then sort_from_object of each
-// order, as rows; then, where some object is antialiased, 1 for those that are.  Eight splats are
-// nearly always of one object, and of the one before.
+// order, as rows; then, where some object is antialiased, 1 for those that are.  Those of a
+// vector are nearly always of one object, and of the one before.
 #define BLOCKS_OF_POSE (VIEWS + ORDERS)
 #define POSE (12 * BLOCKS_OF_POSE + ANTIALIASED)
 
-inline void load_poses(float8* m, int8 object, int* current, __global const float* poses) {
-  if (all(object == object.s0)) {
+inline void load_poses(floatv* m, intv object, int* current, __global const float* poses) {
+  if (ALL_OF(object == object.s0)) {
     if (object.s0 != *current)
       for (int k = 0; k < POSE; k++) m[k] = poses[POSE * object.s0 + k];
     *current = object.s0;
     return;
   }
-  // Two objects meet in these eight splats: every lane gets its own pose.
+  // Two objects meet in these splats: every lane gets its own pose.
   *current = -1;
   int index[LANES];
-  vstore8(object, 0, index);
+  VSTORE(object, 0, index);
   for (int k = 0; k < POSE; k++) {
     float column[LANES];
     for (int lane = 0; lane < LANES; lane++) column[lane] = poses[POSE * index[lane] + k];
-    m[k] = vload8(0, column);
+    m[k] = VLOAD(0, column);
   }
 }
 
@@ -62,35 +62,33 @@ typedef struct {
   __global uint2* pairs;
   __global int* bins;
   int next;  // where the next pair goes
-  uint8 min_key, max_key;
+  uintv min_key, max_key;
 } Keys;
 
 // Floats of any sign sort as these bits do.
-inline uint8 sortable(float8 value) {
-  const uint8 bits = as_uint8(value);
+inline uintv sortable(floatv value) {
+  const uintv bits = AS_UINT(value);
   // IEEE 754 as integers: negative floats have all bits turned, positive ones the sign alone.
-  return bits ^ (as_uint8(as_int8(bits) >> 31) | 0x80000000u);
+  return bits ^ (AS_UINT(AS_INT(bits) >> 31) | 0x80000000u);
 }
 
 // Pairs of the splats that take part in an order, packed; and the first digit's histogram, as
 // bin.cl has them.
-inline void enter_keys(Keys* keys, int i, uint8 key, int8 member) {
-  keys->min_key = min(keys->min_key, key | ~as_uint8(member));
-  keys->max_key = max(keys->max_key, key & as_uint8(member));
+inline void enter_keys(Keys* keys, int i, uintv key, intv member) {
+  keys->min_key = min(keys->min_key, key | ~AS_UINT(member));
+  keys->max_key = max(keys->max_key, key & AS_UINT(member));
   uint low[LANES];
-  vstore8(key & (LOW_BINS - 1), 0, low);
-  if (all(member)) {
-    vstore16((uint16)(i, key.s0, i + 1, key.s1, i + 2, key.s2, i + 3, key.s3, i + 4, key.s4, i + 5,
-                      key.s5, i + 6, key.s6, i + 7, key.s7),
-             0, (__global uint*)(keys->pairs + keys->next));
+  VSTORE(key & (LOW_BINS - 1), 0, low);
+  if (ALL_OF(member)) {
+    store_all_pairs(AS_UINT(LANE_NUMBERS + i), key, keys->pairs + keys->next);
     for (int lane = 0; lane < LANES; lane++) keys->bins[low[lane]]++;
     keys->next += LANES;
     return;
   }
   uint whole[LANES];
   int here[LANES];
-  vstore8(key, 0, whole);
-  vstore8(member & 1, 0, here);
+  VSTORE(key, 0, whole);
+  VSTORE(member & 1, 0, here);
   for (int lane = 0; lane < LANES; lane++) {
     if (!here[lane]) continue;
     keys->pairs[keys->next++] = (uint2)(i + lane, whole[lane]);
@@ -98,80 +96,92 @@ inline void enter_keys(Keys* keys, int i, uint8 key, int8 member) {
   }
 }
 
-inline float8 ramp(float8 room, float per) {  // per 0: there is no limit to fade at
-  return per > 0 ? fmin(fmax(room * per, 0.0f), 1.0f) : (float8)(1);
+#if PAGED
+// Opacities with a part of their optical depth: those of two parts that add up to 1, one behind the
+// other, hide what the whole hides.  What is absent stays so.
+inline floatv weighed(floatv opacity, float weight) {
+  const floatv left = 1.0f - pow(fmax(1.0f - opacity, 0.0f), weight);
+  return select(opacity, left, opacity > 0.0f);
+}
+#endif
+
+inline floatv ramp(floatv room, float per) {  // per 0: there is no limit to fade at
+  return per > 0 ? fmin(fmax(room * per, 0.0f), 1.0f) : (floatv)(1);
 }
 
-#define STORE_RECORDS(rows)                                                          \
-  STORE_COLUMNS(rows, RECORD, 0, px, py, c * per, -b * per)                          \
-  STORE_COLUMNS(rows, RECORD, 4, a * per, opacity, s->red, s->green)                 \
-  STORE_COLUMNS(rows, RECORD, 8, s->blue, half_x, half_y, power_threshold)
+#define STORE_RECORDS(PUT, rows)                                                      \
+  PUT_COLUMNS(PUT, rows, RECORD, 0, px, py, c * per, -b * per)                        \
+  PUT_COLUMNS(PUT, rows, RECORD, 4, a * per, opacity, s->red, s->green)               \
+  PUT_COLUMNS(PUT, rows, RECORD, 8, s->blue, half_x, half_y, power_threshold)
 
 // Screen ellipses of those `alive` in one view: the projection of the paper, then the gates.
 // antialiased: above 0 where a splat is.  passed: per lane how many got past each gate.  record:
 // that of all splats, these are i to i + n; culled ones get extents of -1.
-IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 y, float8 z,
-                                float8 square, float8 antialiased, int8 alive,
+IN_PLACE Ellipses project_lanes(const Splats* s, const floatv* m, floatv x, floatv y, floatv z,
+                                floatv square, floatv antialiased, intv alive,
                                 __global const float* view,
                                 __global const float* limits, int i, int n,
-                                __global float* record, int8* passed) {
+                                __global float* record, intv* passed) {
   const float low_pass = limits[LOW_PASS];
   // Step 1, J: pixels per metre along x and y, and along z by the tangents, held as 3DGS holds
   // them.
-  const float8 inv_z = 1.0f / z, tan_x = x * inv_z, tan_y = y * inv_z;
-  const float8 j00 = view[CAMERA_FX] * inv_z, j11 = view[CAMERA_FY] * inv_z;
-  const float8 j02 = -j00 * fmin(fmax(tan_x, view[MIN_TAN_X]), view[MAX_TAN_X]);
-  const float8 j12 = -j11 * fmin(fmax(tan_y, view[MIN_TAN_Y]), view[MAX_TAN_Y]);
+  const floatv inv_z = 1.0f / z, tan_x = x * inv_z, tan_y = y * inv_z;
+  const floatv j00 = view[CAMERA_FX] * inv_z, j11 = view[CAMERA_FY] * inv_z;
+  // Vectors, since a choice of two is one.
+  const floatv least_x = view[MIN_TAN_X], most_x = view[MAX_TAN_X];
+  const floatv least_y = view[MIN_TAN_Y], most_y = view[MAX_TAN_Y];
+  const floatv j02 = -j00 * MINIMUM(MAXIMUM(tan_x, least_x), most_x);
+  const floatv j12 = -j11 * MINIMUM(MAXIMUM(tan_y, least_y), most_y);
   // Step 2, the rows u and v of J W, with W the rotation camera_from_object; J has two zeros.
-  const float8 ux = j00 * m[0] + j02 * m[8], uy = j00 * m[1] + j02 * m[9];
-  const float8 vx = j11 * m[4] + j12 * m[8], vy = j11 * m[5] + j12 * m[9];
-  const float8 uz = j00 * m[2] + j02 * m[10], vz = j11 * m[6] + j12 * m[10];
+  const floatv ux = j00 * m[0] + j02 * m[8], uy = j00 * m[1] + j02 * m[9];
+  const floatv vx = j11 * m[4] + j12 * m[8], vy = j11 * m[5] + j12 * m[9];
+  const floatv uz = j00 * m[2] + j02 * m[10], vz = j11 * m[6] + j12 * m[10];
   // Step 3, Sigma u and Sigma v: Sigma is symmetric, six floats.
-  const float8 sx = s->xx * ux + s->xy * uy + s->xz * uz;
-  const float8 sy = s->xy * ux + s->yy * uy + s->yz * uz;
-  const float8 sz = s->xz * ux + s->yz * uy + s->zz * uz;
-  const float8 tx = s->xx * vx + s->xy * vy + s->xz * vz;
-  const float8 ty = s->xy * vx + s->yy * vy + s->yz * vz;
-  const float8 tz = s->xz * vx + s->yz * vy + s->zz * vz;
+  const floatv sx = s->xx * ux + s->xy * uy + s->xz * uz;
+  const floatv sy = s->xy * ux + s->yy * uy + s->yz * uz;
+  const floatv sz = s->xz * ux + s->yz * uy + s->zz * uz;
+  const floatv tx = s->xx * vx + s->xy * vy + s->xz * vz;
+  const floatv ty = s->xy * vx + s->yy * vy + s->yz * vz;
+  const floatv tz = s->xz * vx + s->yz * vy + s->zz * vz;
   // Step 4, Sigma' = [u.Sigma u, u.Sigma v; ., v.Sigma v] + low pass = [a b; b c].
-  const float8 bare_a = ux * sx + uy * sy + uz * sz, b = vx * sx + vy * sy + vz * sz;
-  const float8 bare_c = vx * tx + vy * ty + vz * tz;
-  const float8 a = bare_a + low_pass, c = bare_c + low_pass;
+  const floatv bare_a = ux * sx + uy * sy + uz * sz, b = vx * sx + vy * sy + vz * sz;
+  const floatv bare_c = vx * tx + vy * ty + vz * tz;
+  const floatv a = bare_a + low_pass, c = bare_c + low_pass;
   // Step 5, its determinant: that without the low pass, which float rounding may take below 0, plus
   // what the low pass adds.
-  const float8 bare = fmax(bare_a * bare_c - b * b, 0.0f);
-  const float8 determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;
-  const float8 per = 1.0f / determinant;
-  float8 power_threshold = s->power_threshold, opacity = s->opacity;
+  const floatv bare = MAXIMUM(bare_a * bare_c - b * b, (floatv)(0));
+  const floatv determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;
+  const floatv per = 1.0f / determinant;
+  floatv power_threshold = s->power_threshold, opacity = s->opacity;
 #if ANTIALIASED
   // Mip-Splatting's 2D filter (Yu et al. 2024): what the low pass makes wider becomes fainter by
   // sqrt(det Sigma' / det with the low pass), so that all of it gives the same light.
-  const float8 kept = fmin(sqrt(bare / determinant), 1.0f);  // 1 where the quotient is no number
-  opacity *= select((float8)(1), kept, antialiased > 0);
+  const floatv kept = fmin(sqrt(bare / determinant), 1.0f);  // 1 where the quotient is no number
+  opacity *= select((floatv)(1), kept, antialiased > 0);
   power_threshold = fmax(2.0f * log(opacity * limits[PER_MIN_ALPHA]), 0.0f);
 #endif
   // Step 6: the half axes of the box of alpha >= min alpha, and the 2D mean.
-  float8 half_x = sqrt(power_threshold * a), half_y = sqrt(power_threshold * c);
-  const float8 px = j00 * x + view[CAMERA_CX], py = j11 * y + view[CAMERA_CY];
+  floatv half_x = sqrt(power_threshold * a), half_y = sqrt(power_threshold * c);
+  const floatv px = j00 * x + view[CAMERA_CX], py = j11 * y + view[CAMERA_CY];
   // The larger eigenvalue of Sigma', for the clipping threshold tau_lambda of the paper (section
   // 4.1).
-  const float8 mid = 0.5f * (a + c), off = 0.5f * (a - c);
-  const float8 major = mid + sqrt(off * off + b * b);  // px^2, one sigma squared
+  const floatv mid = 0.5f * (a + c), off = 0.5f * (a - c);
+  const floatv major = mid + sqrt(off * off + b * b);  // px^2, one sigma squared
 
   // The first gate that fails counts.  What is not finite is nowhere, so it fails at "size", whose
   // tests are positive.
-  const int8 finite = (half_x < FLT_MAX) & (half_y < FLT_MAX) & isfinite(px + py);
+  const intv finite = (half_x < FLT_MAX) & (half_y < FLT_MAX) & isfinite(px + py);
   // On the screen: the box meets the image.  Splats whose mean is outside stay if they reach in.
-  const int8 inside = (px + half_x > 0.0f) & (px - half_x < view[IMAGE_WIDTH]) &
+  const intv inside = (px + half_x > 0.0f) & (px - half_x < view[IMAGE_WIDTH]) &
                       (py + half_y > 0.0f) & (py - half_y < view[IMAGE_HEIGHT]);
-  const int8 seen = alive & (inside | ~finite);
+  const intv seen = alive & (inside | ~finite);
   // Not larger than tau_lambda; finite in everything that a pixel will be computed from.
-  int8 small = seen & finite & (major <= limits[MAX_PIXELS_2]);
+  intv small = seen & finite & (major <= limits[MAX_PIXELS_2]);
   small &= (determinant > 0.0f) & (determinant < FLT_MAX) & (fabs(s->red) <= MAX_COLOR) &
            (fabs(s->green) <= MAX_COLOR) & (fabs(s->blue) <= MAX_COLOR);
   // sqrt(threshold lambda) is how far the splat reaches along its longer axis.
-  const int8 large = small & (power_threshold * major >= limits[MIN_PIXELS_2]);
-  int8 drawn = large;
+  const intv large = small & (power_threshold * major >= limits[MIN_PIXELS_2]);
+  intv drawn = large;
 #if ANTIALIASED
   drawn &= opacity >= limits[MIN_ALPHA];
 #endif
@@ -191,30 +201,13 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
   passed[GATE_FOOTPRINT] += large;
   passed[GATE_FADED] += drawn;
 
-  const float8 none = -1;
+  const floatv none = -1;
   // An extent of -1 says "culled" to everyone who reads the record.
   half_x = select(none, half_x, drawn);
   half_y = select(none, half_y, drawn);
-  STORE_ROWS(STORE_RECORDS, record, RECORD)
+  STREAM_ROWS(STORE_RECORDS, record, RECORD)
   const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, power_threshold, drawn};
   return out;
-}
-
-// Reductions over the lanes, once a chunk.
-inline int sum_int8(int8 a) {
-  const int4 b = a.lo + a.hi;
-  const int2 c = b.lo + b.hi;
-  return c.x + c.y;
-}
-
-inline uint min_of(uint8 a) {
-  const uint4 b = min(a.lo, a.hi);
-  return min(min(b.x, b.y), min(b.z, b.w));
-}
-
-inline uint max_of(uint8 a) {
-  const uint4 b = max(a.lo, a.hi);
-  return max(max(b.x, b.y), max(b.z, b.w));
 }
 
 // Splats without a record: their extent, their depth and their empty tile bounds say so.
@@ -261,14 +254,14 @@ __kernel void project_arena(
     keys[o] = none;
     for (int b = 0; b < LOW_BINS; b++) keys[o].bins[b] = 0;
   }
-  int8 passed[VIEWS][GATES], intersections[VIEWS], entered = 0;
+  intv passed[VIEWS][GATES], intersections[VIEWS], entered = 0;
   for (int v = 0; v < VIEWS; v++) {
     intersections[v] = 0;
     for (int g = 0; g < GATES; g++) passed[v][g] = 0;
   }
   int current = -1;  // the object whose pose m holds
-  float8 m[POSE];
-  Eight s;
+  floatv m[POSE];
+  Splats s;
   for (int i = first; i < last; i += LANES) {
     // Chunks begin where clusters do.
     const int left = unseen && i % CLUSTER == 0 ? unseen[i / CLUSTER] : 0;
@@ -284,55 +277,56 @@ __kernel void project_arena(
       continue;
     }
     const int n = min(LANES, last - i);
-    const int8 valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
+    const intv valid = LANE_NUMBERS < n;
     const long moved = row_of(i, sources) - i;  // from a row that is drawn to where it lies
     if (i + moved < 0) {
       for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], tile_bounds[v]);
       continue;
     }
+    // As if it began there.
     __global const float* means = mean_opacity + 4 * moved;
     LOAD_ROWS(LOAD_MEANS, s, means, 4)
 #if PAGED
     const float weight = weights[i / PAGE];
     if (weight != 1.0f) s.opacity = weighed(s.opacity, weight);
 #endif
-    // Gate 1, opacity: absent splats of other modalities end here, eight at a time.
-    const int8 bright = valid & (s.opacity >= limits[MIN_ALPHA]) & (s.opacity < FLT_MAX);
+    // Gate 1, opacity: absent splats of other modalities end here, LANES at a time.
+    const intv bright = valid & (s.opacity >= limits[MIN_ALPHA]) & (s.opacity < FLT_MAX);
     entered += bright;
-    if (!any(bright)) {
+    if (!ANY_OF(bright)) {
       for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], tile_bounds[v]);
       continue;
     }
-    int8 object;
+    intv object;
     LOAD_INDICES(object, object_index)
     load_poses(m, object, &current, poses);
     // Gate 2, distance (the paper's second threshold, for distant splats), and the near plane; both
     // need the mean alone.
-    float8 x[VIEWS], y[VIEWS], z[VIEWS], square[VIEWS];
-    int8 alive[VIEWS], seen[VIEWS + 1], anywhere = 0;
+    floatv x[VIEWS], y[VIEWS], z[VIEWS], square[VIEWS];
+    intv alive[VIEWS], seen[VIEWS + 1], anywhere = 0;
     for (int v = 0; v < VIEWS; v++) {
-      const float8* to = m + 12 * v;
+      const floatv* to = m + 12 * v;
       x[v] = to[0] * s.x + to[1] * s.y + to[2] * s.z + to[3];
       y[v] = to[4] * s.x + to[5] * s.y + to[6] * s.z + to[7];
       z[v] = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
       square[v] = x[v] * x[v] + y[v] * y[v] + z[v] * z[v];
-      const int8 near_enough = bright & (square[v] <= limits[MAX_DISTANCE_2]);
+      const intv near_enough = bright & (square[v] <= limits[MAX_DISTANCE_2]);
       passed[v][GATE_DISTANCE] += near_enough;
       alive[v] = near_enough & (z[v] > views[VIEW_SIZE * v + NEAR]);
       anywhere |= alive[v];
       seen[v] = 0;
     }
     // Covariances and colours, the larger part of a splat, only where some view may see one of
-    // eight.
-    if (any(anywhere)) {
+    // them.
+    if (ANY_OF(anywhere)) {
       __global const float* covariances = covariance + 8 * moved;
       LOAD_ROWS(LOAD_COVARIANCES, s, covariances, 8)
       LOAD_ROWS(LOAD_COLORS, s, color, 4)
       s.power_threshold = fmax(2.0f * log(s.opacity * limits[PER_MIN_ALPHA]), 0.0f);
     }
-    int8 drawn_anywhere = 0;
+    intv drawn_anywhere = 0;
     for (int v = 0; v < VIEWS; v++) {
-      if (!any(alive[v])) {
+      if (!ANY_OF(alive[v])) {
         leave_out(i, n, record[v], depth[v], tile_bounds[v]);
         continue;
       }
@@ -342,32 +336,32 @@ __kernel void project_arena(
       }
 #endif
       __global const float* view = views + VIEW_SIZE * v;
-      const float8 antialiased = ANTIALIASED ? m[POSE - 1] : (float8)(0);
+      const floatv antialiased = ANTIALIASED ? m[POSE - 1] : (floatv)(0);
       // Gates 3 to 6 and the record.
-      const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], antialiased,
+      const Ellipses e = project_lanes(&s, m + 12 * v, x[v], y[v], z[v], square[v], antialiased,
                                        alive[v], view, limits, i, n, record[v], passed[v]);
       // The ellipses are in registers: their tile bounds are cheapest here.
-      const TileBounds8 p = tile_bounds_of_eight(&e, (int)view[TILES_X], (int)view[TILES_Y]);
+      const TileBoundsV p = tile_bounds_of_lanes(&e, (int)view[TILES_X], (int)view[TILES_Y]);
       intersections[v] += p.count;
       seen[v] = p.count > 0;
       drawn_anywhere |= seen[v];
-      const float8 far = select((float8)(CULLED_DEPTH), z[v], e.seen);
+      const floatv far = select((floatv)(CULLED_DEPTH), z[v], e.seen);
       store_floats(far, i, n, depth[v]);
       store_pairs(p.corner, p.mask, i, n, tile_bounds[v]);
     }
     // Sort keys: of each view its own, or of one frame between two eyes for both.
     for (int o = 0; o < ORDERS; o++) {
-      const float8* to = m + 12 * (VIEWS + o);
+      const floatv* to = m + 12 * (VIEWS + o);
       // An order that is kept while the views turn holds every splat that is there.
-      const int8 member = keep_outside ? bright : ORDERS == 1 ? drawn_anywhere : seen[o];
-      if (!any(member)) continue;
-      const float8 kz = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
+      const intv member = keep_outside ? bright : ORDERS == 1 ? drawn_anywhere : seen[o];
+      if (!ANY_OF(member)) continue;
+      const floatv kz = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
       // Depth along the view, as 3DGS sorts: it changes while a head turns, and splats pop
       // (StopThePop, Radl et al. 2024).  The distance to the eye does not.
-      float8 key = kz;
+      floatv key = kz;
       if (by_distance) {
-        const float8 kx = to[0] * s.x + to[1] * s.y + to[2] * s.z + to[3];
-        const float8 ky = to[4] * s.x + to[5] * s.y + to[6] * s.z + to[7];
+        const floatv kx = to[0] * s.x + to[1] * s.y + to[2] * s.z + to[3];
+        const floatv ky = to[4] * s.x + to[5] * s.y + to[6] * s.z + to[7];
         key = sqrt(kx * kx + ky * ky + kz * kz);
       }
       enter_keys(keys + o, i, sortable(key), member & isfinite(key));
@@ -377,16 +371,16 @@ __kernel void project_arena(
   for (int v = 0; v < VIEWS; v++) {
     int before = last - first;
     for (int g = 0; g < GATES; g++) {
-      const int after = -sum_int8(g == GATE_OPACITY ? entered : passed[v][g]);
+      const int after = -sum_ints(g == GATE_OPACITY ? entered : passed[v][g]);
       culled[v][GATES * c + g] = max(before, 0) - max(after, 0);
       before = after;
     }
-    uint4 summary = (uint4)(0, sum_int8(intersections[v]), 0, 0);
+    uint4 summary = (uint4)(0, sum_ints(intersections[v]), 0, 0);
     if (ORDERS) {
       const Keys* mine = keys + (ORDERS == 1 ? 0 : v);
       summary.x = mine->next - first;
-      summary.z = min_of(mine->min_key);
-      summary.w = max_of(mine->max_key);
+      summary.z = min_uints(mine->min_key);
+      summary.w = max_uints(mine->max_key);
     }
     status[v][c] = summary;
   }

@@ -45,10 +45,24 @@ def say_whole() -> None:
     )
 
 
-def compile_for_heat(device: Device, models: list[Model]) -> None:
-    """What the first frame of models with heat would compile, now."""
-    counts = {m.splat_count for m in models if m.splat_count and has_heat(m)}
-    if counts:
-        for count in {min(counts), max(counts)}:
-            compile_heat(device, count)
-        compile_with_heat(device, min_transmittance=RenderSettings().min_transmittance)
+class HeatAhead:
+    """Compiles what the first frame with heat would, with the second frame of a set of models.
+
+    Not with the first, which is there 0.4 s sooner where no kernel was ever compiled.
+    """
+
+    def __init__(self) -> None:
+        self._frames = 0
+        self._counts: set[int] = set()  # splats of those models that have heat
+
+    def open(self, models: list[Model]) -> None:
+        """Another set of models."""
+        self._frames = 0
+        self._counts = {m.splat_count for m in models if m.splat_count and has_heat(m)}
+
+    def next_frame(self, device: Device) -> None:
+        self._frames += 1
+        if self._frames == 2 and self._counts:
+            for count in {min(self._counts), max(self._counts)}:
+                compile_heat(device, count)
+            compile_with_heat(device, min_transmittance=RenderSettings().min_transmittance)

@@ -30,7 +30,7 @@ from shapeshift.renderer.limits import arena_rows, check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
-from shapeshift.renderer.tiles.blend import blend_views, compile_for_heat
+from shapeshift.renderer.tiles.blend import HeatAhead, blend_views
 from shapeshift.renderer.tiles.culling import Culling
 from shapeshift.renderer.tiles.depth import blend_depth, depth_pictures, surface_picture
 from shapeshift.renderer.tiles.inputs import (
@@ -85,6 +85,7 @@ class TilesDrawing(Drawing):
         self._depths: dict[int, np.ndarray] = {}
         self._colors: list = []  # rows of four of each splat: one for all views, or one a view
         self._heats: list = []  # of the same splats, (N, 4) once an object has any
+        self._heat_ahead = HeatAhead()
 
     def exchange(self, models: list[Model]) -> list[bool]:
         arena, slots, self._known = self._tables(), self._slots, self._decodings
@@ -118,7 +119,7 @@ class TilesDrawing(Drawing):
         self._object_index = device.upload(np.pad(index, (0, more)))
         self._slots, self._decodings = slots_of(device, models, self._mlps, self._known)
         self.backends["mlps"] = run_by(self._mlps, self._slots)
-        compile_for_heat(device, models)
+        self._heat_ahead.open(models)
 
     def decode_geometry(
         self, i: int, x: Controls, eye_object: np.ndarray | None = None,
@@ -215,6 +216,7 @@ class TilesDrawing(Drawing):
                 self._images[i] = self._depths[i] = nothing
                 self._heat_images[i] = nothing[..., :2]
             return
+        self._heat_ahead.next_frame(self.device)
         sets = sets or [first + i if len(self._colors) > 1 else 0 for i in range(len(views))]
         with timer.time("project", on_gpu=False):
             self._project(views, settings, sets, again)
@@ -276,14 +278,10 @@ class TilesDrawing(Drawing):
         self.sorts, self.order_age = plan.sorts, plan.age
 
     def _launch(
-        self,
-        views: list[View],
-        settings: RenderSettings,
-        sort: SortFrames,
-        into: list[Projected] | None = None,
-        colors: list | None = None,
+        self, views: list[View], settings: RenderSettings, sort: SortFrames,
+        into: list[Projected] | None = None, colors: list | None = None,
         clusters: Clusters | None = None,
-    ) -> list[Projected]:
+    ) -> list[Projected]:  # fmt: skip
         first, *second = colors or self._colors
         return project_arena(
             self.device, self._mean_opacity, self._covariance, first, self._object_index,

@@ -22,9 +22,10 @@ from shapeshift.scene.cameras.camera_list import (
     pose_matrix,
     read_name,
 )
+from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.capture_photos import image_size
 from shapeshift.scene.captures.capture_rules import COLMAP_UP, CaptureWorld
-from shapeshift.scene.captures.read_transforms import ENDINGS, POSES, gather, opencv_axes
+from shapeshift.scene.captures.read_transforms import POSES, gather, opencv_axes
 from shapeshift.scene.pose import View
 
 BLENDER_SIZE = (800, 800)  # of the synthetic NeRF scenes, whose files name no size
@@ -57,9 +58,8 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
         turn = ours_from_world(reading)
     else:
         up = data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None)
-        turn = flipped(reading) @ CaptureWorld.of(np.array(cameras), (0, 0, 1), up, where).turned(
-            np.eye(4)
-        )
+        world = CaptureWorld.of(np.array(cameras), (0, 0, 1), up, where)
+        turn = flipped(reading) @ world.ours_from_file
     views, names = [], []
     for entry, camera, at in zip(entries, cameras, frames, strict=True):
         views.append(view_of(entry, turn @ camera, files[0].parent, reading, notes, at))
@@ -125,11 +125,8 @@ def size_of(fields: Fields, folder: Path, notes: Notes) -> tuple[float, float]:
             fields.number("h", wanted="a number of pixels, 1 or more,", low=1, high=MOST),
         )
     file = entry.get("file_path") or entry.get("file")
-    if isinstance(file, str) and "\0" not in file:
-        for ending in ENDINGS:
-            photo = folder / (file + ending)
-            if os.path.isfile(photo):  # unlike Path.is_file it takes any text for a name
-                return image_size(photo, None)
+    if isinstance(file, str) and os.path.isfile(photo := find_file(folder, file).path):
+        return image_size(photo, None)
     notes.unsized = True
     return BLENDER_SIZE
 

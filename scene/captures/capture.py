@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop
-from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
 from shapeshift.scene.pose import View
+
+ORIGIN = "origin"  # in the notes: metres, our axes, that were taken off all places
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,14 @@ class Photo:
         """Width and height of the image file, pixels."""
         return self.view.size if self.lens is None else self.lens.size
 
+    @property
+    def name(self) -> str:
+        """Its file; of a panorama's faces also where they look, since they share one."""
+        if self.lens is None or self.lens.model != PANORAMA:
+            return str(self.path)
+        right, up = self.lens.params[4:6]
+        return f"{self.path} ({right:g} degrees right, {up:g} up)"
+
 
 @dataclass(frozen=True)
 class Capture:
@@ -43,3 +53,8 @@ class Capture:
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """Metres, our axes: where its zero lies in the file's world; zeros nearly always."""
+        return self.notes.get(ORIGIN, (0.0, 0.0, 0.0))

@@ -12,7 +12,8 @@ from shapeshift.runtime_models.files.json_fields import Fields, rows_of, shown
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_names import guess_kind
-from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.cameras.photo_view import depth_of_subject
+from shapeshift.scene.captures.capture import ORIGIN, Capture, Photo
 from shapeshift.scene.captures.dated_stops import (
     NO_PLACE,
     date_in_entry,
@@ -25,6 +26,10 @@ from shapeshift.scene.captures.value_ranges import with_own_ranges
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
 LARGEST_NUMBER = 1e30  # of a value range: what float32 products hold
 FARTHEST = 1e12  # metres from zero: beyond that no photo was taken
+FINE = 1e-5  # of the cameras' extent, or of a metre: finer steps than float32's are never needed
+ONE_PLACE = 1e-9  # metres that cameras at one place are apart, by rounding
+TOO_NEAR = 4  # near planes: a subject nearer than that has some of it cut off ...
+NEAR_SHARE = 0.1  # ... and a near plane at this share of how far away it is
 TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, from the first
 # Worlds of COLMAP's axes are turned as 3DGS PLY files are, whatever their photos say: splats
 # trained elsewhere from the same model then lie where the capture is.
@@ -39,6 +44,9 @@ class CaptureWorld:
 
     ours_from_file: np.ndarray  # (4, 4) a rotation
     up: tuple[float, float, float]  # what points up in the file's world
+    # Metres, our axes: the capture's zero, where the file's own is so far that float32 would lose
+    # what lies there (survey coordinates); zeros nearly always.
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @staticmethod
     def of(
@@ -47,10 +55,14 @@ class CaptureWorld:
         """`up` if the file gives one, else as the photos (N, 4, 4; OpenCV axes) tell."""
         up = up_of_cameras(world_from_cameras, otherwise) if up is None else up
         turn = upright_rotation(up, where)
-        return CaptureWorld(turn, three(np.asarray(up, np.float64) + 0.0))  # + 0.0: never -0.0
+        origin = near_origin(world_from_cameras[:, :3, 3] @ turn[:3, :3].T)
+        # + 0.0: never -0.0
+        return CaptureWorld(turn, three(np.asarray(up, np.float64) + 0.0), origin)
 
     def turned(self, matrix: np.ndarray) -> np.ndarray:
-        return self.ours_from_file @ matrix
+        out = self.ours_from_file @ matrix
+        out[:3, 3] -= self.origin
+        return out
 
     def capture(
         self,
@@ -74,11 +86,16 @@ class CaptureWorld:
             if not any(p.modality == stop.name and p.split == "train" for p in photos):
                 raise BadFile(f"{folder}: modality {shown(stop.name)} has no photos to train on")
         if points is not None:
-            points = (points @ self.ours_from_file[:3, :3].T).astype(np.float32)
+            points = points @ self.ours_from_file[:3, :3].T - np.array(self.origin)
+            points = points.astype(np.float32)
+        if any(self.origin):
+            notes[ORIGIN] = self.origin
+            x, y, z = self.origin
+            more += (f"It lies far from zero; {x:.0f}, {y:.0f}, {z:.0f} (+Y up) is taken off.",)
         return Capture(
             folder,
             colored_by_palette(stops, photos) if guessed else stops,
-            tuple(photos),
+            with_near_planes(photos),
             points,
             colors,
             background,
@@ -87,8 +104,40 @@ class CaptureWorld:
         )
 
 
+def near_origin(eyes: np.ndarray) -> tuple[float, float, float]:
+    """What to take off all places: whole kilometres, so that two captures of a site have the same.
+
+    eyes: (N, 3) float64 metres.
+    """
+    middle = np.median(eyes, axis=0)
+    extent = float(np.abs(eyes - middle).max())
+    if not np.spacing(np.float32(np.abs(eyes).max())) > FINE * max(extent, 1.0):
+        return (0.0, 0.0, 0.0)
+    return three(np.round(middle / 1000) * 1000 + 0.0)
+
+
+def with_near_planes(photos: list[Photo]) -> tuple[Photo, ...]:
+    """The photos, with planes near enough for what is photographed from centimetres away, or in a
+    unit in which it is.
+    """
+    views = [photo.view for photo in photos]
+    eyes = np.array([view.world_from_eye.position for view in views], np.float64)
+    ahead = np.array([-view.world_from_eye.matrix()[:3, 2] for view in views])
+    radius = float(np.linalg.norm(eyes - eyes.mean(axis=0), axis=1).max())
+    if not radius > ONE_PLACE:  # nothing says how far away the subject is
+        return tuple(photos)
+    away = float(np.median(depth_of_subject(eyes, ahead, radius)))
+    if not 0 < away < TOO_NEAR * min(view.near for view in views):
+        return tuple(photos)
+    near = NEAR_SHARE * away
+    return tuple(replace(photo, view=replace(photo.view, near=near)) for photo in photos)
+
+
 def rigid(matrix: object, where: str) -> np.ndarray:
-    """(4, 4) float64 world_from_camera, its rotation made exactly orthonormal; or BadFile."""
+    """(4, 4) float64 world_from_camera, its rotation made exactly orthonormal; or BadFile.
+
+    A scale of the matrix is left out: it moves neither the camera nor what it sees.
+    """
     try:
         m = np.asarray(matrix, np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -101,13 +150,15 @@ def rigid(matrix: object, where: str) -> np.ndarray:
         raise BadFile(
             f"{where}: the pose is beyond {FARTHEST:g} m; pose this photo again or drop it"
         )
-    rotation = m[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # 1e300 is no rotation either
+        # Of one scale in all directions, as Blender's and Unity's cameras have, nothing is seen.
+        scale = float(np.cbrt(np.abs(np.linalg.det(m[:3, :3]))))
+        rotation = m[:3, :3] / (scale if 0 < scale < np.inf else 1.0)
         error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if not error <= ORTHONORMAL:
         raise BadFile(
             f"{where}: the pose is no rotation (R^T R differs from 1 by {error:.3g}); "
-            "give camera-to-world matrices without scale or shear"
+            "give camera-to-world matrices without shear, and of one scale in all directions"
         )
     if not np.linalg.det(rotation) > 0:
         raise BadFile(f"{where}: the pose mirrors the world; flip one axis of its matrix")
@@ -231,7 +282,7 @@ def split_every_8th(photos: list[Photo]) -> list[Photo]:
     """Every 8th photo of each modality, by name, becomes a test photo; fewer than 3 all train."""
     tests = set()
     for name in {p.modality for p in photos}:
-        mine = sorted(p.path for p in photos if p.modality == name)
+        mine = sorted({p.path for p in photos if p.modality == name})  # once of a panorama
         tests |= set(mine[::TEST_EVERY]) if len(mine) >= 3 else set()
     return [replace(p, split="test" if p.path in tests else "train") for p in photos]
 

@@ -12,7 +12,13 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
 
-MODELS = ("sparse/0", "sparse", "colmap/sparse/0", ".")  # where a folder may hold its model
+MODELS = (
+    "sparse/0",
+    "sparse",
+    "colmap/sparse/0",
+    "dense/sparse",
+    ".",
+)  # where a folder may hold its model
 TABLES = ("cameras", "images", "points3D")
 LONGEST_NAME = 4096  # bytes of an image's name
 # name, how many focal lengths, how many parameters; COLMAP's src/colmap/sensor/models.h
@@ -25,6 +31,7 @@ LENSES = {
     13: ("DIVISION", 2, 5), 14: ("SIMPLE_FISHEYE", 1, 3), 15: ("FISHEYE", 2, 4),
     16: ("EUCM", 2, 6),
 }  # fmt: skip
+PANORAMA = "EQUIRECTANGULAR"  # no lens of COLMAP's; captures/lenses/panorama.py
 LENS_NUMBERS = {name: number for number, (name, _, _) in LENSES.items()}
 CAMERA, IMAGE = struct.Struct("<IiQQ"), struct.Struct("<I7dI")
 COUNT = struct.Struct("<Q")
@@ -57,7 +64,11 @@ class ColmapCamera:
     @property
     def bends(self) -> bool:
         """Whether it is other than a pinhole: its further numbers say how much."""
-        return "FISHEYE" in self.model or any(self.params[_focals(self.model) + 2 :])
+        return (
+            "FISHEYE" in self.model
+            or self.model == PANORAMA
+            or any(self.params[_focals(self.model) + 2 :])
+        )
 
 
 @dataclass(frozen=True)
@@ -214,7 +225,7 @@ def numbers_of(words: list[str], where: str) -> list[float]:
 
 
 def _focals(model: str) -> int:
-    return LENSES[LENS_NUMBERS[model]][1]
+    return 2 if model == PANORAMA else LENSES[LENS_NUMBERS[model]][1]
 
 
 def short_of(path: Path, count: int, what: str) -> BadFile:

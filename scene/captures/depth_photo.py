@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -43,19 +43,26 @@ def depth_of(
     unit = fields.number(key, wanted=METRES, high=FARTHEST) if key else MILLIMETRES
     if key and not unit > 0:
         raise fields.error(key, METRES)
-    name = next((text for key in NAMES if (text := fields.text(key, ""))), "")
-    if not name:
-        return None, unit
-    path = folder / name
-    if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
-        return None, unit
-    width, height = depth_size(path)
-    if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
-        raise BadFile(
-            f"{where}: the depth photo has {width}x{height} pixels, the photo {size[0]}x{size[1]}; "
-            "both must show the same field of view"
-        )
+    path = named_beside(fields, NAMES, folder)
+    if path is not None:
+        refuse_other_view(depth_size(path), size, f"{where}: the depth photo")
     return path, unit
+
+
+def named_beside(fields: Fields, names: Sequence[str], folder: Path) -> Path | None:
+    """The file that a frame names, by the first of some names that it has, if it is there."""
+    name = next((text for key in names if (text := fields.text(key, ""))), "")
+    path = folder / name
+    return path if name and os.path.isfile(path) else None  # Path.is_file does not take any text
+
+
+def refuse_other_view(own: tuple[int, int], size: tuple[int, int], what: str) -> None:
+    """Raises BadFile where something beside a photo has not its shape; sizes: width, height."""
+    if not abs(own[0] * size[1] / (own[1] * size[0]) - 1) <= ASPECT:
+        raise BadFile(
+            f"{what} has {own[0]}x{own[1]} pixels, the photo {size[0]}x{size[1]}; both must show "
+            "the same field of view"
+        )
 
 
 def depth_size(path: Path) -> tuple[int, int]:

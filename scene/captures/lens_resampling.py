@@ -1,5 +1,6 @@
 """Undistortion as one sparse matrix a lens, for the many photos of one camera."""
 
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -33,12 +34,20 @@ def resampling_matrix(
     source: columns and rows of the photo, each pixel of which is `pitch` of the file's.
     Samples beyond the photo count as 0, as Pillow fills what it does not know.
     """
-    from scipy.sparse import csr_array, vstack
+    from scipy.sparse import vstack
+
+    return vstack(list(matrix_rows(lens, size, factor, pitch, source)), format="csr")
+
+
+def matrix_rows(
+    lens: ColmapCamera, size: tuple[int, int], factor: int, pitch: int, source: tuple[int, int]
+) -> "Iterator[csr_array]":
+    """The rows of `resampling_matrix`, those of some rows of the result at a time."""
+    from scipy.sparse import csr_array
 
     (width, height), (columns, rows) = size, source
     x = (np.arange(width * SAMPLES) + 0.5) * (factor / SAMPLES)
     y = (np.arange(height * SAMPLES) + 0.5) * (factor / SAMPLES)
-    parts = []
     for start in range(0, height, ROWS):
         end = min(start + ROWS, height)
         at = straight_pixels(lens, x, y[start * SAMPLES : end * SAMPLES]) / pitch
@@ -60,15 +69,24 @@ def resampling_matrix(
         shares, places = (np.concatenate(tap) for tap in zip(*taps, strict=True))
         shape = ((end - start) * width, columns * rows)
         entries = (shares.astype(np.float32), (np.tile(pixel, 4), places))
-        parts.append(csr_array(entries, shape=shape))
-    return vstack(parts, format="csr")
+        yield csr_array(entries, shape=shape)
 
 
 def resampled(
-    image: Image.Image, lens: ColmapCamera, size: tuple[int, int], factor: int, pitch: int
+    image: Image.Image,
+    lens: ColmapCamera,
+    size: tuple[int, int],
+    factor: int,
+    pitch: int,
+    one_of_many: bool = True,
 ) -> Image.Image:
-    """The photo as its straight camera sees it, see `resampling_matrix`; a mode of bytes."""
-    matrix = resampling_matrix(lens, size, factor, pitch, image.size)
+    """The photo as its straight camera sees it, see `resampling_matrix`; a mode of bytes.
+
+    one_of_many: the matrix is kept for the next photo.
+    """  # fmt: skip
+    about = (lens, size, factor, pitch, image.size)
     pixels = np.asarray(image, np.float32).reshape(image.width * image.height, -1)
-    straight = np.rint(matrix @ pixels).astype(np.uint8).reshape(size[1], size[0], -1)
+    rows = [resampling_matrix(*about)] if one_of_many else matrix_rows(*about)
+    straight = np.concatenate([np.rint(part @ pixels).astype(np.uint8) for part in rows])
+    straight = straight.reshape(size[1], size[0], -1)
     return Image.fromarray(straight[..., 0] if straight.shape[2] == 1 else straight)

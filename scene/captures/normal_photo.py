@@ -1,7 +1,6 @@
 """Normal maps: what a frame says of them, and the directions in the size that is asked for."""
 
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -13,7 +12,12 @@ from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
-from shapeshift.scene.captures.depth_photo import ASPECT, LOOKED_AT, at_pixels
+from shapeshift.scene.captures.depth_photo import (
+    LOOKED_AT,
+    at_pixels,
+    named_beside,
+    refuse_other_view,
+)
 from shapeshift.scene.captures.photo import (
     BROKEN,
     MOST_PIXELS,
@@ -39,18 +43,9 @@ def normals_of(
     axes = fields.text(AXES, "opengl")
     if axes not in FLIPPED:
         raise fields.error(AXES, " or ".join(FLIPPED))
-    name = next((text for key in NAMES if (text := fields.text(key, ""))), "")
-    if not name:
-        return None, axes
-    path = folder / name
-    if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
-        return None, axes
-    width, height = normals_size(path)
-    if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
-        raise BadFile(
-            f"{where}: the normal map has {width}x{height} pixels, the photo {size[0]}x{size[1]}; "
-            "both must show the same field of view"
-        )
+    path = named_beside(fields, NAMES, folder)
+    if path is not None:
+        refuse_other_view(normals_size(path), size, f"{where}: the normal map")
     return path, axes
 
 

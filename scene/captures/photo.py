@@ -15,6 +15,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lens_resampling import LARGEST, resampled
+from shapeshift.scene.captures.lenses.panorama import is_panorama
 from shapeshift.scene.captures.radiometric.number_photos import (
     GRIDS,
     is_radiometric,
@@ -143,13 +144,14 @@ def smaller(
         return image.reduce((across, down), (0, 0, size[0] * across, size[1] * down))
     width, height = pinhole_of(lens).size
     size = (max(width // factor, 1), max(height // factor, 1))
-    if factor == 1:
+    if factor == 1 and not is_panorama(lens):
         return undistorted(image, lens, size)
     # Twice as many pixels as are wanted, out of about as many: fewer would blur, more cost time.
     more = max(factor // done // 2, 1)
     image, twice = image.reduce(more), (2 * size[0], 2 * size[1])
-    if one_of_many and math.prod(size) <= LARGEST:
-        return resampled(image, lens, size, factor, done * more)
+    one_of_many = one_of_many and math.prod(size) <= LARGEST
+    if one_of_many or is_panorama(lens):  # a mesh would draw across a panorama's seam
+        return resampled(image, lens, size, factor, done * more, one_of_many)
     return undistorted(image, lens, twice, factor / 2, done * more).reduce(2)
 
 

@@ -8,6 +8,7 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.colmap_tables import find_model
 from shapeshift.scene.captures.read_colmap import read_colmap
 from shapeshift.scene.captures.read_transforms import read_transforms
+from shapeshift.scene.captures.scans.read_scan import is_scan, read_scan
 
 TABLES = ("transforms.json", "transforms_multimodal.json", "cameras.json")
 SPLITS = ("train", "val", "test")  # of transforms_{split}.json
@@ -18,7 +19,8 @@ def read_capture(path: Path) -> Capture:
     """Reads a folder, or one of its JSON files.  Raises BadFile in one sentence.
 
     Folders: COLMAP's (sparse/0 and images/), or with transforms.json, transforms_multimodal.json,
-    cameras.json, or transforms_train.json and transforms_test.json (docs/capture.md).
+    cameras.json, transforms_train.json and transforms_test.json, or of a scanning program
+    (docs/capture.md).
     """
     path = Path(path)
     if path.is_file() and path.suffix.lower() == ".json":
@@ -34,6 +36,8 @@ def read_capture(path: Path) -> Capture:
         return read_transforms(*(s for s in splits if s.is_file()))
     if find_model(path) is not None:
         return read_colmap(path)
+    if (scan := read_scan(path)) is not None:
+        return scan
     if any(p.suffix.lower() in PICTURES for p in path.rglob("*")):
         raise BadFile(f"{path}: photos without poses; {how_to_pose(path)}.")
     raise BadFile(f"{path}: neither photos nor poses in this folder; see docs/capture.md")
@@ -42,7 +46,8 @@ def read_capture(path: Path) -> Capture:
 def has_poses(folder: Path) -> bool:
     """Whether a folder is one of those that `read_capture` knows."""
     names = (*TABLES, f"transforms_{SPLITS[0]}.json")
-    return any((folder / name).is_file() for name in names) or find_model(folder) is not None
+    tables = any((folder / name).is_file() for name in names)
+    return tables or find_model(folder) is not None or is_scan(folder)
 
 
 def how_to_pose(photos: Path) -> str:

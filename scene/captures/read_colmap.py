@@ -1,5 +1,6 @@
 """A COLMAP folder (sparse/0 and images/, text or binary) -> Capture."""
 
+import os
 from dataclasses import replace
 from itertools import compress
 from pathlib import Path
@@ -7,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import Fields, shown
+from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
+from shapeshift.scene.capture_files import SMALLER, find_file
 from shapeshift.scene.capture_photos import doubts_of, image_size, posed_photo, refuse_all_missing
-from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
@@ -27,6 +30,9 @@ from shapeshift.scene.captures.colmap_points import read_colmap_points
 from shapeshift.scene.captures.colmap_tables import find_model, read_tables
 from shapeshift.scene.captures.read_transforms import read_capture_json
 
+# nerfstudio's, beside the model
+LISTS = {"train_list.txt": "train", "validation_list.txt": "test", "test_list.txt": "test"}
+
 
 def read_colmap(folder: Path) -> Capture:
     """Sub-folders of images/ are modalities; capture.json may say more (docs/capture.md)."""
@@ -35,31 +41,66 @@ def read_colmap(folder: Path) -> Capture:
     model, ending = found
     lenses, images = read_tables(model, ending)
     posed = sorted(images, key=lambda image: image.name)
-    root = folder / "images" if (folder / "images").is_dir() else folder
+    base = folder / "dense" if model == folder / "dense" / "sparse" else folder
+    root = photos_folder(base)
     said = read_capture_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
     stops, modality_of = modalities(said, [i.name for i in posed], folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
     world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
-    there = [(root / image.name).is_file() for image in posed]
-    missing = [str(root / i.name) for i, found in zip(posed, there, strict=True) if not found]
+    paths = [find_file(root, image.name, ("",)).path for image in posed]
+    there = [os.path.isfile(path) for path in paths]
+    missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
     photos, rescaled = [], []
-    for image, world_from_camera in compress(zip(posed, cameras, strict=True), there):
-        lens, path = lenses[image.lens], root / image.name
+    for image, path, world_from_camera in compress(zip(posed, paths, cameras, strict=True), there):
+        lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
         photo = posed_photo(path, modality_of[image.name], matrix, lens, where)
-        mask = find_mask(folder, image.name)
+        mask = find_mask(base, image.name)
         if mask is not None:
             image_size(mask, photo.file_size)
         photos.append(replace(photo, mask=mask))
         rescaled += [str(path)] if photo.file_size != lens.size else []
-    xyz, rgb = read_colmap_points(model / f"points3D{ending}")
-    points, colors = (xyz, rgb.astype(np.float32) / 255) if len(xyz) else (None, None)
+    points, colors, more = points_of(model / f"points3D{ending}")
     counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
-    photos = with_counts(split_every_8th(photos), counts)
+    photos = with_counts(listed_split(photos, folder, root), counts)
     background = background_from(said, f"{folder}/capture.json")
-    guessed, doubts = not said.get("modalities"), doubts_of(len(posed), missing, photos, rescaled)
+    guessed = not said.get("modalities")
+    doubts = doubts_of(len(posed), missing, photos, rescaled) + more
     return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
+
+
+def photos_folder(base: Path) -> Path:
+    """images/, else the first of those with smaller photos, else the folder itself."""
+    names = ("images", *(f"images_{factor}" for factor in SMALLER))
+    return next((base / name for name in names if (base / name).is_dir()), base)
+
+
+def points_of(path: Path) -> tuple[np.ndarray | None, np.ndarray | None, tuple[str, ...]]:
+    """Points and colours 0..1 of a model, and what is doubtful: a model may come without."""
+    if not path.is_file():
+        return None, None, (f"The points {path_end(path)} are not there.",)
+    xyz, rgb = read_colmap_points(path)
+    return (xyz, rgb.astype(np.float32) / 255, ()) if len(xyz) else (None, None, ())
+
+
+def listed_split(photos: list[Photo], folder: Path, root: Path) -> list[Photo]:
+    """By nerfstudio's lists beside the model, a name a line; without them every 8th is held out.
+
+    Photos in none of the lists are not used.
+    """
+    splits: dict[str, str] = {}
+    for name, split in LISTS.items():
+        if (folder / name).is_file():
+            lines = read_text_file(folder / name).decode("utf-8", "replace").split("\n")
+            splits |= {line.strip(): split for line in lines if line.strip()}
+    if not splits:
+        return split_every_8th(photos)
+    named = [(photo, splits.get(photo.path.relative_to(root).as_posix())) for photo in photos]
+    used = [replace(photo, split=split) for photo, split in named if split]
+    if not used:
+        raise BadFile(f"{folder}: its lists of training and test photos name none of its photos")
+    return used
 
 
 def modalities(

@@ -1,6 +1,5 @@
 """transforms.json and cameras.json -> Capture: nerfstudio, Blender, our own form, OpenCV tables."""
 
-import math
 import os
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
@@ -12,11 +11,11 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.capture_photos import doubts_of, image_size, posed_photo, refuse_all_missing
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
-    LARGEST_NUMBER,
     CaptureWorld,
     background_from,
     counts_from,
@@ -30,20 +29,18 @@ from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
+from shapeshift.scene.captures.lenses.frame_lens import lens_of
+from shapeshift.scene.captures.lenses.panorama import FACES, face_lens, face_pose, is_panorama
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.pose import OPENCV_FROM_EYE
 
-ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG")
 POSES = ("transform_matrix", "c2w_opencv", "c2w")
 SPLITS = {"train": "train", "test": "test", "val": "test"}
-LENS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy",
-        "k1", "k2", "k3", "k4", "p1", "p2", "w", "h")  # fmt: skip
 # nerfstudio's lists of the photos of a split; what is in none of them is not used.
 LISTS = {"train_filenames": "train", "val_filenames": "test", "test_filenames": "test"}
 MOST_BYTES = 1 << 30  # of JSON
-NO_PINHOLES = ("EQUIRECTANGULAR", "OMNIDIRECTIONAL", "VR180", "ORTHOPHOTO", "FISHEYE624")
 
 
 @dataclass(frozen=True)
@@ -56,6 +53,7 @@ class Shot:
     world_from_camera: np.ndarray  # (4, 4) OpenCV axes, the file's world
     where: str  # for messages
     folder: Path  # where the names of its photos begin
+    elsewhere: bool = False  # not where the file says
 
     @property
     def names_depth(self) -> bool:
@@ -68,8 +66,14 @@ class Shot:
 
 def read_transforms(*files: Path) -> Capture:
     """A capture from one JSON file, or from the train/val/test files of a Blender data set."""
-    folder, where = files[0].parent, str(files[0])
-    data, entries = gather(files)
+    return capture_of(files[0].parent, str(files[0]), *gather(files))
+
+
+def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping]) -> Capture:
+    """A capture out of what a file says for all frames, and of every frame with that filled in.
+
+    where: of the file, for messages.  Raises BadFile.
+    """
     stops = stops_of(data, entries, where)
     named = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
     shots = [shot for shot in named if os.path.isfile(shot.path)]
@@ -88,26 +92,19 @@ def read_transforms(*files: Path) -> Capture:
     )
     photos, rescaled, no_depth, no_normals = [], [], [], []
     for shot in shots:
-        lens = lens_of(shot)
-        photos.append(photo := photo_of(shot, lens, world, folder))
-        rescaled += [str(shot.path)] if photo.file_size != lens.size else []
-        no_depth += [str(shot.path)] if photo.depth is None and shot.names_depth else []
-        no_normals += [str(shot.path)] if photo.normals is None and shot.names_normals else []
+        lens = lens_of(shot.entry, shot.path, shot.where)
+        photos += (made := photos_of(shot, lens, world, folder))
+        rescaled += [str(shot.path)] if made[0].file_size != lens.size else []
+        no_depth += [str(shot.path)] if made[0].depth is None and shot.names_depth else []
+        no_normals += [str(shot.path)] if made[0].normals is None and shot.names_normals else []
     doubts = doubts_of(len(named), missing, photos, rescaled, no_depth, no_normals)
+    doubts += doubts_of_entries(shots, entries)
     photos = with_counts(photos, counts_from(data.get("modalities"), where))
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
-    points, colors = None, None
-    fields = Fields(data, where)
-    name = fields.text("points", "")
-    if not name and (name := fields.text("ply_file_path", "")):
-        if not os.path.isfile(folder / name):
-            doubts += (f"The points {path_end(folder / name)} are not there.",)
-            name = ""
-    if name or (folder / "points3d.npz").is_file():
-        points, colors = read_points(folder / (name or "points3d.npz"))
+    points, colors, more = points_of(folder, data, where)
     described = any(isinstance(m, dict) for m in data.get("modalities") or ())
-    background, notes = background_from(data, where), fields.optional_object("notes")
+    background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
     capture = world.capture(
         folder,
         stops,
@@ -117,11 +114,45 @@ def read_transforms(*files: Path) -> Capture:
         background,
         not described,
         dict(notes.data) if notes else None,
-        doubts,
+        doubts + more,
     )
     refuse_other_units(capture, where)
     refuse_other_axes(capture, where)
     return capture
+
+
+def points_of(
+    folder: Path, data: dict, where: str
+) -> tuple[np.ndarray | None, np.ndarray | None, tuple[str, ...]]:
+    """Points and colours in the file's world, as far as there are some, and what is doubtful."""
+    fields = Fields(data, where)
+    name = fields.text("points", "")
+    if not name and (name := fields.text("ply_file_path", "")):
+        path = find_file(folder, name, ("",)).path
+        if not os.path.isfile(path):
+            return None, None, (f"The points {path_end(path)} are not there.",)
+        return *read_points(path), ()
+    if name or (folder / "points3d.npz").is_file():
+        return *read_points(folder / (name or "points3d.npz")), ()
+    return None, None, ()
+
+
+def doubts_of_entries(shots: Sequence[Shot], entries: Sequence[Mapping]) -> tuple[str, ...]:
+    """What a person should know of the frames, a sentence each."""
+    said, moved = [], [shot for shot in shots if shot.elsewhere]
+    if moved:
+        first = moved[0]
+        said.append(
+            f"{len(moved)} photos are not where the capture says; they are taken from below its "
+            f"folder, for example {path_end(first.path.relative_to(first.folder))}."
+        )
+    times = {time for entry in entries if isinstance(time := entry.get("time"), int | float)}
+    if len(times) > 1:
+        said.append(
+            "Its frames have different times; they are taken as one still scene, and what moves "
+            "will be a smear."
+        )
+    return tuple(said)
 
 
 def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
@@ -131,6 +162,7 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
     for file in files:
         data = read_capture_json(file)
         frames = data.pop("frames", None)
+        frames = with_test_frames(frames, data.pop("test_frames", None))
         if not isinstance(frames, list) or not all(isinstance(f, dict) for f in frames):
             raise BadFile(f"{file}: no list 'frames'; this file holds no posed photos")
         if not frames:
@@ -140,6 +172,15 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
         entries += [ChainMap(frame, split, data) for frame in listed(frames, data, str(file))]
         everything |= data
     return everything, entries
+
+
+def with_test_frames(frames: object, tests: object) -> object:
+    """The frames of ScanNet++, which has those that are held out in a list of their own."""
+    if not (isinstance(frames, list) and isinstance(tests, list) and tests):
+        return frames
+    if not all(isinstance(frame, dict) for frame in (*frames, *tests)):
+        return None
+    return [f | {"split": "train"} for f in frames] + [f | {"split": "test"} for f in tests]
 
 
 def listed(frames: list[dict], data: dict, where: str) -> list[dict]:
@@ -216,8 +257,13 @@ def shots_of(
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
             )
-        return [Shot(entry, modality, find_image(folder / file), matrix, where, folder)]
-    return [Shot(entry, n, find_image(folder / n / file), matrix, where, folder / n) for n in names]
+        path, elsewhere = find_file(folder, file)
+        return [Shot(entry, modality, path, matrix, where, folder, elsewhere)]
+    shots = []
+    for name in names:
+        path, elsewhere = find_file(folder / name, file)
+        shots.append(Shot(entry, name, path, matrix, where, folder / name, elsewhere))
+    return shots
 
 
 def opencv_axes(entry: Mapping) -> bool:
@@ -227,72 +273,32 @@ def opencv_axes(entry: Mapping) -> bool:
     return "opengl" not in str(entry.get("convention", "")).lower()
 
 
-def find_image(path: Path) -> Path:
-    """The file of that name, whose ending may lack; the name as it is where there is none."""
-    for ending in ENDINGS:
-        if os.path.isfile(f"{path}{ending}"):  # unlike Path.is_file it takes any text for a name
-            return Path(f"{path}{ending}")
-    return path
-
-
-def photo_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path) -> Photo:
+def photos_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path) -> list[Photo]:
+    """The photo of a shot; of a panorama the straight ones that it is cut into."""
     entry, where = shot.entry, shot.where
     fields = Fields(entry, where)
     split = fields.text("split", "train")
     if split not in SPLITS:
         raise BadFile(f"{where} has split {shown(split)}; use train or test")
-    matrix = world.turned(shot.world_from_camera)
-    photo = posed_photo(shot.path, shot.modality, matrix, lens, where)
+    matrix, lenses = shot.world_from_camera, [lens]
+    poses = [world.turned(matrix)]
+    if is_panorama(lens):
+        lenses = [face_lens(lens, face) for face in FACES]
+        poses = [world.turned(face_pose(matrix, face)) for face in FACES]
+    photos = [
+        posed_photo(shot.path, shot.modality, pose, of, where)
+        for pose, of in zip(poses, lenses, strict=True)
+    ]
     mask, name = None, fields.text("mask_path", "") or fields.text("mask", "")
     if name:
-        mask = folder / name
+        mask = find_file(folder, name, ("",)).path
         if not os.path.isfile(mask):
             raise BadFile(f"{where}: the mask {path_end(mask)} is missing; put it there")
-        image_size(mask, photo.file_size)
-    depth, unit = depth_of(entry, shot.folder, photo.file_size, where)
-    photo = replace(photo, mask=mask, split=SPLITS[split], depth=depth, depth_unit=unit)
-    normals, axes = normals_of(entry, shot.folder, photo.file_size, where)
-    return replace(photo, normals=normals, normal_axes=axes)
-
-
-def lens_of(shot: Shot) -> ColmapCamera:
-    """The lens as the file states it, of the size that it states, else of the photo's."""
-    entry, where = shot.entry, shot.where
-    fields = Fields(entry, where)
-    for key in LENS:
-        fields.number(key, 0.0, low=-LARGEST_NUMBER, high=LARGEST_NUMBER)
-    if "w" in entry and "h" in entry:
-        width, height = size = int(entry["w"]), int(entry["h"])
-        if not (width >= 1 and height >= 1 and size == (entry["w"], entry["h"])):
-            raise BadFile(f"{where}: 'w' and 'h' are {entry['w']:g} and {entry['h']:g}, not pixels")
-    else:
-        width, height = size = image_size(shot.path, None)
-    if "fl_x" in entry:
-        fx = float(entry["fl_x"])
-        fy = float(entry.get("fl_y", fx))
-    elif "camera_angle_x" in entry:
-        fx = fy = focal_of(entry, "camera_angle_x", width, where)
-        if "camera_angle_y" in entry:
-            fy = focal_of(entry, "camera_angle_y", height, where)
-    else:
-        raise BadFile(f"{where} has no focal length; give 'fl_x' in pixels or 'camera_angle_x'")
-    centre = float(entry.get("cx", width / 2)), float(entry.get("cy", height / 2))
-    k1, k2, k3, k4, p1, p2 = (float(entry.get(k, 0)) for k in ("k1", "k2", "k3", "k4", "p1", "p2"))
-    model = str(entry.get("camera_model", "")).upper()
-    if any(name in model for name in NO_PINHOLES):
-        raise BadFile(f"{where} is of camera model {model:.40}, which no pinhole can stand for")
-    if "FISHEYE" in model or entry.get("is_fisheye") is True:
-        return ColmapCamera("OPENCV_FISHEYE", size, (fx, fy, *centre, k1, k2, k3, k4))
-    if k4:
-        raise BadFile(
-            f'{where} has k4 = {k4:g}, which only fisheye lenses have: "camera_model": '
-            '"OPENCV_FISHEYE" says that it is one'
-        )
-    return ColmapCamera("FULL_OPENCV", size, (fx, fy, *centre, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0))
-
-
-def focal_of(entry: Mapping, key: str, side: int, where: str) -> float:
-    """Pixels of focal length of an angle of view in radians across `side` pixels."""
-    if not 0 < entry[key] < math.pi:
-        raise BadFile(f"{where}: '{key}' is {entry[key]:g}; radians between 0 and pi are wanted")
-    return side / 2 / math.tan(entry[key] / 2)
+        image_size(mask, photos[0].file_size)
+    photos = [replace(photo, mask=mask, split=SPLITS[split]) for photo in photos]
+    if is_panorama(lens):  # whose depth is measured along rays, not along a view
+        return photos
+    size = photos[0].file_size
+    depth, unit = depth_of(entry, shot.folder, size, where)
+    normals, axes = normals_of(entry, shot.folder, size, where)
+    return [replace(photos[0], depth=depth, depth_unit=unit, normals=normals, normal_axes=axes)]

@@ -12,6 +12,7 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.lenses.panorama import is_panorama, panorama_pixels
 
 STRAIGHT = 0.5  # pixels that distortion may shift a corner by before it matters
 WIDEST = 1.75  # tangent of the half angle up to which a pinhole shows anything: 120 degrees
@@ -49,6 +50,8 @@ class Pinhole:
 
 def pixels_of(lens: ColmapCamera, tangents: np.ndarray) -> np.ndarray:
     """(N, 2) pixels of the photo that lie at tangents (N, 2); NaN or far away where none does."""
+    if is_panorama(lens):
+        return panorama_pixels(lens, tangents)
     import pycolmap
 
     width, height = lens.size
@@ -64,8 +67,8 @@ def is_straight(lens: ColmapCamera, where: str) -> bool:
         raise BadFile(f"{where} has focal lengths {focal}; both must be above 0")
     x, y = np.meshgrid([0, width / 2, width], [0, height / 2, height])
     corners = np.stack([x.ravel(), y.ravel()], axis=1)
-    if not lens.bends:
-        return True
+    if not lens.bends or is_panorama(lens):
+        return not lens.bends
     shift = np.abs(pixels_of(lens, (corners - lens.centre) / focal) - corners).max()
     return bool(shift <= STRAIGHT)
 
@@ -76,6 +79,8 @@ def fold(lens: ColmapCamera) -> float:
 
     Polynomials that were fitted to a photo do so a little beyond its corners.
     """
+    if is_panorama(lens):
+        return np.inf
     angle = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
     axes = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     radius = np.arange(SAMPLES + 1) * (WIDEST * 2**0.5 / SAMPLES)
@@ -91,6 +96,9 @@ def pinhole_of(lens: ColmapCamera) -> Pinhole:
     """The straight camera.  Raises BadFile where the lens leaves too little of the photo, or would
     make too much of it.
     """
+    if is_panorama(lens):  # a face of the cube, as fine as the panorama is in its middle
+        half = max(round(lens.focal[0]), 1)
+        return Pinhole((half, half), (half, half), (2 * half, 2 * half))
     limit, (fx, fy), (width, height) = min(fold(lens), WIDEST), lens.focal, lens.size
     along = np.linspace(0, limit, SAMPLES)
     none = np.zeros_like(along)
@@ -174,6 +182,8 @@ def undistorted(
 @lru_cache(maxsize=8)
 def lost(lens: ColmapCamera, size: tuple[int, int], by: float) -> np.ndarray:
     """(H, W) bool which pixels of the straight camera, each `by` of its own, see past the photo."""
+    if is_panorama(lens):
+        return np.zeros(size[::-1], bool)
     x, y = ((np.arange(side) + 0.5) * by for side in size)
     edge, out = max(by / 2, 0.5), np.ones(size[::-1], bool)
     for start in range(0, len(y), ROWS):

@@ -1,5 +1,7 @@
 """project_arena, the drawing form of projection: against `project`, its gates and its counts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,41 @@ def test_each_splat_follows_its_own_object():
         seen = mine & (record[:, 9] > 0)
         np.testing.assert_array_equal(d.download(got.record)[mine, 9] > 0, seen[mine])
         np.testing.assert_allclose(d.download(got.record)[seen], record[seen], rtol=2e-4, atol=2e-4)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 15, 16, 17, 31, 33, 257, 4111])
+def test_vectors_of_eight_and_of_sixteen_give_the_same_bits(count):
+    """All that a projection leaves, of two views with colours of their own, where some splats are
+    not numbers, some are absent or behind, and objects meet within a vector.
+    """
+    d, cameras = device(), [off_centre_camera((90, 50)), off_centre_camera((33, 70))]
+    rng = np.random.default_rng(count)
+    mean_opacity, covariance, color, _ = (d.download(a) for a in arena(random_splats(count, 5)))
+    for array in (mean_opacity, covariance, color):
+        array[rng.integers(0, max(1, count), count // 9), rng.integers(0, 3)] = np.nan
+    mean_opacity[rng.random(count) < 0.2, 3] = -1
+    index = d.upload(np.sort(rng.integers(0, 3, count)).astype(np.int32))
+    arrays = [d.upload(a) for a in (mean_opacity, covariance, color)]
+    poses = np.stack([turned(seed) for seed in range(3)])
+    made = []
+    for lanes in (8, 16):
+        both = project_arena(
+            replace(d, lanes=lanes), *arrays, index, poses, cameras,
+            antialiased=(True, False, True), second_color=d.upload(color[::-1]),
+        )  # fmt: skip
+        made.append([])
+        for one in both:
+            tiles, record = one.in_tiles, d.download(one.record)
+            record[record[:, 9] <= 0] = 0  # of what is culled the extent alone is said
+            status = d.download(tiles.status)
+            firsts = [tiles.chunk * i for i in range(len(status))]
+            pairs = d.download(tiles.pairs)
+            kept = [pairs[i : i + n] for i, n in zip(firsts, status[:, 0], strict=True)]
+            rest = (one.depth, one.culled_counts, tiles.tile_bounds, tiles.table)
+            made[-1] += [record, status, *kept, *map(d.download, rest)]
+    for eight, sixteen in zip(*made, strict=True):
+        assert eight.tobytes() == sixteen.tobytes()
+    assert count < 257 or len(made[0][2]) > 50
 
 
 def ramp(room: np.ndarray, band: float) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Where photos are mostly background, splats must not vanish together: warm-up and a loss."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,13 +10,23 @@ from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.min_opacity import MIN_OPACITY, add_min_opacity_gradient
+from shapeshift.training.losses.min_opacity import (
+    MIN_OPACITY,
+    SHARE,
+    UNTIL,
+    add_min_opacity_gradient,
+    min_opacity_share,
+)
 from shapeshift.training.schedule import LEAST_RATE, WARM_UP_STEPS, LrWarmup
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
 from tests.support.training.training_runs import run
 
-SETTINGS = TrainSettings(iterations=450, grow=False, max_anchors=600)
+# With one base colour for both stops, what each photo shows white draws the colours of both to
+# white; with one for each the run is never lost.
+SETTINGS = TrainSettings(
+    iterations=450, grow=False, max_anchors=600, anchor_attributes="frame,color"
+)
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +72,12 @@ def test_the_loss_of_absent_splats_has_its_gradient(device, count):
     np.testing.assert_allclose(device.download(grad.opacity), wanted, rtol=1e-5, atol=1e-6)
 
 
+def test_shapes_apart_with_base_colours_for_each_stop_are_learned_at_once(device, apart):
+    trainer = run(Trainer(device, apart, replace(SETTINGS, anchor_attributes="frame,stop_color")))
+    assert not trainer.guard.rollbacks
+    assert min(trainer.held_out_psnr(9).values()) > 20  # 13 dB is an empty picture
+
+
 def test_a_capture_of_shapes_apart_is_turned_back_once_and_learned(device, apart, tmp_path):
     whole = run(Trainer(device, apart, SETTINGS))
     assert whole.guard.rollbacks >= 1 and whole.lr_warmup.start is not None
@@ -71,3 +89,12 @@ def test_a_capture_of_shapes_apart_is_turned_back_once_and_learned(device, apart
     assert resumed.lr_warmup == whole.lr_warmup
     for name, psnr in resumed.held_out_psnr(9).items():
         assert psnr > 20, (name, psnr)
+
+
+def test_the_loss_of_faint_splats_ends_where_stops_are_told_apart():
+    after = np.nextafter(UNTIL, 1)
+    assert [min_opacity_share(2, 0.0, done) for done in (0, UNTIL, after, 1)] == [SHARE] * 2 + [
+        0
+    ] * 2
+    for stops, blended in ((1, 0.0), (3, 0.1)):  # one shape; or shapes between stops are drawn
+        assert {min_opacity_share(stops, blended, done) for done in (0, UNTIL, after, 1)} == {SHARE}

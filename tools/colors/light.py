@@ -25,7 +25,7 @@ from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.training.evaluation.evaluate import evaluate_model  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 
-WAYS = {"without": {}, "light": {"anchor_attributes": "frame,color,light"}}
+WAYS = {"without": {}, "light": {"anchor_attributes": "frame,stop_color,light"}}
 COLUMNS = (
     "capture", "way", "seed", "budget_s", "steps", "step_ms", "anchors", "package_bytes",
     "modality", "psnr_db",

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).resolve()
+EYE_DISTANCE = 0.06  # of the distance to the middle of the object
 WARM_UP = 8
 FRAMES = 12
 COLUMNS = (
@@ -100,10 +101,24 @@ def made_of(model, case: Case):
     return SplatLayers(*arrays, np.zeros(len(order), np.int32), (Stop("all", 1.0),))
 
 
+def eyes_of(view, centre) -> list:
+    """Two parallel eyes beside that of a view; of an earlier checkout, too, hence the imports."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from shapeshift.scene.pose import Pose
+
+    pose = view.world_from_eye
+    right = pose.matrix()[:3, 0] * EYE_DISTANCE * np.linalg.norm(pose.position - centre) / 2
+    return [
+        replace(view, world_from_eye=Pose(pose.position + s * right, pose.wxyz)) for s in (-1, 1)
+    ]
+
+
 def views_of(model, case: Case) -> list:
     """WARM_UP + FRAMES frames, a list of eyes each."""
     import numpy as np
-    from tiles import eyes_of
 
     from shapeshift.scene.cameras.framing import fit_distance, frame_points, view_from
 
@@ -214,6 +229,9 @@ def main() -> int:
         work(options.leg, options.work, not options.whole)
         return 0
     here = HERE.parents[2]
+    sys.path.insert(0, str(here))
+    from shapeshift.app.charts.chart_rows import write_lines
+
     trees = {"now": here, "whole": here}
     if options.before:
         trees["before"] = options.before
@@ -226,11 +244,7 @@ def main() -> int:
         if case.splats <= options.most:
             rows.append(measure(options.leg, case, trees))
             sys.stderr.write(rows[-1] + "\n")
-    text = "\n".join(rows) + "\n"
-    if options.out:
-        options.out.write_text(text)
-    else:
-        sys.stdout.write(text)
+    write_lines(options.out, rows)
     return 0
 
 

@@ -14,7 +14,7 @@ import argparse
 import os
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +22,14 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
+from hidden import eyes_of  # noqa: E402
 from peers import make_views  # noqa: E402
 
+from shapeshift.app.charts.chart_rows import write_lines  # noqa: E402
 from shapeshift.rasterizer.bin import bin_tiles, sort_order  # noqa: E402
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.rasterizer.pack import pack  # noqa: E402
+from shapeshift.rasterizer.program import build  # noqa: E402
 from shapeshift.rasterizer.project import Projected, grid_of  # noqa: E402
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena  # noqa: E402
 from shapeshift.rasterizer.raster import rasterize_rgba_views  # noqa: E402
@@ -39,13 +42,12 @@ from shapeshift.runtime_models.model import SplatLayers, Stop  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.cameras.framing import frame_points  # noqa: E402
 from shapeshift.scene.metrics import psnr  # noqa: E402
-from shapeshift.scene.pose import Pose, View  # noqa: E402
+from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 SIZES = ((640, 360), (1280, 720))
 ORACLE_SIZE = (256, 144)
 WARM_UP = 3
-EYE_DISTANCE = 0.06  # of the distance to the middle of the object
 COLUMNS = (
     "scene,splats,size,pass,cpu_ms_p50,cpu_ms_p95,wall_ms_p50,wall_ms_p95,stereo_over_mono,"
     "ours_over_prototype,psnr_db"
@@ -121,11 +123,8 @@ class Prototype:
     """The forward kernels that these tiles grew from, fed with our records."""
 
     def __init__(self, device: Device, file: Path) -> None:
-        import pyopencl as cl
-
         options = ["-cl-fast-relaxed-math", "-cl-mad-enable"]
-        program = cl.Program(device.context, file.read_text()).build(options)
-        self.kernels = {k.function_name: k for k in program.all_kernels()}
+        self.kernels = build(device.context, file, options)
         self.device = device
 
     def draw(self, projected: Projected, size: tuple[int, int]) -> None:
@@ -165,15 +164,6 @@ def side_by_side(model: SplatLayers, copies: int) -> SplatLayers:
     ]
     count = copies * model.splat_count
     return SplatLayers(means, *again, np.zeros(count, np.int32), (Stop("all", 1.0),))
-
-
-def eyes_of(view: View, centre: np.ndarray) -> list[View]:
-    """Two parallel eyes beside that of a view."""
-    pose = view.world_from_eye
-    right = pose.matrix()[:3, 0] * EYE_DISTANCE * np.linalg.norm(pose.position - centre) / 2
-    return [
-        replace(view, world_from_eye=Pose(pose.position + s * right, pose.wxyz)) for s in (-1, 1)
-    ]
 
 
 def measure(arena: Arena, views: list[View], prototype: Prototype | None) -> Times:
@@ -258,11 +248,7 @@ def main() -> int:
     rows = [f"# {words}", f"# {device.platform}, {device.units} units; {load}", COLUMNS]
     for name, model in (("leg SH3", leg), ("3 legs SH0", three)):
         rows += rows_of(name, Arena.of(device, model), options.poses, prototype)
-    text = "\n".join(rows) + "\n"
-    if options.out:
-        options.out.write_text(text)
-    else:
-        sys.stdout.write(text)
+    write_lines(options.out, rows)
     return 0
 
 

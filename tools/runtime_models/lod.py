@@ -9,7 +9,6 @@ distance and from three times as far, the same of as many splats that --max-spla
 a splat over all levels, and processor seconds a million splats of the scene for levels and files.
 """
 
-import argparse
 import sys
 import tempfile
 import time
@@ -21,9 +20,8 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
-from thin import SIZE, VIEWS, pictures  # noqa: E402
+from thin import SIZE, VIEWS, pictures, write_scenes  # noqa: E402
 
-from shapeshift.app.drawing import open_renderer  # noqa: E402
 from shapeshift.runtime_models.bake import bake  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers, Stop  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
@@ -35,6 +33,10 @@ from shapeshift.runtime_models.splats.sog.write_streamed import write_streamed  
 from shapeshift.scene.cameras.framing import frame_points, model_points, orbit_path  # noqa: E402
 from shapeshift.scene.metrics import psnr  # noqa: E402
 
+COLUMNS = (
+    "scene,sh_degree,leaves,level,splats,psnr_db,psnr_db_3x_farther,max_splats_db,bytes_a_splat,"
+    "cpu_s_a_million"
+)
 LEAF = 4096  # splats, as the command has it
 FAR = 3  # times the distance
 
@@ -77,24 +79,5 @@ def rows_of(path: Path, model: SplatLayers, degree: int, renderer) -> list[str]:
     return rows
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenes", nargs="+", type=Path)
-    parser.add_argument("--out", type=Path)
-    options = parser.parse_args()
-    rows = []
-    with open_renderer("none", "tiles") as (renderer, _):
-        for path in options.scenes:
-            rows += measure(path, renderer)
-    if options.out:
-        names = " ".join(path.name for path in options.scenes)
-        head = [f"# python tools/runtime_models/lod.py {names} --out docs/bench/{options.out.name}"]
-        head += [
-            "scene,sh_degree,leaves,level,splats,psnr_db,psnr_db_3x_farther,max_splats_db,"
-            "bytes_a_splat,cpu_s_a_million"
-        ]
-        options.out.write_text("\n".join([*head, *rows, ""]))
-
-
 if __name__ == "__main__":
-    main()
+    write_scenes(__doc__, COLUMNS, measure)

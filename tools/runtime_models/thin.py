@@ -28,6 +28,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
 from shapeshift.app.drawing import open_renderer  # noqa: E402
+from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.splats.operations import moment_matching  # noqa: E402
@@ -148,8 +149,9 @@ def measure(path: Path, renderer) -> list[str]:
     return rows
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def write_scenes(doc: str, columns: str, measure: Callable[[Path, Renderer], list[str]]) -> None:
+    """Measures every scene that is named; the rows go below their command into --out."""
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("scenes", nargs="+", type=Path)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
@@ -158,13 +160,11 @@ def main() -> None:
         for path in options.scenes:
             rows += measure(path, renderer)
     if options.out:
-        command = "python tools/runtime_models/thin.py " + " ".join(
-            path.name for path in options.scenes
-        )
-        head = [f"# {command} --out docs/bench/{options.out.name}"]
-        head += ["scene,splats,way,part,kept,x,psnr_db,cpu_s"]
+        names = " ".join(path.name for path in options.scenes)
+        program = f"python tools/runtime_models/{Path(sys.argv[0]).name}"
+        head = [f"# {program} {names} --out docs/bench/{options.out.name}", columns]
         options.out.write_text("\n".join([*head, *rows, ""]))
 
 
 if __name__ == "__main__":
-    main()
+    write_scenes(__doc__, "scene,splats,way,part,kept,x,psnr_db,cpu_s", measure)

@@ -25,6 +25,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from shapeshift.app.charts.chart_rows import write_lines  # noqa: E402
 from shapeshift.app.charts.chart_scene import Walk, arc  # noqa: E402
 from shapeshift.renderer.gl.context import NoContext, open_context  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
@@ -162,11 +163,7 @@ def main() -> int:
     words += f" --out {options.out.name}" if options.out else ""
     load = f"load average {os.getloadavg()[0]:.1f} at the end"
     head = [f"# {words}", f"# OpenCL {open_device().platform}; GL {gl}; {load}", COLUMNS]
-    text = "\n".join([*head, *rows]) + "\n"
-    if options.out:
-        options.out.write_text(text, encoding="utf-8")
-    else:
-        sys.stdout.write(text)
+    write_lines(options.out, [*head, *rows])
     return 0
 
 

@@ -31,7 +31,7 @@ from shapeshift.training.train import Trainer  # noqa: E402
 WAYS = {
     "default": {},
     "no growth": {"grow": False},
-    "no frames": {"anchor_attributes": "color"},
+    "no frames": {"anchor_attributes": "stop_color"},
     "no base colours": {"anchor_attributes": "frame"},
     "features alone": {"anchor_attributes": ""},
 }

@@ -284,4 +284,5 @@ class PlainTrainer(Run):
             normalize(value["wxyz.value"]),
             1 / (1 + np.exp(-value["opacity.value"])),
             sh,
+            self.capture.origin,
         )

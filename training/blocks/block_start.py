@@ -153,7 +153,7 @@ def part_of_state(
             array = array[:, rows]
         out[name] = array
     count, stops = len(rows), len(state["densify.contribution"])
-    out["densify.grad2d"] = np.zeros((count * layout.splats, 2), np.float32)
+    out["densify.grad2d"] = np.zeros((stops, count * layout.splats, 2), np.float32)
     out["densify.opacity"] = np.zeros((count, 2), np.float32)
     out["densify.contribution"] = np.zeros((stops, count, 2), np.float32)
     out["densify.steps"] = np.array(0)

@@ -46,7 +46,8 @@ class BlockTrainer(Trainer):
         outside = ~self.inside(self.device.download(self.adam["anchors"]), MARGIN)
         self.anchor_cap = self.most_inside + int(outside.sum())
         state = self.stats.state()
-        state["densify.grad2d"].reshape(len(outside), -1)[outside] = 0
+        grad2d = state["densify.grad2d"]
+        grad2d.reshape(len(grad2d), len(outside), -1)[:, outside] = 0
         state["densify.opacity"][outside] = 0
         state["densify.contribution"][:, outside] = 0
         self.stats.load(state)

@@ -42,8 +42,9 @@ class CoarsePicture:
         values = {name: state[f"{name}.value"] for name in names}
         rates = dict.fromkeys(names, np.zeros(1, np.float32))
         self.device, self.splats = device, layout.splats
-        self.step = TrainingStep(device, layout, voxel, Adam(device, values, rates))
         self.control = {stop.name: encoding.encode(stop.x) for stop in stops}
+        controls, adam = np.stack(list(self.control.values())), Adam(device, values, rates)
+        self.step = TrainingStep(device, layout, voxel, adam, controls)
 
     def weights(self, photo: Photo, factor: int) -> np.ndarray:
         """(A,) pixels that each anchor gives to a photo, as large as it is trained."""

@@ -142,7 +142,7 @@ def look_at_photos(
 ) -> tuple[Cover, ...]:  # fmt: skip
     settings = TrainSettings(**coarse.notes["settings"])
     encoding = encoding_for([stop.x for stop in capture.stops])
-    layout = settings.layout(encoding.d)
+    layout = settings.layout(encoding.d, len(capture.stops))
     picture = CoarsePicture(
         device, coarse.state, layout, coarse.notes["voxel"], encoding, capture.stops
     )
@@ -165,7 +165,8 @@ def write_one(
         write_package(model, folder / f"{name}.shift", EXACT)
         return replace(row, coarse=f"{name}.shift")
     settings = TrainSettings(**coarse.notes["settings"])
-    layout = settings.layout(encoding_for([stop.x for stop in capture.stops]).d)
+    units = encoding_for([stop.x for stop in capture.stops]).d
+    layout = settings.layout(units, len(capture.stops))
     state = part_of_state(coarse.state, np.flatnonzero(own | cover.context), layout)
     known_before = coarse.model.provenance
     kept = [key for key in ("view", "background", "downscale") if key in known_before]

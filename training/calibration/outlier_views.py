@@ -14,6 +14,7 @@ SPREADS = 4.0  # of the deviations from that median, as standard deviations of a
 FEWEST = 5  # photos of a modality: among fewer none stands out
 SHOWN = 20  # names at most
 LOOKED_AT = 8  # photos of a modality that tell whether there is any picture
+ONE_COLOR = 0.02  # of a colour's range, by which photos of one colour differ within themselves
 STEEP = (0.4, 2.5)  # contrast that another exposure or white balance may have
 Tracked = Callable[[list[LoadedPhoto]], Iterable[LoadedPhoto]]
 
@@ -86,25 +87,36 @@ def drawn(trainer: Trainer, photo: LoadedPhoto) -> tuple[np.ndarray, np.ndarray]
 
 
 def failed_modalities(trainer: Trainer) -> list[str]:
-    """A sentence where pictures are no nearer to the photos than a sheet of one colour is."""
-    lost = []
+    """A sentence where pictures are no nearer to the photos than a sheet of one colour is, and one
+    where the photos are such a sheet.
+    """
+    lost, empty = [], []
     for modality, photos in trainer.schedule.photos.items():
-        won = []
+        won, plain = [], True
         for photo in photos[:: -(-len(photos) // LOOKED_AT)]:
             image, wanted = drawn(trainer, photo)
             each = np.ones(wanted.shape[:2]) if photo.weight is None else photo.weight
             mean = np.average(wanted.reshape(-1, 3), axis=0, weights=each.ravel())
             flat = np.broadcast_to(mean, wanted.shape)
+            plain &= not np.abs(wanted - flat)[each > 0].max(initial=0) > ONE_COLOR
             won.append(psnr(image, wanted, photo.weight) - psnr(flat, wanted, photo.weight))
-        if not np.median(won) > 0:
+        if plain:
+            empty.append(modality)
+        elif not np.median(won) > 0:
             lost.append(modality)
-    if not lost:
-        return []
-    return [
-        f"{', '.join(lost)}: the pictures are no nearer to the photos than one colour all over; "
-        "train longer, or take other --points (hull where the background is known), and check "
-        "that photos and poses belong together."
-    ]
+    said = []
+    if empty:
+        said.append(
+            f"{', '.join(empty)}: the photos show one colour all over; look whether they are what "
+            "you meant."
+        )
+    if lost:
+        said.append(
+            f"{', '.join(lost)}: the pictures are no nearer to the photos than one colour all "
+            "over; train longer, or take other --points (hull where the background is known), and "
+            "check that photos and poses belong together."
+        )
+    return said
 
 
 def find_outlier_views(trainer: Trainer, tracked: Tracked = iter) -> list[OutlierView]:

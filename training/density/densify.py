@@ -16,6 +16,7 @@ SHRINK = 0.5  # size of a new anchor in that of its parent
 EXCHANGED = 0.05  # of all anchors, at most: those that make room once the cap is reached
 LEAST_OPACITY = 0.005  # mean of an anchor's splats below which it goes
 LEAST_VIEWS = 10  # steps that must have shown a splat, or an anchor, for its sums to count
+LEAST_STOP_VIEWS = 5  # steps of one stop; fewer count as so many, as chance is large
 LEAST_STEPS = 50  # before an anchor can go for its opacity ...
 LEAST_RUNS = 3  # ... and of these such as ran it: what is absent runs rarely, see visibility.py
 AXIS_BITS = 21  # of a key of a grid cell
@@ -68,22 +69,32 @@ def cell_keys(points: np.ndarray, cell: float, origin: np.ndarray) -> np.ndarray
     return (cells[:, 0] << 2 * AXIS_BITS) | (cells[:, 1] << AXIS_BITS) | cells[:, 2]
 
 
+def largest_gradient(grad2d: np.ndarray) -> np.ndarray:
+    """(N,) mean screen gradient of each splat at the stop where it is largest.
+
+    A mean over all stops would say that a splat does well enough which one of them asks for more
+    of.  grad2d: (stops, N, 2) of DensificationStats; 0 where too few steps showed the splat.
+    """
+    sums, views = grad2d[..., 0], grad2d[..., 1]
+    each = sums / np.maximum(views, LEAST_STOP_VIEWS)
+    return np.where(views.sum(0) > LEAST_VIEWS, each.max(0), 0)
+
+
 def new_anchors(
     anchors: np.ndarray,  # (A, 3) metres
     sizes: np.ndarray,  # (A,) metres
     means: list[np.ndarray],  # (A * k, 3) metres at every stop; NaN where the splat is absent
-    grad2d: np.ndarray,  # (A * k, 2) of DensificationStats
+    grad2d: np.ndarray,  # (stops, A * k, 2) of DensificationStats
 ) -> NewAnchors:
     """New anchors at splats of a large gradient, one in each free cube of their size."""
-    views = grad2d[:, 1]
-    strength = np.where(views > LEAST_VIEWS, grad2d[:, 0] / np.maximum(views, 1), 0)
+    strength = largest_gradient(grad2d)
     strongest = np.argsort(-strength, kind="stable")
     strongest = strongest[strength[strongest] > GRAD2D_THRESHOLD]
     places = np.stack([mean[strongest] for mean in means], axis=1).reshape(-1, 3)
     splats = np.repeat(strongest, len(means))  # strongest first, its stops one after the other
     there = np.isfinite(places).all(axis=1)
     places, splats = places[there], splats[there]
-    parents = splats // (len(grad2d) // max(len(anchors), 1))
+    parents = splats // (len(strength) // max(len(anchors), 1))
     if not len(places):
         return NewAnchors(np.zeros((0, 3), np.float32), np.zeros(0, np.int64))
     # Sizes in steps of two, so that anchors of one step share a grid.

@@ -5,7 +5,7 @@ import numpy as np
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import package_files, zip_files
 from shapeshift.training.export import model_of
-from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, HeadLayout, initial_weights, padded
+from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
 from shapeshift.training.settings import TrainSettings
 
 POSITION_BYTES, NUMBER_BYTES = 12, 2  # of an anchor, and of each of its other numbers
@@ -22,8 +22,8 @@ def bytes_without_anchors(
         "anchors.value": np.zeros((1, 3), np.float32),
         "features.value": np.zeros((1, padded(layout.features)), np.float32),
     }
-    for name in layout.per_anchor[2:]:
-        state[f"{name}.value"] = np.ones((1, ATTRIBUTE_WIDTH[name]), np.float32)
+    for name, width in layout.own_widths.items():
+        state[f"{name}.value"] = np.ones((1, width), np.float32)
     one = model_of(state, layout, 1.0, encoding, stops, {})
     return int(GROWN * len(zip_files(package_files(one, "float16")))) + NOTES_BYTES
 
@@ -41,7 +41,7 @@ def anchor_cap(
     if settings.max_mb is None:
         return settings.max_anchors
     fixed = bytes_without_anchors(layout, encoding, stops)
-    numbers = layout.features + sum(ATTRIBUTE_WIDTH[name] for name in layout.per_anchor[2:])
+    numbers = layout.features + sum(layout.own_widths.values())
     fits = int((settings.max_mb * 1e6 - fixed) // (POSITION_BYTES + NUMBER_BYTES * numbers))
     if fits < 1:
         raise BadFile(

@@ -49,11 +49,18 @@ def first_anchors(
     size = np.clip(size, voxel / SIZES, voxel * SIZES)
     axes, wxyz = surface_axes(places, np.concatenate([first.points, first.guesses]))
     frames = np.concatenate([np.log(size[:, None] / voxel * axes), wxyz], axis=1)
-    seen = np.clip(photo_colors(places, photos, background or BLACK), DARKEST, BRIGHTEST)
-    colors = np.log(seen / (1 - seen))
-    at, axes, logits = (a.astype(np.float32) for a in (places, frames, colors))
+    at, axes = (a.astype(np.float32) for a in (places, frames))
+    logits = base_colors(places, photos, background)
     light = np.zeros((len(at), ATTRIBUTE_WIDTH["light"]), np.float32)
     return FirstAnchors(at, axes, logits, light, voxel)
+
+
+def base_colors(
+    places: np.ndarray, photos: list[LoadedPhoto], background: tuple | None
+) -> np.ndarray:
+    """(A, 3) float32 logits of the mean colours that photos show at places (A, 3)."""
+    seen = np.clip(photo_colors(places, photos, background or BLACK), DARKEST, BRIGHTEST)
+    return np.log(seen / (1 - seen)).astype(np.float32)
 
 
 def choose_positions(first: InitialPoints, most: int) -> np.ndarray:

@@ -8,9 +8,10 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.point_sources import CLOUDS, cloud_points, depth_points
 from shapeshift.training.first_anchors.triangulation import triangulated_points
-from shapeshift.training.first_anchors.views import common_box, pixel_of
+from shapeshift.training.first_anchors.views import common_box, distance_of, pixel_of, seen_first
 from shapeshift.training.photos import LoadedPhoto, sampled
 from shapeshift.training.supervision.backgrounds import NOISE
 
@@ -22,7 +23,11 @@ RANDOM_POINTS = 20_000
 NO_POINTS = np.zeros((0, 3))
 GUESSES = 0.08  # of the anchors at most: guesses where the photos show what has no points
 ON_HULL = 0.3  # of the anchors at most, where the others stand at triangulated points
-FEWEST = 100  # triangulated points; fewer are chance
+FEWEST = 100  # triangulated points; fewer are chance ...
+FEWEST_ALONE = 20  # ... but better than none where nothing else says how far things are
+LEAST_SEEN = 0.5  # of a hull's points; of objects seen from all around 0.65 to 0.85 are
+LEAST_WATCHED = 0.1  # of the place that cameras look at together: else they look at several
+NEAREST, FARTHEST = 0.3, 4.0  # guesses along rays, in median distances to what cameras look at
 Report = Callable[[str], None]  # what is done now, in words
 SAMPLE = 1000  # points whose nearest neighbour is looked for
 
@@ -115,7 +120,21 @@ def visual_hull(photos: list[tuple], centre: np.ndarray, half: float) -> np.ndar
     if not len(coarse):
         return coarse
     margin = 2 * half / COARSE_SIDE
-    return carve(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
+    fine = carve(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
+    return seen_part(fine, [view for view, _ in photos])
+
+
+def seen_part(hull: np.ndarray, views: list[View]) -> np.ndarray:
+    """The hull without what none of the photos sees of it, where that is the larger part.
+
+    What was photographed from one side only has a hull like a wedge behind it: no step would ever
+    change what stands there, and a view from another side shows it.
+    """
+    if len(hull) < 2:
+        return hull
+    edge = median_neighbour(hull, np.random.default_rng(0))
+    seen = seen_first(hull, edge, views)
+    return hull if seen.mean() >= LEAST_SEEN else hull[seen]
 
 
 def visual_hulls(photos: list[LoadedPhoto], background: tuple | None) -> list[np.ndarray]:
@@ -189,7 +208,8 @@ def initial_points(
     doubts: tuple[str, ...] = ()
     if source in ("auto", "triangulated"):
         try:
-            found = from_photos(capture, photos, rng, report, seconds)
+            least = FEWEST if hull or source == "triangulated" else FEWEST_ALONE
+            found = from_photos(capture, photos, rng, report, seconds, least)
             return with_hull(found, hull) if hull else found
         except BadFile as why:
             if source == "triangulated":
@@ -237,19 +257,19 @@ def with_hull(found: InitialPoints, hull: InitialPoints) -> InitialPoints:
 
 def from_photos(
     capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, report: Report | None,
-    seconds: float | None = None,
+    seconds: float | None = None, least: int = FEWEST,
 ) -> InitialPoints:  # fmt: skip
-    """Points triangulated out of the photos.  Raises BadFile where they are too few."""
+    """Points triangulated out of the photos.  Raises BadFile where they are fewer than `least`."""
 
     def progress(stage: str, done: int, of: int) -> None:
         if report is not None:
             report(f"points out of the photos: {stage}, {done} of {of}")
 
     points = triangulated_points(photos, capture.background, progress, seconds)
-    if len(points) < FEWEST:
+    if len(points) < least:
         raise BadFile(
             f"{capture.folder}: only {len(points)} points could be triangulated out of its photos "
-            f"({FEWEST} are needed); they show too little texture, overlap too little, or do not "
+            f"({least} are needed); they show too little texture, overlap too little, or do not "
             "belong to their poses."
         )
     origin = f"{len(points):,} triangulated points"
@@ -290,9 +310,37 @@ def visible_cloud(
 
 
 def random_points(photos: list[LoadedPhoto], rng: np.random.Generator) -> np.ndarray:
-    """(P, 3) anywhere in the place that the cameras look at together."""
-    centre, half = common_box([p.view for p in photos])
+    """(P, 3) anywhere in the place that the cameras look at together; where they look at no one
+    place, as along a corridor or from the air, anywhere before them.
+    """
+    views = [photo.view for photo in photos]
+    centre, half = common_box(views)
     cloud = centre + half * rng.uniform(-1, 1, (RANDOM_POINTS, 3))
-    seen = np.sum([pixel_of(p.view, cloud)[1] for p in photos], axis=0)
-    watched = seen >= max(1, len(photos) // 3)
-    return cloud[watched] if watched.any() else cloud
+    seen = np.sum([pixel_of(view, cloud)[1] for view in views], axis=0)
+    watched = seen >= max(1, len(views) // 3)
+    if watched.mean() >= LEAST_WATCHED:
+        return cloud[watched]
+    return points_before(views, rng)
+
+
+def points_before(views: list[View], rng: np.random.Generator) -> np.ndarray:
+    """(P, 3) along rays through the photos' pixels, as dense in each photo as in every other.
+
+    None stands right before a camera, where a few would hide all that it sees.
+    """
+    away, each = distance_of(views), -(-RANDOM_POINTS // len(views))
+    found = []
+    for view in views:
+        camera_from_world, fx, fy, cx, cy = view.pinhole()
+        x, y = rng.random((2, each)) * np.array(view.size)[:, None]
+        z = away / rng.uniform(1 / FARTHEST, 1 / NEAREST, each)
+        ray = np.stack([(x - cx) / fx * z, (y - cy) / fy * z, z, np.ones(each)])
+        found.append((np.linalg.inv(camera_from_world) @ ray)[:3].T)
+    points = np.concatenate(found)
+    free = np.ones(len(points), bool)
+    for view in views:
+        camera_from_world = view.pinhole()[0]
+        depth = points @ camera_from_world[2, :3] + camera_from_world[2, 3]
+        # A point of the view's own is as near as NEAREST but for rounding.
+        free &= ~(pixel_of(view, points)[1] & (depth < 0.999 * NEAREST * away))
+    return points[free]

@@ -30,7 +30,7 @@ def cloud_points(path: Path, capture: Capture, rng: np.random.Generator) -> tupl
         raise BadFile(f"{path}: holds no points, or some that are no numbers; export it again.")
     up = capture.notes.get("up_in_file", (0.0, 1.0, 0.0))
     turned = subsampled(points, rng) @ upright_rotation(up, str(path))[:3, :3].T
-    return turned, count
+    return turned - np.array(capture.origin), count
 
 
 def subsampled(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:

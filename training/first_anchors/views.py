@@ -4,6 +4,9 @@ import numpy as np
 
 from shapeshift.scene.pose import View
 
+AT_ONCE = 20  # near planes: as far away is what was photographed from one place
+SLACK = 1.5  # distances of samples by which those of one surface may lie behind each other
+
 
 def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(P, 2) pixels, row 0 on top, and (P,) whether the point lies in the image."""
@@ -18,10 +21,38 @@ def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return pixel, inside
 
 
+def seen_first(points: np.ndarray, edge: float, views: list[View]) -> np.ndarray:
+    """(P,) whether any view has nothing of a surface before a point of it.
+
+    points: samples of surfaces, metres, `edge` apart.
+    """
+    from scipy.ndimage import minimum_filter
+
+    seen = np.zeros(len(points), bool)
+    for view in views:
+        pixel, inside = pixel_of(view, points)
+        rows = np.flatnonzero(inside)
+        if not len(rows):
+            continue
+        camera_from_world, fx, _, _, _ = view.pinhole()
+        depth = points[rows] @ camera_from_world[2, :3] + camera_from_world[2, 3]
+        side = max(1.0, edge * fx / float(np.median(depth)))  # pixels between the samples
+        column, row = (pixel[rows] / side).astype(int).T
+        nearest = np.full([int(length / side) + 1 for length in view.size[::-1]], np.inf)
+        np.minimum.at(nearest, (row, column), depth)
+        nearest = minimum_filter(nearest, 3)  # a surface has no gaps between its samples
+        slack = SLACK * side / fx * depth  # metres: the samples', or a pixel where that is more
+        seen[rows] |= depth <= nearest[row, column] + slack
+    return seen
+
+
 def common_box(views: list[View]) -> tuple[np.ndarray, float]:
     """(centre (3,), half side) metres of the place that the cameras look at together."""
     eyes = np.array([v.world_from_eye.position for v in views])
     ahead = np.array([-v.world_from_eye.matrix()[:3, 2] for v in views])
+    tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
+    if least := least_distance(views):
+        return (eyes + least * ahead).mean(0), float(1.5 * least * min(tangent, 0.6))
     # nearest point to all viewing axes, least squares; nearly parallel axes are held near the eyes
     away = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
     spread = max(float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max()), 1e-3)
@@ -31,11 +62,20 @@ def common_box(views: list[View]) -> tuple[np.ndarray, float]:
         away.sum(0) + weight * np.eye(3), (away @ eyes[:, :, None]).sum(0)[:, 0] + weight * guess
     )
     distance = np.median(np.linalg.norm(eyes - centre, axis=1))
-    tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
     return centre, float(1.5 * distance * min(tangent, 0.6))
+
+
+def least_distance(views: list[View]) -> float:
+    """Metres to what photos show that were all taken from one place, and so do not say how far it
+    is; 0 where they were taken from several.
+    """
+    eyes, near = np.array([v.world_from_eye.position for v in views]), min(v.near for v in views)
+    spread = float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max())
+    return 0.0 if spread > near else AT_ONCE * near
 
 
 def distance_of(views: list[View]) -> float:
     """Median metres from the cameras to the place that they look at together."""
     eyes = np.array([view.world_from_eye.position for view in views])
-    return float(np.median(np.linalg.norm(eyes - common_box(views)[0], axis=1)))
+    distance = float(np.median(np.linalg.norm(eyes - common_box(views)[0], axis=1)))
+    return max(distance, least_distance(views))

@@ -173,9 +173,18 @@ def _attribute(part: Component, settings: TrainSettings, stops: tuple) -> TrainS
     return None if less.layout(UNITS).per_anchor == layout.per_anchor else less
 
 
+def _one_color(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    """One base colour an anchor in the place of one for each stop."""
+    layout = settings.layout(UNITS, len(stops))
+    if len(layout.color_groups) < 2:
+        return None
+    names = ("color" if name == "stop_color" else name for name in layout.attributes)
+    return replace(settings, anchor_attributes=",".join(dict.fromkeys(names)))
+
+
 REDUCE = {
     "fix": _fix, "view": _no_view, "hidden": _hidden, "features": _features,
-    "slot": _slot, "anchors": _anchors, "attribute": _attribute,
+    "slot": _slot, "anchors": _anchors, "attribute": _attribute, "one color": _one_color,
 }  # fmt: skip
 # What costs most to run comes first; the shape as a whole before its networks one by one.
 COMPONENTS = (
@@ -187,7 +196,8 @@ COMPONENTS = (
     Component("half of the features", "features", again=True),
     Component("anchors' own axes and sizes", "attribute", ("frame",)),
     Component("anchors' own light by direction", "attribute", ("light",)),
-    Component("anchors' own base colours", "attribute", ("color",)),
+    Component("a base colour for each stop", "one color"),
+    Component("anchors' own base colours", "attribute", ("color", "stop_color")),
     Component("one splat of every anchor", "slot", again=True),
     Component("a third of the anchors", "anchors", again=True),
 )

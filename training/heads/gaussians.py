@@ -48,8 +48,7 @@ class Activation:
         self.grad_raw = device.empty((count, self.layout.raw_at[-1]))
         self.grad_anchors = device.empty((count, 3))
         self.grad_attributes = {
-            name: device.empty((count, ATTRIBUTE_WIDTH[name]))
-            for name in self.layout.per_anchor[2:]
+            name: device.empty((count, ATTRIBUTE_WIDTH[name])) for name in self.layout.own
         }
 
     def attributes_of(self, rows: dict[str, Any]) -> tuple:
@@ -59,7 +58,7 @@ class Activation:
     def forward(self, raw, rows: dict[str, Any], eye: np.ndarray) -> Gaussians:
         """The splats seen from an eye (3,) in metres.
 
-        `rows`: of the optimiser's groups that have a row an anchor, those of the step.
+        `rows`: what the step's anchors have, a row each, with the base colours of its stop.
         """
         self.resize(len(rows["anchors"]))
         self.eye = [np.float32(v) for v in eye]

@@ -13,9 +13,15 @@ DIRECTION = 3
 CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients are summed apart
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
 RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
-# What anchors may have besides their features, and the optimiser's group of it.
-ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors", "light": "light"}
+# What anchors may have besides their features, and what the kernels call it: a base colour may be
+# one for all stops, or one for each of them.
+ANCHOR_ATTRIBUTES = {
+    "frame": "frames", "color": "colors", "stop_color": "colors", "light": "light",
+}  # fmt: skip
 ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3, "light": 8}  # numbers an anchor, see gaussians.cl
+# Stops that may have base colours of their own; of more, the colour network would get more hidden
+# units than the kernels of decoding take (rasterizer/decode): 12 a stop beside 32, and 2 for light.
+MOST_STOP_COLORS = 7
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
 
@@ -37,7 +43,8 @@ class HeadLayout:
     control: int = 16  # d of Psi
     fixed: tuple[str, ...] = ()  # heads that do not see Psi: what they give is shared by all stops
     view_dependent: bool = True  # whether colour sees the direction from the eye
-    attributes: tuple[str, ...] = ("frame", "color")  # of anchors, besides their features
+    attributes: tuple[str, ...] = ("frame", "stop_color")  # of anchors, besides their features
+    stops: int = 1  # how many a run has: base colours an anchor, with "stop_color"
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -50,10 +57,33 @@ class HeadLayout:
                 raise ValueError(f"Anchors have no attribute '{name}'; use {known}.")
 
     @property
+    def own(self) -> tuple[str, ...]:
+        """What anchors have besides places and features, as the kernels call it."""
+        names = (name for name in self.attributes if name != "light" or self.view_dependent)
+        return tuple(dict.fromkeys(ANCHOR_ATTRIBUTES[name] for name in names))
+
+    @property
+    def color_groups(self) -> tuple[str, ...]:
+        """The optimiser's groups of base colours: one, one a stop, or none.
+
+        Where the colour network sees no stop, its anchors show the same colour at all of them.
+        """
+        if "colors" not in self.own:
+            return ()
+        each = "stop_color" in self.attributes and "color" not in self.fixed
+        each = each and 1 < self.stops <= MOST_STOP_COLORS
+        return tuple(f"colors_{stop}" for stop in range(self.stops)) if each else ("colors",)
+
+    @property
+    def own_widths(self) -> dict[str, int]:
+        """How many numbers an anchor has in each of the optimiser's groups of what is its own."""
+        groups = ((n, self.color_groups if n == "colors" else (n,)) for n in self.own)
+        return {group: ATTRIBUTE_WIDTH[name] for name, found in groups for group in found}
+
+    @property
     def per_anchor(self) -> tuple[str, ...]:
         """The optimiser's groups that have a row for each anchor."""
-        own = (name for name in self.attributes if name != "light" or self.view_dependent)
-        return ("anchors", "features", *(ANCHOR_ATTRIBUTES[name] for name in own))
+        return ("anchors", "features", *self.own_widths)
 
     def parts_of(self, name: str) -> tuple[str, ...]:
         """What a head's network takes, in the order of the exported one (eq. 5)."""
@@ -91,9 +121,9 @@ class HeadLayout:
             "WEIGHTS": self.weights_at[-1], "MAX_OUT": max(padded(n) for n in self.outs),
             "VIEW_COLOR": self.view_dependent,
             "CONDITIONED": sum(1 << m for m, name in enumerate(HEADS) if name not in self.fixed),
-            "FRAMES": "frame" in self.attributes,
-            "BASE_COLORS": "color" in self.attributes,
-            "LIGHT": "light" in self.per_anchor,
+            "FRAMES": "frames" in self.own,
+            "BASE_COLORS": "colors" in self.own,
+            "LIGHT": "light" in self.own,
         }  # fmt: skip
         for m, out in enumerate(self.outs):
             numbers |= {
@@ -170,7 +200,7 @@ def initial_weights(layout: HeadLayout, rng: np.random.Generator) -> np.ndarray:
         "color": rng.uniform(-1, 1, 3 * k) / np.sqrt(layout.hidden),
     }
     gain = {"offset": 1.0, "scale": 0.5, "rotation": 0.5, "opacity": 0.5, "color": 1.0}
-    if "color" in layout.attributes:  # the base colours are known; the network adds to them
+    if "colors" in layout.own:  # the base colours are known; the network adds to them
         last_bias["color"], gain["color"] = np.zeros(3 * k), 0.3
     everything = replace(layout, fixed=(), view_dependent=True)
     networks = {}

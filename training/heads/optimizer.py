@@ -60,7 +60,7 @@ class Adam:
             group.rates = self.device.upload(np.asarray(rates[name], np.float32))
 
     def step(self, grads: dict[str, object], rate_scale: float, rows: dict | None = None) -> None:
-        """One update of every group by its gradient, at `rate_scale` times its rates.
+        """One update of every group that has a gradient, at `rate_scale` times its rates.
 
         rows: (R,) int32 on the device by group: of these groups, whose rate is one for all, only
         those rows take the step, and their gradients are all that `grads` has.
@@ -70,6 +70,8 @@ class Adam:
         first, second = correct
         scale = np.float32(rate_scale)
         for name, group in self.groups.items():
+            if name not in grads:
+                continue
             moments = group.value, group.mean, group.square
             chosen, pull = None if rows is None else rows.get(name), PULL.get(name, np.float32(0))
             if chosen is None:

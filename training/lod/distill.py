@@ -20,9 +20,8 @@ from shapeshift.runtime_models.rotation import normalize
 from shapeshift.scene.pose import View
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.settings import SHORT
+from shapeshift.training.settings import SHORT, parameter_rates
 from shapeshift.training.step import TrainingStep
-from shapeshift.training.train import parameter_rates
 from shapeshift.training.update.trainable import layout_of, packed_weights, rows_of, voxel_of
 
 BACKGROUNDS = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))  # in turns: what is absent must be so before both

@@ -105,7 +105,7 @@ class PhotoFiles:
             normals = floats.pop(0).view(np.int8).reshape(height, width, 4)
         photo, masked = self.photos[number], bool(flags & MASKED)
         return LoadedPhoto(
-            view.divided(self.reader.factor), photo.modality, rgba, weight, str(photo.path), depth,
+            view.divided(self.reader.factor), photo.modality, rgba, weight, photo.name, depth,
             masked, normals,
         )  # fmt: skip
 

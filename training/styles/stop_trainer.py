@@ -17,10 +17,10 @@ from shapeshift.training.export import ACTIVATION
 from shapeshift.training.heads.gaussians import SCALE_CLIP, Gaussians
 from shapeshift.training.heads.networks import HeadLayout, Layers, padded
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.settings import SHORT, check_numbers
+from shapeshift.training.settings import SHORT, check_numbers, parameter_rates
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.styles.source_outputs import SourceOutputs
-from shapeshift.training.train import FEATURE_SPREAD, parameter_rates
+from shapeshift.training.train import FEATURE_SPREAD
 
 KERNEL = Path(__file__).parents[1] / "kernels" / "new_stop.cl"
 BIAS_SPREAD = 0.2  # of the new units' first biases, either way
@@ -162,7 +162,8 @@ class StopStep(TrainingStep):
         """All splats of the new stop; `control` and `rows` have no meaning here."""
         adam = self.adam
         with self.timed("heads"):
-            self.gathered = {n: adam.gather(n, None) for n in self.layout.per_anchor}
+            self.groups = self.groups_at(control)
+            self.gathered = {n: adam.gather(g, None) for n, g in self.groups.items()}
             raw = self.heads.forward(
                 adam["weights"], adam["anchors"], adam["features"], np.zeros(1), eye
             )

@@ -21,9 +21,9 @@ from shapeshift.training.heads.networks import KERNELS
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.run import SETTLE
-from shapeshift.training.settings import TrainSettings
+from shapeshift.training.settings import TrainSettings, parameter_rates
 from shapeshift.training.step import TrainingStep
-from shapeshift.training.train import Trainer, parameter_rates
+from shapeshift.training.train import Trainer
 from shapeshift.training.update.regions import UpdateRegion
 from shapeshift.training.update.trainable import layout_of, packed_weights, rows_of, voxel_of
 

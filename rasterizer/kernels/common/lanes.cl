@@ -78,7 +78,7 @@ inline floatn4 four_of(float4 v) {
 inline floatn3 load_threes(__global const float* array, int first, int n) {
   floatn3 v;
   if (n == WIDTH)
-    LOAD_THREES(v, array + (size_t)3 * first)
+    LOAD_THREES(v, , array + (size_t)3 * first)
   else
     v = make3(load_column(array, 3, 0, first, n), load_column(array, 3, 1, first, n),
               load_column(array, 3, 2, first, n));

@@ -16,7 +16,7 @@
 #define BOUNDS_COLUMN(bounds) ((int)((bounds).x & 0xfff))
 #define BOUNDS_ROW(bounds) ((int)((bounds).x >> 12 & 0xfff))
 
-// Bounds of one splat; tile_bounds_of_eight.cl does the same for eight.
+// Bounds of one splat; tile_bounds_of_lanes.cl does the same for vectors.
 inline uint2 tile_bounds_of(const float* s, int tiles_x, int tiles_y) {
   const float x = s[MEAN_X], y = s[MEAN_Y], ex = s[EXTENT_X], ey = s[EXTENT_Y];
   if (!(ex > 0)) return (uint2)(0);

@@ -165,9 +165,11 @@ inline floatn light_along(__global const float* light, const floatn* d) {
   return sum;
 }
 
-// Outputs of a head out of its units first to end of those that are awake.
-inline void second_layer(Head head, int first, int end, const int* live, const floatn* unit,
-                         __global const float* weights, floatn* out) {
+// Outputs of a head out of its units first to end of those that are awake.  A call, not four copies
+// of a head's worth of code: 0.15 s less to compile, and no slower.
+__attribute__((noinline)) void second_layer(Head head, int first, int end, const int* live,
+                                            const floatn* unit, __global const float* weights,
+                                            floatn* out) {
   // b2, one a tile's output.
   __global const float* biases = weights + head.last_at;
   // TILE weights a tile and unit, side by side; units count from the first of all heads.

@@ -25,6 +25,7 @@ def test_the_bundled_package_is_small_whole_and_of_these_stops():
     assert model.stops == STOPS
     settings = model.provenance["settings"]
     assert settings["max_anchors"] == demo.MOST_ANCHORS
+    assert settings["anchor_attributes"] == demo.ATTRIBUTES
     assert settings["blended_shapes"] == demo.BLENDED_SHAPES and model.encoding.d == len(STOPS)
     assert model.provenance["iterations"] == settings["iterations"] == demo.ITERATIONS
     alive = []

@@ -168,7 +168,8 @@ def test_python_trains_blocks_to_the_bytes_of_the_command(capture, tmp_path, cap
     with pytest.raises(KeyboardInterrupt):
         ss.train(capture, tmp_path / "a.blocks", **lengths, **how)
     assert not (tmp_path / "a.blocks").exists()
-    scene = ss.train(capture, tmp_path / "a.blocks", **lengths, **how)
+    shared = {"cluster": "local:2"} if importlib.util.find_spec("distributed") else {}
+    scene = ss.train(capture, tmp_path / "a.blocks", **lengths, **how, **shared)
     assert capfd.readouterr() == ("", "")
     assert scene.steps == 30 + 2 * 60 and scene.seconds > scene.start_seconds > 0
     assert scene.anchors == len(scene.model.anchors) and set(scene.psnr_db) == {"RGB", "Thermal"}

@@ -1,4 +1,6 @@
-"""The first frame between a stop and a thermal one compiles nothing: that was done at opening."""
+"""The first frame between a stop and a thermal one compiles nothing: the second frame did, and the
+first one, which somebody waits for, did not.
+"""
 
 import os
 import subprocess
@@ -9,8 +11,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 # Prints, for few splats and for many, the programs that the driver has compiled (the files of its
-# cache) and those that we have asked for: after a frame at a stop, and after the first one with
-# heat.  PoCL has a binary of its own for more than 65,535 items.
+# cache) and those that we have asked for: after one and two frames at a stop, and after the first
+# one with heat.  PoCL has a binary of its own for more than 65,535 items.
 FRAMES = """
 import sys
 from pathlib import Path
@@ -25,7 +27,7 @@ with Renderer(None, "tiles") as renderer:
     for count in (60, 22_000):  # times 3 splats
         opened = model(count)
         counts = []
-        for x in (0.0, 0.2):
+        for x in (0.0, 0.0, 0.2):
             renderer.update(scene_of(opened, x=x))
             renderer.draw([VIEW])
             counts.append(compiled())
@@ -52,6 +54,8 @@ def test_the_first_frame_with_heat_compiles_nothing(tmp_path):
     rows = [line.replace("(", "").replace(")", "") for line in done.stdout.splitlines()]
     numbers = [[int(n) for n in row.replace(",", " ").split()] for row in rows]
     assert len(numbers) == 2
-    for before_files, before_programs, after_files, after_programs in numbers:
-        assert before_files > 0, "the driver has kept nothing: the test sees no compilation"
-        assert (after_files, after_programs) == (before_files, before_programs)
+    for first_files, _, *second, after_files, after_programs in numbers:
+        assert first_files > 0, "the driver has kept nothing: the test sees no compilation"
+        assert [after_files, after_programs] == second
+        assert second[0] > first_files
+    assert numbers[0][3] == numbers[0][1] + 2, "programs of heat, and of drawing with it"

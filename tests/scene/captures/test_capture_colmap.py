@@ -112,3 +112,44 @@ def test_colmap_lacks_a_table_or_an_image(tmp_path):
     (tmp_path / "sparse/0/cameras.bin").unlink()
     with pytest.raises(BadFile, match=r"cameras\.bin is missing"):
         read_capture(tmp_path)
+
+
+def test_a_model_without_points_and_with_smaller_photos_is_read(tmp_path):
+    colmap_model(tmp_path, False)
+    (tmp_path / "sparse/0/points3D.bin").unlink()
+    (tmp_path / "images").rename(tmp_path / "images_4")
+    capture = read_capture(tmp_path)
+    assert capture.points is None
+    assert len(capture.photos) == 7
+    assert any("points3D.bin are not there" in said for said in capture.doubts)
+
+
+def test_the_folders_of_phototourism(tmp_path):
+    colmap_model(tmp_path, False)
+    before = read_capture(tmp_path)
+    (tmp_path / "dense").mkdir()
+    (tmp_path / "sparse/0").rename(tmp_path / "dense/sparse")
+    (tmp_path / "images").rename(tmp_path / "dense/images")
+    (tmp_path / "sparse").rmdir()
+    after = read_capture(tmp_path)
+    for one, other in zip(before.photos, after.photos, strict=True):
+        assert np.array_equal(one.view.eye_from_world(), other.view.eye_from_world())
+    assert np.array_equal(after.points, before.points)
+
+
+def test_lists_of_photos_to_train_on_and_to_hold_out(tmp_path):
+    colmap_model(tmp_path, False)
+    names = [
+        p.path.relative_to(tmp_path / "images").as_posix() for p in read_capture(tmp_path).photos
+    ]
+    (tmp_path / "train_list.txt").write_text("\n".join(names[1:3] + names[4:6]) + "\n")
+    (tmp_path / "test_list.txt").write_text(f"{names[0]}\r\n{names[6]}")
+    used = {p.path.relative_to(tmp_path / "images").as_posix(): p.split
+            for p in read_capture(tmp_path).photos}  # fmt: skip
+    assert used == dict.fromkeys(names[1:3] + names[4:6], "train") | dict.fromkeys(
+        (names[0], names[6]), "test"
+    ), "what is in no list is not used"
+    (tmp_path / "train_list.txt").write_text("elsewhere.png")
+    (tmp_path / "test_list.txt").unlink()
+    with pytest.raises(BadFile, match="name none of its photos"):
+        read_capture(tmp_path)

@@ -30,8 +30,10 @@ def singular_pose(frames, more):
     return "no rotation"
 
 
-def scaled_pose(frames, more):
-    frames[0]["transform_matrix"] = (np.array(frames[0]["transform_matrix"]) * 1.1).tolist()
+def sheared_pose(frames, more):
+    pose = np.array(frames[0]["transform_matrix"])
+    pose[:3, 0] *= 1.1
+    frames[0]["transform_matrix"] = pose.tolist()
     return "no rotation"
 
 
@@ -97,9 +99,25 @@ def bent_k4(frames, more):
     return "only fisheye lenses"
 
 
-def panorama(frames, more):
-    more["camera_model"] = "EQUIRECTANGULAR"
+def stereo_panorama(frames, more):
+    more["camera_model"] = "OMNIDIRECTIONALSTEREO_L"
     return "which no pinhole"
+
+
+def part_of_a_panorama(frames, more):
+    more["camera_model"] = "EQUIRECTANGULAR"
+    return "twice as wide as high"
+
+
+def few_distortion_params(frames, more):
+    more["distortion_params"] = [0.1, 0.2]
+    return "'distortion_params' is .*a list of 6"
+
+
+def degrees_over_180(frames, more):
+    del more["fl_x"]
+    more["x_fov"] = 190
+    return "degrees between 0 and 180"
 
 
 def half_a_pixel(frames, more):
@@ -182,9 +200,10 @@ def missing_points(frames, more):
 
 
 @pytest.mark.parametrize("change", [spoil(c) for c in (
-    no_poses, nan_pose, singular_pose, scaled_pose, mirrored_pose, ragged_pose, small_pose,
+    no_poses, nan_pose, singular_pose, sheared_pose, mirrored_pose, ragged_pose, small_pose,
     wrong_size, missing_images, nameless_frame, empty, no_focal, negative_focal, nan_focal,
-    folded_lens, bent_k4, panorama, half_a_pixel, odd_list, list_of_others, empty_modality,
+    folded_lens, bent_k4, stereo_panorama, part_of_a_panorama, few_distortion_params,
+    degrees_over_180, half_a_pixel, odd_list, list_of_others, empty_modality,
     unknown_modality, only_tests, odd_split, stop_outside, twin_stops, odd_kind, upside_range,
     newer_version, no_up, odd_background, missing_points,
 )])  # fmt: skip

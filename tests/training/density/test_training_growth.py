@@ -15,6 +15,7 @@ from shapeshift.training.density.densify import (
     NewAnchors,
     absent_as_nan,
     densify_and_prune,
+    largest_gradient,
     least_contributing,
     mean_contribution,
     new_anchors,
@@ -53,7 +54,7 @@ def test_what_a_splat_gives_equals_the_float64_reference(device):
     assert not first.any() and weights.max() > 1
     wanted = weights.reshape(-1, LAYOUT.splats).sum(1)
     np.testing.assert_allclose(second[:, 0], wanted, rtol=1e-4, atol=1e-5)
-    views = stats.state()["densify.grad2d"][:, 1].reshape(-1, LAYOUT.splats)
+    views = stats.state()["densify.grad2d"][..., 1].sum(0).reshape(-1, LAYOUT.splats)
     np.testing.assert_array_equal(second[:, 1], views.max(1))
 
 
@@ -73,7 +74,8 @@ def test_sums_over_the_steps(device, some):
     """All anchors, or another choice of them every step."""
     layout, anchors = HeadLayout(splats=3), 17
     stats = DensificationStats(device, layout, anchors, 2)
-    grad2d, opacity, contribution = np.zeros((17, 3, 2)), np.zeros((17, 2)), np.zeros((2, 17, 2))
+    grad2d, opacity = np.zeros((2, 17, 3, 2)), np.zeros((17, 2))
+    contribution = np.zeros((2, 17, 2))
     for turn in range(4):
         rng = RNG(turn)
         rows = np.sort(rng.choice(17, 9, replace=False)) if some else np.arange(17)
@@ -85,14 +87,15 @@ def test_sums_over_the_steps(device, some):
         stats.add(*map(device.upload, (record, grad, alpha)), (40, 30), asked)
         on = (record[:, 9] > 0).reshape(-1, 3)
         screen = np.hypot(grad[:, 9], grad[:, 10]).reshape(-1, 3) * 20
-        grad2d[rows] += np.stack([np.where(on, screen, 0), on], axis=-1)
+        grad2d[turn % 2, rows] += np.stack([np.where(on, screen, 0), on], axis=-1)
         opacity[rows] += np.stack(
             [np.maximum(alpha, 0).reshape(-1, 3).sum(1), np.ones(len(rows))], axis=-1
         )
         gives = np.where(on, grad[:, 11].reshape(-1, 3), 0).sum(1)
         contribution[turn % 2, rows] += np.stack([gives, on.any(1)], axis=-1)
     state = stats.state()
-    np.testing.assert_allclose(state["densify.grad2d"], grad2d.reshape(-1, 2), rtol=1e-5, atol=1e-5)
+    wanted = grad2d.reshape(2, -1, 2)
+    np.testing.assert_allclose(state["densify.grad2d"], wanted, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(state["densify.opacity"], opacity, rtol=1e-5)
     np.testing.assert_allclose(state["densify.contribution"], contribution, rtol=1e-4, atol=1e-5)
     assert state["densify.steps"] == 4
@@ -103,8 +106,19 @@ def test_sums_over_the_steps(device, some):
 
 
 def grad2d_of(*strengths: float, views: int = 30) -> np.ndarray:
-    """(N, 2) of DensificationStats; strengths in thresholds."""
-    return np.array([[views * GRAD2D_THRESHOLD * s, views] for s in strengths])
+    """(1, N, 2) of DensificationStats; strengths in thresholds."""
+    return np.array([[[views * GRAD2D_THRESHOLD * s, views] for s in strengths]])
+
+
+def test_a_splat_pulls_as_hard_as_at_the_stop_that_asks_most():
+    views = np.array([[30, 30], [7, 4], [11, 0], [10, 0], [5, 5], [1, 10], [0, 0], [4, 7]]).T
+    means = np.array([[1, 3], [4, 2], [2, 9], [2, 9], [2, 2], [5, 2], [7, 7], [5, 2]]).T
+    found = largest_gradient(np.stack([views * means, views], axis=-1).astype(np.float32))
+    # Four views of five that a stop needs: four fifths of the mean.  Ten in all are too few.
+    np.testing.assert_allclose(found, [3, 4, 2, 0, 0, 2, 0, 4])
+    alone = RNG(0).uniform(0, 40, (1, 50, 2)).astype(np.float32)
+    mean = np.where(alone[0, :, 1] > 10, alone[0, :, 0] / alone[0, :, 1], 0)
+    np.testing.assert_array_equal(largest_gradient(alone), mean)  # of one stop: the mean
 
 
 def test_new_anchors_stand_free_under_the_splats_that_pull():

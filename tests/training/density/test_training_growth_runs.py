@@ -12,6 +12,8 @@ import pytest
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.training.first_anchors.first_anchors import base_colors
+from shapeshift.training.losses.min_opacity import SHARE
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import SETTLE, Trainer
@@ -23,7 +25,8 @@ WAYS = {
     "to the cap": {},
     "at the cap": {"max_anchors": FIRST},
     "no attributes": {"anchor_attributes": ""},
-    "with light": {"anchor_attributes": "frame,color,light"},
+    "with light": {"anchor_attributes": "frame,stop_color,light"},
+    "one base colour": {"anchor_attributes": "frame,color"},
 }
 
 
@@ -55,6 +58,26 @@ def test_a_way_to_grow_gives_the_same_bits_whole_and_resumed(device, balls, way,
     untrained = Trainer(device, balls, settings).held_out_psnr(9)
     for name, psnr in whole.held_out_psnr(9).items():
         assert psnr > untrained[name] + 5, name
+
+
+def test_first_base_colours_of_a_stop_are_those_of_its_photos(device, balls):
+    trainer = Trainer(device, balls, BASE)
+    anchors = device.download(trainer.adam["anchors"])
+    groups = trainer.layout.color_groups
+    assert len(groups) == 2 and "colors" not in trainer.adam.groups
+    for group, stop in zip(groups, trainer.stops, strict=True):
+        mine = [photo for photo in trainer.photos.train if photo.modality == stop.name]
+        wanted = base_colors(anchors, mine, trainer.schedule.background)
+        np.testing.assert_array_equal(device.download(trainer.adam[group]), wanted)
+        assert np.ptp(wanted, axis=0).min() > 1  # the balls are no grey fog
+
+
+def test_a_run_of_two_stops_ends_the_loss_of_faint_splats(device, balls, monkeypatch):
+    trainer, shares = Trainer(device, balls, replace(BASE, iterations=20, max_anchors=100)), []
+    gradients = trainer.step.gradients
+    monkeypatch.setattr(trainer.step, "gradients", lambda *a: shares.append(a[-1]) or gradients(*a))
+    run(trainer)
+    assert shares[-20:] == [SHARE] * 7 + [0.0] * 13  # before them kernels are compiled
 
 
 def test_nothing_changes_within_the_steps_that_a_picture_needs_to_settle(device, balls):

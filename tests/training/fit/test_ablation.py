@@ -110,6 +110,14 @@ def test_settings_without_each_part():
     assert found["anchors' own axes and sizes"].anchor_attributes == "color,light"
     assert found["anchors' own base colours"].anchor_attributes == "frame,light"
     assert found["anchors' own light by direction"].anchor_attributes == "frame,color"
+    each = BY_NAME["a base colour for each stop"]
+    assert each.without(settings, STOPS) is None
+    more = TrainSettings(anchor_attributes="frame,stop_color,light")
+    assert each.without(more, STOPS).anchor_attributes == "frame,color,light"
+    assert each.without(more, STOPS[:1]) is None
+    assert BY_NAME["anchors' own base colours"].without(more, STOPS).anchor_attributes == (
+        "frame,light"
+    )
     for none in ({}, {"view_dependent": False, "anchor_attributes": "frame,light"}):
         usual = TrainSettings(**none)  # blind colours have no light, so nothing is taken away
         assert BY_NAME["anchors' own light by direction"].without(usual, STOPS) is None

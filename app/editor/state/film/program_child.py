@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import IO
 
@@ -103,3 +104,50 @@ class ProgramChild:
             return ""
         before = f"shapeshift {self._name}: "
         return self.said.removeprefix(before) or f"{self._name} ended with code {self.code}."
+
+
+class ChildWork(ABC):
+    """Work of the window that one command at a time does."""
+
+    def __init__(self) -> None:
+        self._child: ProgramChild | None = None
+
+    @property
+    def running(self) -> bool:
+        return self._child is not None
+
+    @property
+    def progress(self) -> tuple[str, float]:
+        """What is being done, part done."""
+        return self._child.progress if self._child else ("", 0.0)
+
+    def cancel(self) -> None:
+        """Ends it; what the command keeps of it stays."""
+        if self._child is not None:
+            self._child.cancel()
+
+    def poll(self) -> bool:
+        """Once a frame: says how it ended; True while it is under way."""
+        child = self._child
+        if child is None or child.code is None:
+            return child is not None
+        self._child = None
+        if child.cancelled:
+            self.say_left()
+        elif problem := child.problem():
+            self.say_failed(problem)
+        else:
+            self.show(child)
+        return True
+
+    @abstractmethod
+    def say_left(self) -> None:
+        """That it was cancelled."""
+
+    @abstractmethod
+    def say_failed(self, why: object) -> None:
+        """A sentence of the command, or of why it could not be started."""
+
+    @abstractmethod
+    def show(self, child: ProgramChild) -> None:
+        """What was made."""

@@ -5,7 +5,7 @@ from pathlib import Path
 from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.saving import unsaved
-from shapeshift.app.editor.state.film.program_child import ProgramChild
+from shapeshift.app.editor.state.film.program_child import ChildWork, ProgramChild
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
@@ -14,23 +14,14 @@ from shapeshift.scene.film.film_file import ENDING, write_film_file
 VIDEOS = (".mp4", ".webm", ".webp", ".gif")
 
 
-class Rendering:
+class Rendering(ChildWork):
     """The choices, and the one film that may be under way."""
 
     def __init__(self, state: EditorState, folder: Path) -> None:
+        super().__init__()
         self._state, self._folder = state, folder
         self.ending = VIDEOS[0]
-        self._child: ProgramChild | None = None
         self._path = Path()
-
-    @property
-    def running(self) -> bool:
-        return self._child is not None
-
-    @property
-    def progress(self) -> tuple[str, float]:
-        """What is being done, part done."""
-        return self._child.progress if self._child else ("", 0.0)
 
     def status(self) -> str:
         """Words for the status line; "" when nothing is under way."""
@@ -38,12 +29,10 @@ class Rendering:
 
     def start(self) -> None:
         """Begins to draw; what is moved meanwhile does not show in the film."""
-        state = self._state
         try:
-            words = self._words()
-            self._child = ProgramChild(words)
+            self._child = ProgramChild(self._words())
         except (OSError, UsageError) as error:
-            state.problem = said("There is no film: {error}", error=error)
+            self.say_failed(error)
 
     def _words(self) -> list[str]:
         """The command.  Raises UsageError, OSError."""
@@ -74,25 +63,15 @@ class Rendering:
         else:
             state.say(said("Kept in {path}", path=path))
 
-    def cancel(self) -> None:
-        """Ends it; the frames that are drawn stay."""
-        if self._child is not None:
-            self._child.cancel()
+    def say_left(self) -> None:
+        folder = frames_of(self._path)
+        self._state.say(said("The film was left; its frames are in {folder}", folder=folder))
 
-    def poll(self) -> bool:
-        """Once a frame: says how it ended; True while it is under way."""
-        child = self._child
-        if child is None or child.code is None:
-            return child is not None
-        self._child = None
-        if child.cancelled:
-            folder = frames_of(self._path)
-            self._state.say(said("The film was left; its frames are in {folder}", folder=folder))
-        elif problem := child.problem():
-            self._state.problem = said("There is no film: {error}", error=problem)
-        else:
-            self._state.say(child.said, seconds=8)
-        return True
+    def say_failed(self, why: object) -> None:
+        self._state.problem = said("There is no film: {error}", error=why)
+
+    def show(self, child: ProgramChild) -> None:
+        self._state.say(child.said, seconds=8)
 
 
 def scene_on_disk(state: EditorState) -> tuple[Path, list[str]]:

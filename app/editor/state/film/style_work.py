@@ -12,7 +12,7 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import key_of
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.files.saving import unsaved
-from shapeshift.app.editor.state.film.program_child import ProgramChild
+from shapeshift.app.editor.state.film.program_child import ChildWork, ProgramChild
 from shapeshift.app.editor.state.film.rendering import free_name
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
@@ -26,7 +26,7 @@ _SHAPES = typing.get_args(typing.get_type_hints(Options)["shape"])
 SHAPES: tuple[str, ...] = tuple(shape for shape in _SHAPES if shape)
 
 
-class StyleWork:
+class StyleWork(ChildWork):
     """The choices, and the one style that may be under way; a new file each, never the old one."""
 
     def __init__(
@@ -36,21 +36,12 @@ class StyleWork:
 
         Without it, and in a scene of several objects, the object gets the new package in its place.
         """
+        super().__init__()
         self._state, self._folder, self._open_file = state, folder, open_file
         self._object, self._stop = "", ""  # whose package it is, and the stop that it shall show
         self.shape = SHAPES[0]
         self.strength = 1.0
-        self._child: ProgramChild | None = None
         self._path = Path()
-
-    @property
-    def running(self) -> bool:
-        return self._child is not None
-
-    @property
-    def progress(self) -> tuple[str, float]:
-        """What is being done, part done."""
-        return self._child.progress if self._child else ("", 0.0)
 
     def status(self) -> str:
         """Words for the status line; "" when nothing is under way."""
@@ -86,28 +77,15 @@ class StyleWork:
             command = ["style", str(source.path), "--out", str(self._path), *words]
             self._child = ProgramChild(command)
         except (OSError, UsageError) as error:
-            state.problem = said("There is no new style: {error}", error=error)
+            self.say_failed(error)
 
-    def cancel(self) -> None:
-        """Ends it; nothing is left of it."""
-        if self._child is not None:
-            self._child.cancel()
+    def say_left(self) -> None:
+        self._state.say(said("The style was left; nothing was written."))
 
-    def poll(self) -> bool:
-        """Once a frame: shows what is there now; True while it is under way."""
-        child = self._child
-        if child is None or child.code is None:
-            return child is not None
-        self._child = None
-        if child.cancelled:
-            self._state.say(said("The style was left; nothing was written."))
-        elif problem := child.problem():
-            self._state.problem = said("There is no new style: {error}", error=problem)
-        else:
-            self._show()
-        return True
+    def say_failed(self, why: object) -> None:
+        self._state.problem = said("There is no new style: {error}", error=why)
 
-    def _show(self) -> None:
+    def show(self, child: ProgramChild) -> None:
         """What was made, in place of what it was made of."""
         state = self._state
         alone = state.edited.path is None and len(state.scene.objects) == 1

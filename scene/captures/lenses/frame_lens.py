@@ -1,0 +1,96 @@
+"""The lens of a frame in transforms.json, in the words of nerfstudio, instant-ngp and Blender."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from shapeshift.runtime_models.files.json_fields import Fields
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.capture_photos import image_size
+from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
+from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
+
+NUMBERS = ("fl_x", "fl_y", "x_fov", "y_fov", "camera_angle_x", "camera_angle_y", "cx", "cy",
+           "k1", "k2", "k3", "k4", "p1", "p2", "w", "h")  # fmt: skip
+BENDS = ("k1", "k2", "k3", "k4", "p1", "p2")  # nerfstudio's order in 'distortion_params'
+ARIA = 12  # numbers of FISHEYE624: k0 to k5, p0, p1, s0 to s3
+NO_PINHOLES = ("OMNIDIRECTIONAL", "VR180", "ORTHOPHOTO")
+
+
+def lens_of(entry: Mapping, path: Path, where: str) -> ColmapCamera:
+    """The lens as the file states it, of the size that it states, else of the photo's.
+
+    Of a panorama one whose focal length is that of its middle.  Raises BadFile.
+    """
+    fields = Fields(entry, where)
+    for key in NUMBERS:
+        fields.number(key, 0.0, low=-LARGEST_NUMBER, high=LARGEST_NUMBER)
+    if "w" in entry and "h" in entry:
+        width, height = size = int(entry["w"]), int(entry["h"])
+        if not (width >= 1 and height >= 1 and size == (entry["w"], entry["h"])):
+            raise BadFile(f"{where}: 'w' and 'h' are {entry['w']:g} and {entry['h']:g}, not pixels")
+    else:
+        width, height = size = image_size(path, None)
+    model = str(entry.get("camera_model", "")).upper()
+    if any(name in model for name in NO_PINHOLES):
+        raise BadFile(f"{where} is of camera model {model:.40}, which no pinhole can stand for")
+    if "EQUIRECTANGULAR" in model:
+        if not abs(width - 2 * height) <= 1:
+            raise BadFile(
+                f"{where} is a panorama of {width}x{height} pixels; whole ones, twice as wide as "
+                "high, are read"
+            )
+        focal = width / (2 * math.pi)
+        return ColmapCamera(PANORAMA, size, (focal, focal, width / 2, height / 2))
+    fx, fy = focal_lengths(entry, size, where)
+    pinhole = (fx, fy, float(entry.get("cx", width / 2)), float(entry.get("cy", height / 2)))
+    return bent_lens(model, size, pinhole, fields)
+
+
+def bent_lens(
+    model: str, size: tuple[int, int], pinhole: tuple[float, ...], fields: Fields
+) -> ColmapCamera:
+    """The lens with its distortion: numbers of their own, or nerfstudio's list of them."""
+    entry, where = fields.data, fields.where
+    if "FISHEYE624" in model:
+        numbers = fields.numbers("distortion_params", ARIA)
+        return ColmapCamera("RAD_TAN_THIN_PRISM_FISHEYE", size, (*pinhole, *numbers))
+    each = tuple(float(entry.get(key, 0)) for key in BENDS)
+    if fields.has("distortion_params"):
+        each = fields.numbers("distortion_params", len(BENDS))
+    k1, k2, k3, k4, p1, p2 = each
+    if "FISHEYE" in model or entry.get("is_fisheye") is True:
+        return ColmapCamera("OPENCV_FISHEYE", size, (*pinhole, k1, k2, k3, k4))
+    if k4:
+        raise BadFile(
+            f'{where} has k4 = {k4:g}, which only fisheye lenses have: "camera_model": '
+            '"OPENCV_FISHEYE" says that it is one'
+        )
+    return ColmapCamera("FULL_OPENCV", size, (*pinhole, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0))
+
+
+def focal_lengths(entry: Mapping, size: tuple[int, int], where: str) -> tuple[float, float]:
+    """Pixels across and down, of focal lengths or of angles of view; one stands for both."""
+    across = focal_of(entry, ("fl_x", "x_fov", "camera_angle_x"), size[0], where)
+    if across is None:
+        raise BadFile(f"{where} has no focal length; give 'fl_x' in pixels or 'camera_angle_x'")
+    # An angle of view down beside a focal length across is not looked at: instant-ngp writes both,
+    # and rounds the angle.
+    keys = ("fl_y",) if "fl_x" in entry else ("fl_y", "y_fov", "camera_angle_y")
+    down = focal_of(entry, keys, size[1], where)
+    return across, across if down is None else down
+
+
+def focal_of(entry: Mapping, keys: tuple[str, ...], side: int, where: str) -> float | None:
+    """Pixels of focal length by the first of `keys` that there is; `side`: pixels of the angles."""
+    key = next((key for key in keys if key in entry), None)
+    if key is None:
+        return None
+    if key.startswith("fl_"):
+        return float(entry[key])
+    degrees = key.endswith("_fov")
+    angle = math.radians(entry[key]) if degrees else entry[key]
+    if not 0 < angle < math.pi:
+        wanted = "degrees between 0 and 180" if degrees else "radians between 0 and pi"
+        raise BadFile(f"{where}: '{key}' is {entry[key]:g}; {wanted} are wanted")
+    return side / 2 / math.tan(angle / 2)

@@ -1,0 +1,118 @@
+"""Captures that nothing was tuned on: anchors beside plain splats, with the defaults alone.
+
+    python3 tools/training/first_anchors/strangers.py --out docs/bench/strangers.csv \
+        [--seconds 20] [--kinds room aerial ...] [--seeds 0] [--models anchors splats]
+
+Kinds are those of training/synthetic/strangers.py, each another place for another seed, made on the
+spot and read as a stranger's files are.  Both models have the same processor seconds of one core
+and start from what the program itself finds.  psnr_db: of all held-out photos; worst_db: of the
+worst of them; start_s: processor seconds until the first step, which --seconds counts.
+"""
+
+import argparse
+import csv
+import shlex
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parents[2]), str(HERE.parent)]
+
+from bare import processor_s  # noqa: E402
+
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.runtime_models.model import BadFile  # noqa: E402
+from shapeshift.scene.captures.capture import Capture  # noqa: E402
+from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
+from shapeshift.scene.pose import View  # noqa: E402
+from shapeshift.training.baselines.plain import PlainTrainer  # noqa: E402
+from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
+from shapeshift.training.photos import BLACK  # noqa: E402
+from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.synthetic.strangers import KINDS, make_stranger  # noqa: E402
+from shapeshift.training.train import Trainer  # noqa: E402
+
+COLUMNS = (
+    "capture", "seed", "model", "psnr_db", "worst_db", "seconds", "steps", "start_s", "count",
+    "origin", "said",
+)  # fmt: skip
+MODELS = {"anchors": (Trainer, TrainSettings), "splats": (PlainTrainer, PlainSettings)}
+
+
+def trained(device, capture: Capture, model: str, options: argparse.Namespace, seed: int) -> dict:
+    make, settings = MODELS[model]
+    before = processor_s()
+    run = make(device, capture, settings(iterations=None, seconds=options.seconds, seed=seed))
+    start_s = processor_s() - before
+    for _ in run.steps():
+        pass
+    background = run.schedule.background or BLACK
+    each = [run.psnr_of(draw(run, photo.view), photo, background) for photo in run.held_out]
+    if options.pictures:
+        save_pictures(run, options.pictures / f"{capture.folder.name}_{seed}_{model}.png")
+    return {
+        "psnr_db": f"{sum(each) / len(each):.2f}", "worst_db": f"{min(each):.2f}",
+        "seconds": f"{run.elapsed:.1f}", "steps": run.iteration, "start_s": f"{start_s:.1f}",
+        "count": len(run.adam[run.param_group]), "origin": run.origin,
+        "said": " ".join(run.warnings).replace(str(capture.folder), capture.folder.name),
+    }  # fmt: skip
+
+
+def draw(run, view: View):
+    """What a run shows from there, over the background that it knows."""
+    background = run.schedule.background or BLACK
+    if isinstance(run, PlainTrainer):
+        return run.step.draw(view, background)
+    return run.step.draw(view, run.control(run.stops[0].name), background)
+
+
+def save_pictures(run, path: Path) -> None:
+    """Up to six held-out photos, and below them what the run draws."""
+    columns, background = [], run.schedule.background or BLACK
+    for photo in run.held_out[:6]:
+        drawn = run.device.download(draw(run, photo.view).frame.image).transpose(1, 2, 0)
+        columns.append(np.concatenate([photo.over(background), drawn]))
+    sheet = np.rint(255 * np.clip(np.concatenate(columns, axis=1), 0, 1)).astype(np.uint8)
+    Image.fromarray(sheet).save(path)
+
+
+def asked() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--models", nargs="+", choices=list(MODELS), default=list(MODELS))
+    parser.add_argument("--pictures", type=Path, help="a folder for photos beside drawings")
+    return parser.parse_args()
+
+
+def main() -> None:
+    options, device = asked(), open_device("cpu")
+    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
+        file.write(
+            f"# python3 tools/training/first_anchors/strangers.py {shlex.join(sys.argv[1:])}\n"
+        )
+        file.write(f"# {device.name}, {device.platform}\n")
+        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
+        rows.writeheader()
+        for kind in options.kinds:
+            for seed in options.seeds:
+                there = Path(folder) / str(seed) / kind
+                there.mkdir(parents=True)
+                make_stranger(there, kind, seed)
+                for model in options.models:
+                    try:
+                        found = trained(device, read_capture(there), model, options, seed)
+                    except BadFile as why:
+                        found = {"said": str(why).replace(str(there), kind)}
+                    rows.writerow({"capture": kind, "seed": seed, "model": model} | found)
+                    file.flush()
+
+
+if __name__ == "__main__":
+    main()
