@@ -169,10 +169,11 @@ def coarse_task(options: Options, work: Path) -> Task:
     asked.pop("iterations", None)
     if options.coarse_iterations is not None:
         asked["iterations"] = options.coarse_iterations
-    reads = [capture]
-    if "points" in asked and Path(asked["points"]).is_file():
-        asked["points"] = str(Path(asked["points"]).absolute())
-        reads.append(asked["points"])
+    reads, points = [capture], str(asked.get("points", ""))
+    if points and Path(points).is_file():
+        points = str(Path(points).absolute())
+        asked["points"] = points
+        reads.append(points)
     calibrate = ["--calibrate", options.calibrate] if options.calibrate else []
     argv = ["train", capture, "--out", str(out), *words_of(asked), *calibrate]
     return task_of(
