@@ -167,9 +167,8 @@ def run(options: Options) -> int:
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
         renderer.streaming.reads = not options.draft
-        background = backdrop or document.background
         renderer.settings = replace(
-            settings, target=renderer.settings.target, background=background
+            settings, target=renderer.settings.target, background=backdrop or document.background
         )
         if budget:
             drawn = ChartSubject(subjects[0], None, views[0].size, 1 + (options.stereo > 0))
