@@ -161,6 +161,7 @@ def follow(
 ) -> str:
     """Its last line that is no progress, once it has ended; all are heard in this thread."""
     lines: queue.SimpleQueue[str] = queue.SimpleQueue()  # "" is the end
+    last = ""
 
     def read() -> None:
         assert child.stderr is not None
@@ -180,7 +181,7 @@ def follow(
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     child.wait(wait_s)
 
-    reader, last = threading.Thread(target=read, name="a task's lines", daemon=True), ""
+    reader = threading.Thread(target=read, name="a task's lines", daemon=True)
     reader.start()
     try:
         while child.poll() is None:

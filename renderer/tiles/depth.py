@@ -31,8 +31,10 @@ def blend_depth(
     arena: mean_opacity, covariance, object_index, pages.
     """
     camera = camera_of(view)
-    given = (world_from_objects, camera, projected, arena[3])
-    surfaces = surface_arena(device, *arena[:3], *given)
+    opacity, covariance, object_index, pages = arena
+    surfaces = surface_arena(
+        device, opacity, covariance, object_index, world_from_objects, camera, projected, pages
+    )
     return rasterize_depth(device, projected, tiles, surfaces, view.size)
 
 

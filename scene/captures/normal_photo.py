@@ -80,7 +80,8 @@ def load_normals(photo: Photo, factor: int | None = None) -> np.ndarray:
     with np.errstate(over="ignore", invalid="ignore"):
         length = np.sqrt(np.square(values).sum(axis=2, keepdims=True))
         known = (length >= LENGTH[0]) & (length <= LENGTH[1])  # NaN is not
-        steps = values / np.where(known, length, 1) * np.float32(FLIPPED[photo.normal_axes]) * 127
+        toward_eye = np.array(FLIPPED[photo.normal_axes], np.float32)
+        steps = values / np.where(known, length, 1) * toward_eye * 127
     steps = np.where(known, np.rint(steps), 0)
     return np.concatenate([steps, known], axis=2).astype(np.int8)
 

@@ -187,13 +187,15 @@ def with_normals(capture: Capture, folder) -> Capture:
 
 
 def test_normal_maps_bring_the_shape_nearer_where_photos_are_few(device, tmp_path):
-    """From a hull and four photos a modality: measured once, 0.186 against 0.259."""
-    balls = with_normals(make_balls(tmp_path / "balls", 64, 4, 3, depth=True), tmp_path)
+    """From a hull and three photos a modality: measured once, 0.034 against 0.063 with this seed,
+    0.032 against 0.063 with another.
+    """
+    balls = with_normals(make_balls(tmp_path / "balls", 64, 3, 3, depth=True), tmp_path)
     mapped = load_normals(balls.photos[0])
     assert mapped[..., 3].mean() > 0.3 and (mapped[..., 2][mapped[..., 3] > 0] > -30).mean() > 0.9
     hull = replace(balls, points=None, point_colors=None)
     errors = []
-    for share in (0.1, 0.0):
+    for share in (0.3, 0.0):
         settings = TrainSettings(
             iterations=120, max_anchors=400, grow=False, depth_share=0.0, normal_share=share
         )
@@ -201,7 +203,7 @@ def test_normal_maps_bring_the_shape_nearer_where_photos_are_few(device, tmp_pat
         for _ in trainer.steps():
             pass
         errors.append(depth_error(trainer))
-    assert errors[0] < 0.9 * errors[1], errors
+    assert errors[0] < 0.7 * errors[1], errors
 
 
 def test_a_normal_map_follows_its_photo_through_masks_and_sizes(tmp_path):

@@ -64,8 +64,8 @@ class NormalLoss:
     def target(self, normals: np.ndarray, view: View) -> NormalTarget:
         """(H, W, 4) int8 as load_normals gives them, of a photo with that view."""
         whole = np.ascontiguousarray(normals, np.int8)
-        _, *camera = view.pinhole()
-        return NormalTarget(self.device.upload(whole), tuple(camera), pairs_of(whole))
+        _, fx, fy, cx, cy = view.pinhole()
+        return NormalTarget(self.device.upload(whole), (fx, fy, cx, cy), pairs_of(whole))
 
     def compare(
         self, drawn: DepthFrame, target: NormalTarget, share: float, others: tuple | None = None

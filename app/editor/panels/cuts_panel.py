@@ -104,6 +104,7 @@ def _plane(tool: SectionTool, state: EditorState, ui_scale: float) -> None:
     assert isinstance(shape, PlaneShape), "asked for planes alone"
     middle = float(np.array(shape.normal) @ state.centre)
     now, far = shape.offset_m - middle, state.radius
+    now = now if abs(now) >= 0.0005 else 0.0  # not -0.000
     by = slider("offset", now, -far, far, "place: %.3f m")
     tip("Along its normal from the middle of the scene; its dot is dragged, too.", ui_scale)
     if by != now:

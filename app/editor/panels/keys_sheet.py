@@ -1,5 +1,6 @@
 """The sheet of keys: everything that keys and mouse do, in groups; F1 opens and closes it."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 from imgui_bundle import imgui
@@ -11,9 +12,14 @@ from shapeshift.app.editor.texts.table import said
 
 Vec = imgui.ImVec2
 Row = tuple[str, str]  # key, what it does
-KEY_NAMES = ("Delete",)  # as printed there, though the word is also on a button
+# What is printed on keys, and the text by which tables have it in the language of a keyboard.
+KEY_WORDS = {
+    "Ctrl": "the key Ctrl", "Shift": "the key Shift", "Space": "the key Space",
+    "Enter": "the key Enter", "Delete": "the key Delete",
+}  # fmt: skip
+WORDS = re.compile(rf"\b({'|'.join(KEY_WORDS)})\b")
 COLUMN = 330.0  # logical pixels, of a group
-KEY_PART = 0.38  # of a column, where what a key does begins
+KEY_PART = 0.40  # of a column, where what a key does begins
 MOUSE_AND_CAMERA = (
     ("drag", "orbit; look about when flying"),
     ("right drag", "pan; look about when flying"),
@@ -115,14 +121,31 @@ def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> Non
     for key, what in rows:
         imgui.set_cursor_pos_x(left)
         y = imgui.get_cursor_pos_y()
-        imgui.text_unformatted(key if key in KEY_NAMES else said(key))
+        imgui.push_text_wrap_pos(left + KEY_PART * width - gap / 4)
+        imgui.text_unformatted(key_text(key))
+        imgui.pop_text_wrap_pos()
+        below = imgui.get_cursor_pos_y()
         imgui.set_cursor_pos(Vec(left + KEY_PART * width, y))
         imgui.push_text_wrap_pos(left + width - gap)
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))
         imgui.text_unformatted(said(what))
         imgui.pop_style_color()
         imgui.pop_text_wrap_pos()
+        imgui.set_cursor_pos_y(max(below, imgui.get_cursor_pos_y()))
     imgui.set_cursor_pos(Vec(left, imgui.get_cursor_pos_y() + gap / 2))
+
+
+def key_text(key: str) -> str:
+    """A row's key as keyboards of the language in use have it."""
+    text = said(key)
+    if text != key and key not in KEY_WORDS:
+        return text
+    return WORDS.sub(lambda found: _printed(found[0]), key)
+
+
+def _printed(word: str) -> str:
+    text = KEY_WORDS[word]
+    return word if said(text) == text else said(text)
 
 
 def spread(groups: Mapping[str, Sequence[Row]], columns: int) -> list[list[str]]:

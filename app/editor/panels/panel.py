@@ -114,7 +114,9 @@ def draw_sections(
             kept[other.name], toggled = is_open, True
         if is_open:
             imgui.push_id(other.name)
+            imgui.push_text_wrap_pos(0)  # a sentence in any language goes on in the next line
             other.draw(ui_scale)
+            imgui.pop_text_wrap_pos()
             imgui.pop_id()
     return toggled
 

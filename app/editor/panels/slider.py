@@ -97,7 +97,7 @@ def _split_button(state: EditorState, index: int, on: bool, ui_scale: float) -> 
     side = imgui.get_frame_height()
     corner = imgui.get_cursor_screen_pos()
     if imgui.button("##split", Vec(side, side)):
-        state.split.toggle(state.scene.objects[index])
+        state.split.toggle(state.scene.objects[index], way=state.shifts.get(index))
     tip("Split: another stop right of a line, with a knob of its own. Key C.", ui_scale)
     draw, inset = imgui.get_window_draw_list(), 0.26 * side
     low = Vec(corner.x + inset, corner.y + inset)

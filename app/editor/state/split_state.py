@@ -6,6 +6,8 @@ from shapeshift.app.editor.state.regions import farthest_stop
 from shapeshift.renderer.colors.palette import thermal_weights
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.control import Shift
+from shapeshift.scene.film.style_path import AutoSlide
 from shapeshift.scene.scene import Scene, SceneObject
 
 ON_STOP = 1e-3
@@ -22,11 +24,16 @@ class SplitState:
     detail: float = 1.0  # of the shape, that is laid under the heat
     possible: bool = False  # whether there is anybody to draw it
 
-    def toggle(self, obj: SceneObject, over: bool = False) -> None:
+    def toggle(
+        self, obj: SceneObject, over: bool = False, way: Shift | AutoSlide | None = None
+    ) -> None:
         """On for this object, at a thermal stop, else the one farthest from its x; or off.
 
         over: heat over shape instead of a line; from one of the two to the other nothing goes off.
+        way: that its x is on, to where it counts as being.
         """
+        if isinstance(way, Shift):
+            obj = replace(obj, x=way.end)
         self.on = not self.on or self.name != obj.name or self.over != over
         self.over = over
         if self.name != obj.name or self.x == obj.slider_x:

@@ -131,7 +131,7 @@ def splitting(
     def handle_event(event: Event) -> bool:
         if isinstance(event, KeyDown) and event.key == glfw.KEY_C and not event.ctrl:
             for index in state.sliders[:1]:
-                split_state.toggle(state.scene.objects[index], event.shift)
+                split_state.toggle(state.scene.objects[index], event.shift, state.shifts.get(index))
             return True
         has_line = split_state.on and bool(made) and not split_state.over
         return has_line and split().handle_line_event(event)

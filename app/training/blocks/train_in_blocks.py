@@ -165,14 +165,15 @@ def coarse_task(options: Options, work: Path) -> Task:
     from shapeshift.training.checkpoint import checkpoint_path
 
     capture, out = capture_path(options), work / COARSE
-    asked = {"max_anchors": most_anchors(options)} | options.asked  # as blocks have
+    asked: Asked = {"max_anchors": most_anchors(options)} | options.asked  # as blocks have
     asked.pop("iterations", None)
     if options.coarse_iterations is not None:
         asked["iterations"] = options.coarse_iterations
-    reads = [capture]
-    if "points" in asked and Path(asked["points"]).is_file():
-        asked["points"] = str(Path(asked["points"]).absolute())
-        reads.append(asked["points"])
+    reads, points = [capture], str(asked.get("points", ""))
+    if points and Path(points).is_file():
+        points = str(Path(points).absolute())
+        asked["points"] = points
+        reads.append(points)
     calibrate = ["--calibrate", options.calibrate] if options.calibrate else []
     argv = ["train", capture, "--out", str(out), *words_of(asked), *calibrate]
     return task_of(

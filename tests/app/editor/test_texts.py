@@ -1,5 +1,6 @@
 """The tables of texts: nothing is missing, placeholders agree, letters have a font."""
 
+import importlib
 import re
 import string
 from collections import Counter
@@ -7,6 +8,7 @@ from collections import Counter
 import pytest
 from PIL import ImageFont
 
+from shapeshift.app.editor.panels import keys_sheet
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.texts import fonts, table
 from shapeshift.app.editor.texts.fonts import (
@@ -17,7 +19,7 @@ from shapeshift.app.editor.texts.fonts import (
     why_not,
 )
 from shapeshift.app.editor.texts.table import all_languages, said, use_language
-from tests.support.desktop.overlay_texts import overlay_texts, unsaid_texts
+from tests.support.desktop.overlay_texts import KEY_TABLES, overlay_texts, unsaid_texts
 
 OTHERS = [code for code in all_languages() if code != table.ENGLISH]
 PERCENT = re.compile(r"%[-+.\d]*[a-z%]")
@@ -92,6 +94,33 @@ def test_labels_fit_their_buttons(code):
     said_so = {texts.get(name, name): name for name in THREE_TO_A_ROW}
     wide = {text: round(width_px(text)) for text in said_so if width_px(text) > NARROW + FONT_PX}
     assert not wide
+
+
+@pytest.mark.parametrize("code", list(all_languages()))
+def test_every_word_of_the_sheets_keys_fits_beside_what_it_does(code):
+    """What has several words goes on in the next line; one that is too long alone is cut, as it
+    should be in Japanese only.
+    """
+    use_language(code)
+    groups = [*keys_sheet.GROUPS.values()]
+    for name in KEY_TABLES:
+        rows = importlib.import_module(f"shapeshift.app.editor.window.{name}").KEYS
+        groups += rows.values() if isinstance(rows, dict) else [rows]
+    keys = {keys_sheet.key_text(key) for rows in groups for key, _ in rows}
+    assert len(keys) > 60
+    room = keys_sheet.KEY_PART * 0.94 * keys_sheet.COLUMN - 4
+    words = {word: width_px(word) for key in keys for word in key.split() if word.isascii()}
+    assert not {word: round(px) for word, px in words.items() if px > room}
+
+
+def test_keys_are_named_as_a_keyboard_of_the_language_has_them():
+    use_language("de")
+    names = ("Ctrl+O", "Delete", "Space", "Shift+left, right", "W A S D Q E", "F1")
+    assert [keys_sheet.key_text(name) for name in names] == [
+        "Strg+O", "Entf", "Leertaste", "Umschalt+links, rechts", "W A S D Q E", "F1",
+    ]  # fmt: skip
+    use_language(table.ENGLISH)
+    assert [keys_sheet.key_text(name) for name in names] == list(names)
 
 
 def test_what_no_table_has_is_said_as_it_is():

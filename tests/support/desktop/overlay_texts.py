@@ -24,7 +24,7 @@ TABLES = {
     "cuts_panel": {"ADD": ALL, "EDGES": VALUES},
     "empty_panel": {"CHOICES": ALL, "WHAT": ALL},
     "inspection.ruler_panel": {"KIND_LABELS": VALUES, "KIND_TIPS": ALL, "ACTIONS": ALL},
-    "keys_sheet": {"GROUPS": ALL},
+    "keys_sheet": {"GROUPS": ALL, "KEY_WORDS": VALUES},
     "open_row": {"NEW": ALL},
     "panel": {"LARGER": ALL, "SMALLER": ALL, "ORDER": ALL},
     "save_boxes": {"OVER": ALL, "SAVE": ALL, "LOSE": ALL},
@@ -65,6 +65,13 @@ KEY_TABLES = (
     "objects", "parts", "sections.section_handles", "split", "touch", "wipe",
 )  # fmt: skip
 STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
+# Texts on their way through variables, as tests/.../look/test_desktop_languages.py has found them.
+BY_VARIABLES = {
+    "Budget", "Quality", "Passes", "Counts", "Machine", "drawing", "sort", "vendor", "in the scene",
+    "Redo", "plane", "fur", "blocks", "bubbles", "points", "melt", "explode", "strokes",
+    "a frame in at most %.1f ms", "as the exact picture to %.0f dB", "field of view: %.0f\u00b0",
+    "speed: %.2g x", "sort every frame",
+}  # fmt: skip
 LETTERS = re.compile(r"[A-Za-z]{2}")
 KEY = r"(Ctrl|Shift|Alt|Esc|Enter|Space|Tab|[A-Z]|F\d+|\d|[+\u2013])"
 NAMES = re.compile(rf"[.\w]*\.\w+|{KEY}([ ,+]+{KEY})*|%\.\d+f .?m")  # the same in all tables
@@ -156,6 +163,7 @@ def overlay_texts() -> set[str]:
         module = importlib.import_module(f"shapeshift.app.editor.state.{name}")
         for text in texts:
             found |= set(texts_of(getattr(module, text)))
+    found |= BY_VARIABLES
     found |= set(texts_of(REASON_TEXTS, VALUES))  # in the legend of a debug view
     for name in KEY_TABLES:
         module = importlib.import_module(f"shapeshift.app.editor.window.{name}")

@@ -81,7 +81,7 @@ def draw_cameras(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> N
     tip(KEEP, ui_scale)
     imgui.same_line()
     imgui.push_item_width(-1)
-    names = [said("as {form}", form=said(FORM_NAMES[form])) for form in FORMS]
+    names = [said(FORM_NAMES[form]) for form in FORMS]
     kept.form = choice("form", kept.form, FORMS, names, names=True)
     tip("What the file of kept views is written for.", ui_scale)
     imgui.pop_item_width()

@@ -36,14 +36,15 @@ DEBUG_NAMES = {
 
 def draw_two_stops(state: EditorState, ui_scale: float) -> None:
     """One stop, two beside a line, or heat over the shape of the other."""
-    split, obj = state.split, state.scene.objects[state.sliders[0]]
+    split, index = state.split, state.sliders[0]
     now = TWO_STOPS[1 + split.over] if split.on else TWO_STOPS[0]
     chosen = choice("two stops", now, TWO_STOPS, TWO_STOPS)
     tip("Another stop at once: keys C and Shift+C. Its knob is blue.", ui_scale)
     if chosen == TWO_STOPS[0] and split.on:
         split.on = False
     elif chosen != now:
-        split.toggle(obj, over=chosen == TWO_STOPS[2])
+        obj, way = state.scene.objects[index], state.shifts.get(index)
+        split.toggle(obj, chosen == TWO_STOPS[2], way)
     if split.on and split.over:
         split.detail = slider("detail", split.detail, 0.0, MOST_DETAIL, "shape: %.2f")
         tip("How much of the photo's edges shows through the colours of heat.", ui_scale)

@@ -19,6 +19,7 @@ from shapeshift.app.editor.state.frame_stats import FrameStatsView
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.quality_controller import QualityController
 from shapeshift.app.editor.texts.table import said
+from shapeshift.renderer.debug.debug import REASON_TEXTS
 from shapeshift.renderer.settings import CULL_REASONS, FrameStats
 
 Vec = imgui.ImVec2
@@ -111,5 +112,6 @@ def _splats(stats: FrameStats) -> None:
     """Why splats were not drawn: the first gate that each one failed, in the gates' order."""
     counts = [("in the scene", stats.splats), ("drawn", stats.drawn)]
     known = [why for why in CULL_REASONS if why in stats.culled]
-    counts += [(said("culled: {why}", why=said(why)), stats.culled[why]) for why in known]
+    for why in known:
+        counts.append((said("culled: {why}", why=said(REASON_TEXTS[why])), stats.culled[why]))
     rows([(name, number(count)) for name, count in counts])

@@ -16,9 +16,12 @@ ROWS_SHOWN = 16  # of an open list; more are reached by scrolling
 
 
 def item_label(name: str) -> str:
-    """What stands on an item in the language in use; which item it is does not depend on that."""
-    shown = said(name)
-    return name if shown == name else f"{shown}###{name}"
+    """What stands on an item in the language in use; which item it is does not depend on that, and
+    is said by what follows "###" where one item has several texts.
+    """
+    text, _, item = name.partition("###")
+    shown = said(text)
+    return name if shown == text else f"{shown}###{item or name}"
 
 
 def section(name: str, open_first: bool = False, unfold: bool = False) -> bool:

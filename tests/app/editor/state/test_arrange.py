@@ -365,7 +365,7 @@ def do_something(state: EditorState, rng: np.random.Generator) -> None:
 
 
 def ready(state: EditorState) -> None:
-    end = time.monotonic() + 10
+    end = time.monotonic() + 30
     while state.bodies.poll(state.edited) and time.monotonic() < end:
         time.sleep(0.0005)
     assert state.bodies.problem == "" and not state.bodies.busy

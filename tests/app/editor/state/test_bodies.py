@@ -62,7 +62,7 @@ def made(monkeypatch) -> list:
 
 
 def until_there(bodies: Bodies, of: EditedFile) -> None:
-    end = time.monotonic() + 10
+    end = time.monotonic() + 30
     while bodies.poll(of) and time.monotonic() < end:
         time.sleep(0.001)
     assert not bodies.busy
@@ -145,14 +145,14 @@ def test_another_scene_ends_what_is_being_made(monkeypatch):
     monkeypatch.setattr(collider_files, "one_collider", one_collider)
     of = edited(obj("a"))
     with Bodies() as bodies:
-        assert bodies.poll(of) and begun.wait(10)
-        end = time.monotonic() + 10
+        assert bodies.poll(of) and begun.wait(30)
+        end = time.monotonic() + 30
         while "50%" not in bodies.status and time.monotonic() < end:
             time.sleep(0.001)
         assert bodies.status == "a: cutting it into convex pieces 50%"
         bodies.forget()
-        assert ended.wait(10) and not bodies.busy
+        assert ended.wait(30) and not bodies.busy
         begun.clear()
         ended.clear()
-        assert bodies.poll(of) and begun.wait(10)
+        assert bodies.poll(of) and begun.wait(30)
     assert ended.is_set()  # so does the end of the program

@@ -288,7 +288,7 @@ def test_bytes_have_three_digits_and_a_unit():
 
 
 def wait(opener: Opener):
-    end = time.monotonic() + 10
+    end = time.monotonic() + 30
     while opener.busy and time.monotonic() < end:
         found = opener.poll()
         if found is not None:
@@ -302,7 +302,7 @@ def test_reading_goes_on_beside_the_window():
 
     def slow(paths, progress):
         progress("reading a.ply", 0.25)
-        assert go.wait(10)
+        assert go.wait(30)
         return paths
 
     opener.start((Path("a.ply"),), slow)
@@ -320,7 +320,7 @@ def test_the_last_wish_wins():
 
     def slow(paths, progress):
         began.append(paths[0].name)
-        assert go.wait(10)
+        assert go.wait(30)
         return paths
 
     for name in "abc":

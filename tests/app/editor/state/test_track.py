@@ -9,7 +9,7 @@ from shapeshift.app.editor.state.messages import LONGEST, MOST_PROBLEMS, NOTE_S,
 from shapeshift.app.editor.state.split_state import SplitState, name_of
 from shapeshift.app.editor.state.track import Grip, Track, half_ways, next_stop, read_x, stepped
 from shapeshift.runtime_models.model import SplatLayers, Stop
-from shapeshift.scene.control import SNAP
+from shapeshift.scene.control import SNAP, Shift
 from shapeshift.scene.scene import Scene, SceneObject
 
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 0.5), Stop("Opened", 1.0))
@@ -115,6 +115,10 @@ def test_the_other_side_is_thermal_where_there_is_such_a_stop():
         assert state.on and abs(state.x - wanted) <= (wanted == 0.0)  # of equals either end
     state.toggle(obj("a", 0.2))
     assert not state.on
+    going = obj("a", 0.46, thermal)  # a key has sent it to Heat, and it is not there yet
+    state = SplitState()
+    state.toggle(going, way=Shift(0.0, 0.5, going.model.blend, 0.3))
+    assert state.on and state.x != 0.5
 
 
 def test_one_object_alone_is_another_right_of_the_line():

@@ -1,6 +1,7 @@
 """The overlay in windows of several sizes and scales: what is drawn lies where the layout says."""
 
 import time
+from collections.abc import Callable
 
 import glfw
 import numpy as np
@@ -19,14 +20,18 @@ from tests.support.desktop.widgets import Widgets
 SIZES = [(800, 600), (1280, 720), (3840, 2160)]
 
 
+def until(holds: Callable[[], bool], seconds: float = 20.0) -> bool:
+    """Takes what the X server has to say until something holds; False where it never does."""
+    end = time.monotonic() + seconds
+    while not holds() and time.monotonic() < end:
+        glfw.wait_events_timeout(0.02)
+    return holds()
+
+
 def resize(viewer, size: tuple[int, int]) -> None:
     """Another size of the window, as somebody drags its corner."""
     glfw.set_window_size(viewer.window.handle, *size)
-    for _ in range(50):
-        glfw.poll_events()
-        if viewer.window.logical_size == size:
-            break
-        glfw.wait_events_timeout(0.02)
+    assert until(lambda: viewer.window.logical_size == size)
     run_frames(viewer, 4)
     while not np.array_equal(viewer.viewpoint.free, viewer.viewpoint.free_wanted()):
         run_frames(viewer, 5, seconds=0.1)
@@ -289,14 +294,17 @@ def test_a_window_grows_with_its_text_as_far_as_the_monitor_goes(any_size, times
     """The X server's screen has 1280x720; 900x640 grows in both directions or not at all."""
     viewer = any_size
     before = viewer.window.logical_size
-    monitor.grow_window(viewer.window.handle, times)
-    for _ in range(20):
-        glfw.wait_events_timeout(0.01)
-    size = viewer.window.logical_size
+    handle = viewer.window.handle
+    monitor.grow_window(handle, times)
     if wanted is None:
-        assert size == before
+        assert not until(lambda: viewer.window.logical_size != before, seconds=0.2)
     else:
-        assert size == tuple(min(a, b) for a, b in zip(wanted, (1280, 720), strict=True))
-        left, top = glfw.get_window_pos(viewer.window.handle)
-        assert abs(2 * left + size[0] - 1280) <= 1 and abs(2 * top + size[1] - 720) <= 1
+        wide, high = (min(a, b) for a, b in zip(wanted, (1280, 720), strict=True))
+        assert until(lambda: viewer.window.logical_size == (wide, high))
+
+        def in_the_middle() -> bool:
+            left, top = glfw.get_window_pos(handle)
+            return abs(2 * left + wide - 1280) <= 1 and abs(2 * top + high - 720) <= 1
+
+        assert until(in_the_middle)
     glfw.set_window_pos(viewer.window.handle, 0, 0)
