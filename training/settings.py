@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.heads.networks import HeadLayout
 
 if TYPE_CHECKING:
@@ -83,8 +84,8 @@ class TrainSettings:
     """Train for this many steps; the same number gives the same bits."""
     max_anchors: int = 12000
     """Most anchors; as far as there are points, a run starts with that many.  A capture of one
-    modality has 30000 of 2 splats with light by direction instead, where none of --max-anchors,
-    --splats-per-anchor, --anchor-attributes and --max-mb is given."""
+    modality with 16 or more training photos has 30000 of 2 splats with light by direction instead,
+    where none of --max-anchors, --splats-per-anchor, --anchor-attributes and --max-mb is given."""
     max_mb: float | None = None
     """Most megabytes of the package on disk, from the start on.  Default: no limit."""
     points: str = "auto"
@@ -174,19 +175,19 @@ class TrainSettings:
 
 
 # A scene that never changes: the networks have nothing to share between stops, so more anchors with
-# fewer splats each, and light of their own, gain 0.2 to 1 dB for two to three times the bytes.
+# fewer splats each, and light of their own, gain 0.4 to 1 dB for two to three times the bytes.
 ONE_MODALITY: dict[str, Any] = {
     "splats_per_anchor": 2, "max_anchors": 30000, "anchor_attributes": "frame,color,light",
 }  # fmt: skip
+MANY_PHOTOS = 16  # to train on: twelve do not hold so much freedom, docs/bench/sparse.csv
 SIZES = (*ONE_MODALITY, "max_mb")  # who gives one of these means all of them
 
 
-def suited(settings: TrainSettings, asked: Iterable[str], modalities: int) -> TrainSettings:
-    """New settings of a run as they suit a capture of so many modalities.
-
-    asked: fields that somebody gave.
-    """
-    if modalities > 1 or not set(asked).isdisjoint(SIZES):
+def suited(settings: TrainSettings, asked: Iterable[str], capture: Capture) -> TrainSettings:
+    """New settings of a run as they suit a capture.  asked: fields that somebody gave."""
+    photos = sum(photo.split == "train" for photo in capture.photos)
+    many = len(capture.stops) == 1 and photos >= MANY_PHOTOS
+    if not many or not set(asked).isdisjoint(SIZES):
         return settings
     return replace(settings, **ONE_MODALITY)
 

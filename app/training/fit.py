@@ -100,7 +100,7 @@ def run(options: Options) -> int:
     longer = options.final_iterations, options.final_seconds
     last = None if longer == (None, None) else settings_of(options.asked | budget(*longer))
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
-    settings = suited(settings, options.asked, len(capture.stops))
+    settings = suited(settings, options.asked, capture)
     if options.calibrate is not None:
         if options.cluster == NONE:
             settings = calibrated(device, capture, settings, options.calibrate)

@@ -130,7 +130,7 @@ def run_of(part: TablePart, capture: "Capture", asked: TrainOptions, rig: str) -
         return splats_run(plain, asked.asked | asked.splats)
     refuse_foreign(part.file)
     given = asked.asked
-    settings = suited(settings_of(given), given, len(capture.stops))  # of one model and of several
+    settings = suited(settings_of(given), given, capture)  # of one model and of several
     settings = replace(settings, rig=rig)
     return anchors_run(share_of(settings, capture) if part.modality else settings, asked.asked)
 

@@ -70,7 +70,7 @@ def run_whole(options: Options) -> int:
     settings = settings_of(options.asked, resume[1]["settings"] if resume else None)
     capture = open_capture(options.capture, options.memory)
     if resume is None:
-        settings = suited(settings, options.asked, len(capture.stops))
+        settings = suited(settings, options.asked, capture)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:

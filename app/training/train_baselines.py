@@ -78,7 +78,7 @@ def run_baseline(options: Options, room: "PhotoRoom") -> int:
     settings = settings_of(options.asked) if plain is None else None
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     if settings is not None:
-        settings = suited(settings, options.asked, len(capture.stops))
+        settings = suited(settings, options.asked, capture)
     say(f"{device.name}, {device.platform}")
     if settings is not None and options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)

@@ -146,7 +146,7 @@ def trainer_of(
     found, on = read_capture(plain(str(capture))), open_device(device)
     if before is None:
         given = [name for name, value in settings.items() if value is not None]
-        wished = suited(wished, given, len(found.stops))
+        wished = suited(wished, given, found)
     if calibrate is not None:
         if resume:
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")

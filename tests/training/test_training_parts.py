@@ -1,6 +1,7 @@
 """The parts of training that are plain numpy: first points, photos, growing, schedule, Adam."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -210,19 +211,26 @@ def test_settings_name_the_networks():
 
 
 @pytest.mark.parametrize(
-    ("asked", "modalities", "own"),
+    ("asked", "stops", "photos", "own"),
     [
-        ((), 1, True),
-        (("iterations", "points", "seed", "features", "downscale"), 1, True),
-        ((), 2, False),
-        ((), 9, False),
-        *(((name,), 1, False) for name in (*ONE_MODALITY, "max_mb")),
+        ((), 1, 16, True),
+        ((), 1, 15, False),
+        ((), 1, 500, True),
+        (("iterations", "points", "seed", "features", "downscale"), 1, 16, True),
+        ((), 2, 60, False),
+        *(((name,), 1, 60, False) for name in (*ONE_MODALITY, "max_mb")),
     ],
 )
-def test_a_scene_that_never_changes_has_more_anchors_with_light(asked, modalities, own):
-    """Unless somebody says how many or of what kind; nothing else differs."""
+def test_a_scene_that_never_changes_has_more_anchors_with_light(asked, stops, photos, own):
+    """Unless there are few training photos, or somebody says how many or of what kind; nothing else
+    differs.
+    """
+    view = View(look_at(np.ones(3), np.zeros(3)), perspective(0.7, (4, 4)), 0.05, 9.0, (4, 4))
+    splits = ["train"] * photos + ["test"] * 20
+    taken = tuple(Photo(view, Path(f"{i}.png"), "0", split=s) for i, s in enumerate(splits))
+    capture = Capture(Path(), tuple(Stop(str(i), 0.1 * i) for i in range(stops)), taken)
     settings = TrainSettings(seed=7, iterations=300)
-    found = suited(settings, asked, modalities)
+    found = suited(settings, asked, capture)
     if not own:
         assert found == settings
         return

@@ -69,7 +69,7 @@ def anchors(device, capture: Capture, options: argparse.Namespace, points: str, 
     settings = TrainSettings(
         iterations=None, seconds=options.seconds, seed=options.seed, points=points, downscale=factor
     )
-    settings = suited(settings, (), len(capture.stops))
+    settings = suited(settings, (), capture)
     psnr, said = train(lambda: Trainer(device, capture, settings))
     return [(name, db, said) for name, db in psnr.items()]
 

@@ -11,7 +11,8 @@ psnr_db, ssim and depth_error (of what is seen, where the capture knows it) are 
 photos, train_db of up to 8 of the photos that were learned from.  Ways take turns; those that want
 what a capture does not have are left out.
 
-  default        as `train` does it for one modality, without depth and normals
+  default        2 splats an anchor and light, as `train` has it from 16 photos of one modality on;
+                 without depth and normals
   depth          with depth photos (--depth-share 0.3)
   normals        with normal maps (--normal-share 0.1)
   both           with both
@@ -21,7 +22,8 @@ what a capture does not have are left out.
   rough both     both of these
   seen points    depth at the points that were triangulated out of these photos, alone
   alike          colours that do not see the eye (view_dependent)
-  five           fewer anchors of 5 splats each, as many splats, without light by direction
+  five           fewer anchors of 5 splats each, as many splats, without light by direction, as
+                 `train` has it for fewer photos
   half           half of the anchors
   left out       each step leaves out a tenth of the anchors, drawn by chance (DropGaussian, 2025)
   early          half of the steps
@@ -55,7 +57,7 @@ from shapeshift.training.photos import (  # noqa: E402
     choose_downscale,
     load_photos,
 )
-from shapeshift.training.settings import TrainSettings, suited  # noqa: E402
+from shapeshift.training.settings import ONE_MODALITY, TrainSettings  # noqa: E402
 from shapeshift.training.synthetic import one_shape, workshop  # noqa: E402
 from shapeshift.training.synthetic.tracer import depth_under, look, pixel_rays  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
@@ -262,7 +264,7 @@ def rows_of(
             iterations=options.iterations, seed=seed,
             downscale=options.downscale or choose_downscale(whole.photos),
         )  # fmt: skip
-        settings = replace(suited(settings, (), 1), max_anchors=options.max_anchors)
+        settings = replace(settings, **ONE_MODALITY | {"max_anchors": options.max_anchors})
         loaded = {
             split: load_photos(part, split, settings.downscale or 1, settings.masks)
             for split in ("train", "test")

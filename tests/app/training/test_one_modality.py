@@ -1,4 +1,4 @@
-"""A capture of one modality is trained with anchors of its own kind, whoever starts it."""
+"""Many photos of one modality are trained with anchors of their own kind, whoever starts it."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ def balls(tmp_path_factory):
     """(both modalities, RGB alone)"""
     both, alone = (tmp_path_factory.mktemp(name) for name in ("both", "alone"))
     capture = make_balls(both, size=32, views=6, test_views=1)
-    write_capture(replace(one_modality(make_balls(alone, 32, 6, 1), "RGB"), folder=alone))
+    write_capture(replace(one_modality(make_balls(alone, 32, 16, 1), "RGB"), folder=alone))
     return capture.folder, alone
 
 
