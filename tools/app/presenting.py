@@ -109,11 +109,11 @@ def measure(viewer: Viewer) -> list[str]:
     watch.over(viewer, "frame", "frame")
     watch.over(viewer, "draw_overlay", "widgets")
     watch.over(viewer.shown, "draw", "presenting")
-    viewer.renderer.update = lambda scene: None
-    viewer.renderer.draw = lambda views, target: present_alone(viewer, target)
-    for way in ways.values():
+    setattr(viewer.renderer, "update", lambda scene: None)  # noqa: B010  methods
+    setattr(viewer.renderer, "draw", lambda _, target: present_alone(viewer, target))  # noqa: B010
+    for each in ways.values():
         for name in ("keep_picture", "lay_over", "swap"):
-            watch.over(way, name, "presenting")
+            watch.over(each, name, "presenting")
     for name, change in changes(viewer).items():
         taken: dict[tuple[str, str], list[float]] = defaultdict(list)
         for _ in range(TURNS):
