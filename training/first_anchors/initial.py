@@ -180,7 +180,28 @@ def filler_points(
             [(x * view.size[0] - cx) / fx * z, (y * view.size[1] - cy) / fy * z, z, np.ones_like(z)]
         )
         found.append((np.linalg.inv(camera_from_world) @ eye)[:3].T)
-    return np.concatenate(found) if found else np.zeros((0, 3))
+    if not found:
+        return np.zeros((0, 3))
+    guesses = np.concatenate(found)
+    return guesses[free_sight(guesses, points, [photo.view for photo in sampled(photos)])]
+
+
+def free_sight(guesses: np.ndarray, points: np.ndarray, views: list[View]) -> np.ndarray:
+    """(G,) whether a guess stands right before none of the cameras, where few would hide all that
+    they see and nothing behind would learn any more.
+
+    Right before: nearer than half of what the nearest of the view's points (P, 3) are.
+    """
+    free = np.ones(len(guesses), bool)
+    for view in views:
+        _, inside = pixel_of(view, points)
+        if not inside.any():
+            continue
+        along = view.pinhole()[0][2]
+        nearest = np.percentile(points[inside] @ along[:3] + along[3], 5)
+        depth = guesses @ along[:3] + along[3]
+        free &= ~(pixel_of(view, guesses)[1] & (depth < nearest / 2))
+    return free
 
 
 def initial_points(

@@ -7,6 +7,8 @@ from shapeshift.training.first_anchors.initial import (
     FARTHEST,
     NEAREST,
     RANDOM_POINTS,
+    filler_points,
+    free_sight,
     points_before,
     random_points,
     seen_part,
@@ -69,6 +71,28 @@ def test_of_a_flight_the_common_place_holds_next_to_nothing():
     assert (seen >= len(views) // 3).sum() < 100
     started = random_points(photos_of(views), np.random.default_rng(0))
     assert len(started) > RANDOM_POINTS / 2
+
+
+def test_no_guess_stands_right_before_a_camera_that_looks_past_it():
+    """In a room, where cameras look across each other's places."""
+    views = views_of("room", 40)
+    rng = np.random.default_rng(1)
+    corner = np.array([2.2, 1.25, 1.8])
+    wall = rng.uniform(-1, 1, (600, 3)) * corner + np.array([0, 1.25, 0])
+    wall[:, 0] = np.sign(wall[:, 0]) * 2.2
+    guesses = filler_points(wall, photos_of(views), rng)
+    assert len(guesses) > 1000
+    before = 0
+    for view in views:
+        _, inside = pixel_of(view, wall)
+        nearest = np.percentile(depth_in(view, wall[inside]), 5)
+        _, seen = pixel_of(view, guesses)
+        before += (depth_in(view, guesses[seen]) < nearest / 2).sum()
+    assert before == 0
+    middle = np.array([[0, 1.25, 0]])  # where nearly all of them look
+    assert not free_sight(middle, wall, views)[0]
+    assert free_sight(middle + np.array([2.1, 0, 0]), wall, views)[0]
+    assert free_sight(middle, wall[:0], views)[0], "without points nothing is near"
 
 
 def ball(count: int, radius: float) -> np.ndarray:
