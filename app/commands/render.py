@@ -150,8 +150,6 @@ def run(options: Options) -> int:
     check_one_of(options, budget)
     check_output(options)
     check_show(options)
-    if options.draft and not options.budget:
-        raise UsageError("--draft is of scenes in levels of detail; add --budget, such as 2M.")
     # What needs no scene comes before it: large ones take a while to open.
     cameras = choose_cameras(options, size)
     count = len(cameras.views) if cameras else None
@@ -263,6 +261,8 @@ def check_show(options: Options) -> None:
     from shapeshift.app.decomposition.show_views import read_show
     from shapeshift.app.errors import UsageError
 
+    if options.draft and not options.budget:
+        raise UsageError("--draft is of scenes in levels of detail; add --budget, such as 2M.")
     show, _ = read_show(options.show)
     if options.select and show in ("background", "isolated"):
         raise UsageError(f"--show {show} goes without --select; leave one of the two out.")
