@@ -97,7 +97,7 @@ inline void enter_keys(Keys* keys, int i, uintv key, intv member) {
 }
 
 #if PAGED
-// Opacities of a part of what there is.  Of faint splats the part itself; of opaque ones more, since
+// Opacities of a part of what there is. Of faint splats the part itself; of opaque ones more, since
 // two halves, one behind the other, would let through a quarter in the middle, and less than their
 // optical depth says, since then their tails would add up to more than the whole: the least squares
 // over a splat's area are at opacity * part^0.69 for two halves that are opaque.
