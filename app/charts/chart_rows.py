@@ -2,13 +2,13 @@
 
 import csv
 import io
-import sys
 from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar, get_type_hints
 
 from shapeshift.app.errors import UsageError
+from shapeshift.app.terminal import print_text
 from shapeshift.runtime_models.files.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -73,11 +73,10 @@ class RowsFile(Generic[Row]):
 
 def write_lines(out: Path | None, lines: list[str]) -> None:
     """Into a file, or onto the terminal where none is named."""
-    text = "".join(f"{line}\n" for line in lines)
     if out is None:
-        sys.stdout.write(text)
+        print_text("\n".join(lines))
     else:
-        write_text(out, text)
+        write_text(out, "".join(f"{line}\n" for line in lines))
 
 
 def write_text(path: Path, text: str) -> None:
