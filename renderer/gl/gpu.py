@@ -104,6 +104,13 @@ class Gpu:
         self.release()
 
 
+def release_framebuffer(framebuffer: moderngl.Framebuffer) -> None:
+    """Gives back a framebuffer with all that was drawn into."""
+    for image in framebuffer.color_attachments:
+        image.release()
+    framebuffer.release()
+
+
 def groups_for(count: int, size: int) -> int:
     """Work groups of `size` invocations that cover `count`."""
     return -(-count // size)

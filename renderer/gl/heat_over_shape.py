@@ -4,7 +4,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.colors.heat_over_shape import blur_weights
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
 
 MOST = 256  # weights that the shader has room for: of pictures up to 20,000 pixels high
 
@@ -53,9 +53,7 @@ class HeatOverShape:
 
     def _release_between(self) -> None:
         if self._between is not None:
-            for texture in self._between.color_attachments:
-                texture.release()
-            self._between.release()
+            release_framebuffer(self._between)
             self._between = None
 
     def release(self) -> None:

@@ -3,7 +3,7 @@
 import moderngl
 import numpy as np
 
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
 from shapeshift.renderer.gl.window.window_bytes import WindowBytes
 from shapeshift.scene.appearance import Background, Sky, up_of_eye
 from shapeshift.scene.pose import View
@@ -110,9 +110,7 @@ class Resolve:
 
     def _release_bytes(self) -> None:
         if self._bytes is not None:
-            for texture in self._bytes.color_attachments:
-                texture.release()
-            self._bytes.release()
+            release_framebuffer(self._bytes)
             self._bytes = None
 
     def _upload(self, image: np.ndarray, which: int) -> moderngl.Texture:

@@ -4,7 +4,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
 from shapeshift.renderer.gl.target import DTYPES, HiddenDepths
 from shapeshift.scene.pose import View
 
@@ -115,14 +115,14 @@ class Splatter:
                 return old
         made = self._gpu.target(size, dtype, images)  # before the old one goes: it may be refused
         if old is not None:
-            _release_target(old)
+            release_framebuffer(old)
         self._targets[i] = made
         return made
 
     def release(self) -> None:
         self._hidden.release()
         for target in self._targets.values():
-            _release_target(target)
+            release_framebuffer(target)
         self._targets.clear()
         for _, triangles in self._programs.values():
             triangles.release()
@@ -132,9 +132,3 @@ class Splatter:
 
     def __exit__(self, *failure) -> None:
         self.release()
-
-
-def _release_target(target: moderngl.Framebuffer) -> None:
-    for image in target.color_attachments:
-        image.release()
-    target.release()

@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
 from shapeshift.renderer.layout import CULLED_KEY
 
 MAX_RESIDUAL_DISPARITY = 5.5  # pixels between the two ellipses of a splat, in the mean
@@ -92,9 +92,7 @@ class StereoPairSplatter:
 
     def _release_targets(self) -> None:
         if self.targets is not None:
-            for texture in self.targets.color_attachments:
-                texture.release()
-            self.targets.release()
+            release_framebuffer(self.targets)
             self.targets = None
 
     def release(self) -> None:

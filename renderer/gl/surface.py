@@ -10,7 +10,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.gl.gpu import Gpu, groups_for, release_framebuffer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.scene.pose import View
@@ -61,13 +61,13 @@ class DepthPictures:
         if old is None or old.size != size:
             made = self._gpu.target((size[0], size[1]), "f4")
             if old is not None:
-                _release_target(old)
+                release_framebuffer(old)
             self._targets[i] = made
         return self._targets[i]
 
     def release(self) -> None:
         for target in self._targets.values():
-            _release_target(target)
+            release_framebuffer(target)
         self._targets.clear()
         if self._surfaces is not None:
             self._surfaces.release()
@@ -113,7 +113,7 @@ def _draw(
         target.clear(0.0, 0.0, 0.0, 0.0)
     _draw_into(gpu, target, arena, view, settings, surfaces, output)
     pixels = np.frombuffer(target.color_attachments[0].read(), np.float32)
-    _release_target(target)
+    release_framebuffer(target)
     return pixels.reshape(height, width, 4)[::-1]
 
 
@@ -135,9 +135,3 @@ def _draw_into(
         gpu.ctx.blend_func = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
         triangles.render_indirect(arena.command, moderngl.TRIANGLES, count=1)
     triangles.release()
-
-
-def _release_target(target: moderngl.Framebuffer) -> None:
-    for image in target.color_attachments:
-        image.release()
-    target.release()

@@ -190,13 +190,18 @@ def _integers(path: Path, most: int) -> np.ndarray:
     return steps
 
 
+def mapped_numbers(path: Path) -> np.ndarray:
+    """A view of the numbers of a .npy file, whatever their shape: nothing is read yet."""
+    try:
+        return np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, OSError, OverflowError, EOFError, *BAD_HEADER):
+        raise BadFile(f"{path_end(path)}: no .npy of plain numbers; save it again") from None
+
+
 def _array(path: Path) -> np.ndarray:
     """A view of the (H, W) numbers of a .npy file: nothing is read yet."""
+    values = mapped_numbers(path)
     where = path_end(path)
-    try:
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, OverflowError, EOFError, *BAD_HEADER):
-        raise BadFile(f"{where}: no .npy of plain numbers; save it again") from None
     if values.ndim != 2 or values.dtype.kind not in "fui" or not 0 < values.size <= MOST_PIXELS:
         raise BadFile(
             f"{where}: a depth photo is (H, W) numbers, this is {values.shape!s:.40} of "

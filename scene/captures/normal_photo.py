@@ -8,13 +8,13 @@ import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import Fields
 from shapeshift.runtime_models.files.memory import Memory
-from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.depth_photo import (
     LOOKED_AT,
     at_pixels,
+    mapped_numbers,
     named_beside,
     refuse_other_view,
 )
@@ -127,11 +127,7 @@ def _colors(path: Path, most: int) -> np.ndarray:
 
 def _array(path: Path) -> np.ndarray:
     """A view of the (H, W, 3) numbers of a .npy file: nothing is read yet."""
-    where = path_end(path)
-    try:
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, OverflowError, EOFError, *BAD_HEADER):
-        raise BadFile(f"{where}: no .npy of plain numbers; save it again") from None
+    values, where = mapped_numbers(path), path_end(path)
     good = values.ndim == 3 and values.shape[2] == 3 and values.dtype.kind == "f"
     if not (good and 0 < values.size <= 3 * MOST_PIXELS):
         raise BadFile(

@@ -16,7 +16,7 @@ from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.shown import Beside, FrameRequest
 from shapeshift.app.editor.window.two_pictures import TwoPictures
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
 from shapeshift.renderer.gl.heat_over_shape import HeatOverShape
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile
@@ -84,9 +84,7 @@ class Split(TwoPictures):
 
     def _release_screen(self) -> None:
         if self._screen is not None:
-            for texture in self._screen.color_attachments:
-                texture.release()
-            self._screen.release()
+            release_framebuffer(self._screen)
             self._screen = None
 
     def release(self) -> None:

@@ -20,7 +20,7 @@ from shapeshift.app.editor.window.window import (
     Release,
     Window,
 )
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
 from shapeshift.renderer.gl.resolve import Resolve
 from shapeshift.renderer.renderer import Renderer
 
@@ -109,9 +109,7 @@ class TwoPictures:
 
     def _release_target(self) -> None:
         if self._target is not None:
-            for texture in self._target.color_attachments:
-                texture.release()
-            self._target.release()
+            release_framebuffer(self._target)
             self._target = None
 
     def release(self) -> None:

@@ -10,6 +10,7 @@ from shapeshift.app.headset.over.glass_state import seen_through
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.renderer.colors.palette import thermal_blend
 from shapeshift.renderer.colors.two_looks import same_shape
+from shapeshift.renderer.gl.gpu import release_framebuffer
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.pose import View
@@ -158,9 +159,7 @@ class HandGlass:
     def _release_part(self, i: int) -> None:
         part = self._parts.pop(i, None)
         if part is not None:
-            for texture in part.color_attachments:
-                texture.release()
-            part.release()
+            release_framebuffer(part)
 
     def close(self) -> None:
         """Gives all of it back; the context and the eyes' renderer stay."""

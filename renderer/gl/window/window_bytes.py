@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
 
 GL_TEXTURE0, GL_TEXTURE_2D, GL_RGBA, GL_BGRA = 0x84C0, 0x0DE1, 0x1908, 0x80E1
 GL_UNSIGNED_INT_8_8_8_8_REV, GL_NEAREST, GL_COLOR_BUFFER_BIT = 0x8367, 0x2600, 0x4000
@@ -110,7 +110,5 @@ class WindowBytes:
 
     def release(self) -> None:
         if self._source is not None:
-            for texture in self._source.color_attachments:
-                texture.release()
-            self._source.release()
+            release_framebuffer(self._source)
             self._source = None
