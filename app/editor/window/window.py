@@ -362,6 +362,7 @@ class Window:
                 self._note(Release(BUTTONS[button]))
             return
         if self._over_overlay(x, y):
+            self._last_click = (x, y, -1.0)  # clicks with one on a panel between are two clicks
             return
         if self._pressed is not None:  # one button at a time: who had the first one hears its end
             self._note(Release(self._pressed))

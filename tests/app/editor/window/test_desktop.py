@@ -10,7 +10,7 @@ from PIL import Image
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.window import hands
-from shapeshift.app.editor.window.window import DoubleClick, Drag, Drop, KeyDown, Wheel
+from shapeshift.app.editor.window.window import DoubleClick, Drag, Drop, KeyDown, Press, Wheel
 from shapeshift.renderer.settings import RenderSettings
 from tests.support.desktop.desktop_stand import read_stub, run_frames, until_opened
 
@@ -235,6 +235,19 @@ def test_two_quick_clicks_on_one_place_are_a_double_click(
     monkeypatch.setattr(viewer, "handle_event", events.append)
     run_frames(viewer, 1)
     assert sum(isinstance(event, DoubleClick) for event in events) == double
+
+
+def test_a_click_on_a_panel_between_two_quick_ones_makes_them_two_clicks(viewer, monkeypatch):
+    monkeypatch.setattr(glfw, "get_time", lambda: 1000.0)
+    left, top, right, bottom = next(iter(viewer.window.covered))
+    for x, y in ((600, 200), ((left + right) / 2, (top + bottom) / 2), (600, 200)):
+        glfw_click(viewer.window, x, y)
+        glfw_release(viewer.window)
+    events = []
+    monkeypatch.setattr(viewer, "handle_event", events.append)
+    run_frames(viewer, 1)
+    assert sum(isinstance(event, Press) for event in events) == 2
+    assert not any(isinstance(event, DoubleClick) for event in events)
 
 
 # Files and pictures
