@@ -86,25 +86,48 @@ class Exposures:
         self.begin = fraction + FROM
         self.begin_step = step + VISITS * len(self.row)
 
+    def known(self, modality: str) -> np.ndarray | None:
+        """(n, 3) logarithms of the gains of a modality's photos that were looked at.
+
+        None while they are too few, or the model shows too little of its photos.
+        """
+        logs, like = (of[self.rows[modality]] for of in (self.log_gain, self.correlation))
+        seen = np.isfinite(logs).all(axis=1)
+        enough = seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE
+        return logs[seen] if enough else None
+
+    def seen_from(self, modality: str) -> np.ndarray:
+        """(n, 3) metres: the places of the cameras of the photos in `known`."""
+        rows = np.array(self.rows[modality])
+        return self.eyes[rows[np.isfinite(self.log_gain[rows]).all(axis=1)]]
+
     def spread(self, modality: str) -> float:
         """Of the logarithms of a modality's gains, by their median deviation, as a standard one.
 
-        0 while too few of them are known, the model shows too little of its photos, or gains follow
-        the cameras' places and have little in common.
+        0 while nothing is known of them, or where gains follow the cameras' places and have little
+        in common.
         """
-        rows = self.rows[modality]
-        known, like, eyes = self.log_gain[rows], self.correlation[rows], self.eyes[rows]
-        seen = np.isfinite(known).all(axis=1)
-        if not (seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE):
+        known = self.known(modality)
+        if known is None:
             return 0.0
-        away = known[seen] - np.median(known[seen], axis=0)
+        away = known - np.median(known, axis=0)
         each = NORMAL * np.median(np.abs(away), axis=0)
         spread = float(np.sqrt((each**2).mean()))
         if not spread > NOISE:  # nothing is evened out; no need to ask why
             return spread
         usual = np.clip(away, -OUTLIER * each, OUTLIER * each)
         alike = common(usual) >= COMMON
-        return spread if alike or by_place(usual, eyes[seen]) <= BY_PLACE else 0.0
+        return spread if alike or by_place(usual, self.seen_from(modality)) <= BY_PLACE else 0.0
+
+    def alike(self, modality: str) -> bool:
+        """Whether the photos of a modality are known to have one exposure.
+
+        Else light by direction would learn the brightness of each photo, as no two are taken from
+        one place.  Fewer than FEWEST never tell, and count as alike.
+        """
+        if self.one_exposure or len(self.rows[modality]) < FEWEST:
+            return True
+        return self.known(modality) is not None and self.spread(modality) <= NOISE
 
     def gain(self, photo: LoadedPhoto) -> Gain:
         """What the photo's colours are times the model's; NONE where all photos are alike."""
