@@ -159,7 +159,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
   const int begin = tile_start[tile], end = tile_start[tile + 1];
 #if !defined(HEAT) && !defined(FOVEATED)
-  if (begin == end) {
+  if (begin == end) {  // most of a picture with one object in it
     clear_tile(x0, y0, width, height, image);
     return;
   }
@@ -196,8 +196,8 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
 #endif
   // Bit k: block k still takes splats.
   uint open = used;
-  // A batch is made before the one that precedes it is drawn: the processor has its masks by the time
-  // that a block asks for them.  The last one is often in vain.
+  // A batch is made before the one that precedes it is drawn: the processor has its masks by the
+  // time that a block asks for them.  The last one is often in vain.
   Batch batches[2];
 #define FETCH(p, into) fetch(p, end, x0, y0, intersections, record, into GIVE_HEAT_IN)
   int p = begin, n = FETCH(p, batches);
