@@ -138,7 +138,7 @@ def measure(viewer: Viewer) -> list[str]:
         taken: dict[tuple[str, str], list[float]] = defaultdict(list)
         for _ in range(TURNS):
             for way, presented in ways.items():
-                window.presented, viewer.renderer.taker = presented, presented.take
+                window.presented, viewer.renderer.taker = presented, presented.take_picture
                 for number in range(FRAMES):
                     change(number)
                     window.wait(0.0)
@@ -149,7 +149,7 @@ def measure(viewer: Viewer) -> list[str]:
                             taken[way, part].append(sum(ms))
         seen = []
         for presented in ways.values():
-            window.presented, viewer.renderer.taker = presented, presented.take
+            window.presented, viewer.renderer.taker = presented, presented.take_picture
             alone.grays = repeat(0.2)
             viewer.shown.forget()
             viewer.frame(0.0)

@@ -32,12 +32,12 @@ class Layered:
 
     def keep_bytes(self, pixels: np.ndarray) -> None:
         """The same of a picture that no window has yet, (H, W, 4) uint8 as a window has them."""
-        self._picture.put(pixels)
+        self._picture.upload(pixels)
         self._holds = False
 
     def show_bytes(self, pixels: np.ndarray, window: moderngl.Framebuffer) -> None:
         """Fills the window with a picture and all that is over it."""
-        self._whole.put(pixels)
+        self._whole.upload(pixels)
         self._whole.show(window)
         self._holds = False
 

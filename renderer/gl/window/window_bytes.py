@@ -56,7 +56,7 @@ class WindowBytes:
 
     def copy(self, pixels: np.ndarray, framebuffer: moderngl.Framebuffer) -> None:
         """Fills the viewport of a window's, which is bound, with (H, W, 4) uint8 of its size."""
-        self.put(pixels)
+        self.upload(pixels)
         self._show(framebuffer)
 
     def show(self, framebuffer: moderngl.Framebuffer) -> None:
@@ -77,7 +77,7 @@ class WindowBytes:
             taken = (left, below + height, left + width, below)
             self._blit(framebuffer, taken, (0, 0, width, height))
 
-    def put(self, pixels: np.ndarray) -> None:
+    def upload(self, pixels: np.ndarray) -> None:
         """Holds (H, W, 4) uint8 from now on."""
         height, width = pixels.shape[:2]
         self.lay_out((width, height))

@@ -59,7 +59,7 @@ class Presented:
         make, self._pending = self._pending, None
         return make
 
-    def take(self, make: MakeBytes, framebuffer: moderngl.Framebuffer) -> bool:
+    def take_picture(self, make: MakeBytes, framebuffer: moderngl.Framebuffer) -> bool:
         """A renderer's WindowTaker: a picture of the whole window waits for what lies over it."""
         whole = framebuffer.glo == 0 and framebuffer.viewport == (0, 0, *self._size())
         self._pending = make if whole and self.kept is not None else None

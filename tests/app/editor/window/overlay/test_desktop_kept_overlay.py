@@ -263,7 +263,7 @@ def test_half_of_a_window_is_copied_at_once(viewer, kept):
     screen, (width, height) = viewer.window.screen(), viewer.window.size
     black = np.zeros((height, width, 4), np.uint8)
     screen.viewport = (0, 0, width // 2, height)
-    assert not viewer.window.presented.take(lambda **_: black[:, : width // 2], screen)
+    assert not viewer.window.presented.take_picture(lambda **_: black[:, : width // 2], screen)
     screen.viewport = (0, 0, width, height)
-    assert viewer.window.presented.take(lambda **_: black, screen)
+    assert viewer.window.presented.take_picture(lambda **_: black, screen)
     assert (viewer.window.picture() == 0).all()
