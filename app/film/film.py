@@ -66,8 +66,8 @@ class Options(ClusterOptions, DrawingOptions):
     every: int = 1
     """Draw each N-th frame alone, for a first look; the film stays as long."""
     codec: Literal["", "h264", "av1", "vp9"] = ""
-    """How a video is packed.  Default: h264 in .mp4, vp9 in .webm.  With av1 and vp9 the file is the same to the byte each
-    time; of h264 only the frames are."""
+    """How a video is packed.  Default: h264 in .mp4, vp9 in .webm.  With av1 and vp9 the file is
+    the same to the byte each time; of h264 only the frames are."""
     background: tuple[float, float, float] | None = None
     """Red, green and blue behind everything, 0 to 1 as displayed.  Default: what the scene was
     trained on, else black."""
