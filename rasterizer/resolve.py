@@ -27,7 +27,7 @@ class Behind:
 
 
 @dataclass(frozen=True)
-class Overlay:
+class WindowOverlay:
     """What is laid over a window's picture."""
 
     layer: np.ndarray  # (H, W, 4) uint8, premultiplied; blue first and row 0 on top
@@ -45,7 +45,7 @@ def resolve(
     heat: np.ndarray | None = None,
     *,
     as_window: bool = False,
-    overlay: Overlay | None = None,
+    overlay: WindowOverlay | None = None,
 ) -> np.ndarray:
     """(H, W, 4) uint8, opaque, of image (H, W, 4) float32: red first and row 0 at the bottom, as GL
     wants it, or as a window has it in memory: blue first and row 0 on top.

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.resolve import Overlay
+from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
@@ -193,7 +193,7 @@ class Drawing(ABC):
 
     def presentable_bytes(
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
-        heat: bool = False, as_window: bool = False, overlay: Overlay | None = None,
+        heat: bool = False, as_window: bool = False, overlay: WindowOverlay | None = None,
     ) -> np.ndarray:  # fmt: skip
         """(H, W, 4) uint8 of view i as a window shows it, opaque: red first and row 0 at the
         bottom, or as a window has it in memory, blue first and row 0 on top.

@@ -113,9 +113,9 @@ class Renderer:
                 if not obj.seen:
                     continue
                 key, first = control_key(obj), decoded.key is None
+                x = control_of(obj) if decoded.key != key else decoded.x
                 # Another key with the same x: a selector changed where nothing is.
-                if decoded.key != key and (first or not same_controls(control_of(obj), decoded.x)):
-                    x = control_of(obj)
+                if decoded.key != key and (first or not same_controls(x, decoded.x)):
                     # What follows the eye is decoded with the colours, once the eye is known.
                     follows = first or shape_follows_control(obj.model)
                     # What has leaves comes with the stream.

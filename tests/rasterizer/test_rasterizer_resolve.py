@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.resolve import Overlay, resolve
+from shapeshift.rasterizer.resolve import WindowOverlay, resolve
 from shapeshift.renderer.colors.palette import apply_palette, overlay_heat, palette_colors
 from tests.support.renderer.rasterizer_scenes import device
 
@@ -69,14 +69,14 @@ def test_an_overlay_lies_over_a_windows_picture_in_its_boxes_alone(width):
     for left, top, right, low in boxes:
         inside[top:low, left:right] = True
     bare = resolve(device(), rgba, background, as_window=True).copy()
-    overlay = Overlay(layer, np.array(boxes, np.int32))
+    overlay = WindowOverlay(layer, np.array(boxes, np.int32))
     got = resolve(device(), rgba, background, as_window=True, overlay=overlay)
     np.testing.assert_array_equal(got[~inside], bare[~inside])
     want = laid_over(bare.astype(np.float64), layer.astype(np.float64))
     # Halves of a step, and what (p + p / 256 + 128) / 256 is beside p / 255 + 1 / 2: 1 / 256.
     assert np.abs(got[inside] - want[inside]).max(initial=0) <= 0.5 + 1 / 255
     assert (got[..., 3] == 255).all()
-    none = Overlay(layer, np.zeros((0, 4), np.int32))
+    none = WindowOverlay(layer, np.zeros((0, 4), np.int32))
     np.testing.assert_array_equal(
         resolve(device(), rgba, background, as_window=True, overlay=none), bare
     )
@@ -87,6 +87,6 @@ def test_what_is_more_than_its_alpha_stays_white():
     picture = np.ones((1, 4, 4), np.float32)
     layer = np.full((1, 4, 4), 200, np.uint8)
     layer[..., 3] = 199
-    overlay = Overlay(layer, np.array([(0, 0, 4, 1)], np.int32))
+    overlay = WindowOverlay(layer, np.array([(0, 0, 4, 1)], np.int32))
     got = resolve(device(), picture, (1, 1, 1), as_window=True, overlay=overlay)
     assert (got == 255).all()

@@ -138,10 +138,10 @@ class EditorCamera:
         shown = self._goal - self._lag
         key = (shown.tobytes(), self.radius, self.fov_y, self.near_m, size, free)
         if self._eye_view is None or self._eye_view[0] != key:
-            self._eye_view = (key, self._view_of(shown, size, free or (0, 0, *size)))
+            self._eye_view = (key, self.view_of(shown, size, free or (0, 0, *size)))
         return self._eye_view[1]
 
-    def _view_of(self, shown: np.ndarray, size: tuple[int, int], free: Box) -> View:
+    def view_of(self, shown: np.ndarray, size: tuple[int, int], free: Box) -> View:
         right, up, forward = axes_of(shown[YAW], shown[PITCH], shown[ROLL])
         world_from_eye = np.eye(4)
         world_from_eye[:3, :3] = np.stack([right, up, -forward], axis=1)

@@ -17,7 +17,7 @@ from shapeshift.app.editor.window.overlay.triangles import (
     read_lists,
     tiles_of,
 )
-from shapeshift.rasterizer.resolve import Overlay
+from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import MakeBytes
 from shapeshift.renderer.gl.window.layered import Layered
@@ -38,7 +38,7 @@ class KeptOverlay(ModernGLRenderer):
         super().__init__(wnd=None, ctx=ctx, display_size=logical_size)
         self._gpu = Gpu(ctx)
         self._layer, self._layered = WindowBytes(self._gpu), Layered(self._gpu)
-        self._bytes: np.ndarray | None = None  # the layer once more, as Overlay has it
+        self._bytes: np.ndarray | None = None  # the layer once more, as WindowOverlay has it
         self._unread: list[PixelBox] = []  # where it differs from that
         self._tiles: np.ndarray | None = None  # that the overlay covers
         self._covered: list[PixelBox] = []  # these, as few boxes
@@ -101,7 +101,7 @@ class KeptOverlay(ModernGLRenderer):
             self._bytes[top:low, left:right] = self._layer.read_box((left, top, right, low))
         self._unread = []
         boxes = np.array(self._covered, np.int32).reshape(-1, 4)
-        self._layered.show_bytes(make(overlay=Overlay(self._bytes, boxes)), window)
+        self._layered.show_bytes(make(overlay=WindowOverlay(self._bytes, boxes)), window)
 
     @property
     def _texture(self) -> moderngl.Texture:

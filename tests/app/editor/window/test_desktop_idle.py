@@ -144,9 +144,9 @@ def test_a_minimised_window_that_may_not_close_comes_back_to_ask(viewer, display
 def test_a_frame_computes_its_view_once(viewer, monkeypatch):
     """It asks for it five times and more: for the picture, regions, the camera's section..."""
     computed = []
-    of = EditorCamera._view_of
+    of = EditorCamera.view_of
     monkeypatch.setattr(
-        EditorCamera, "_view_of", lambda self, *what: (computed.append(what), of(self, *what))[1]
+        EditorCamera, "view_of", lambda self, *what: (computed.append(what), of(self, *what))[1]
     )
     for _ in range(3):
         viewer.viewpoint.camera.turn(0.1, 0.0)

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from shapeshift.app.editor.window.window import KeyDown
-from shapeshift.rasterizer.resolve import Overlay
+from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.rasterizer.resolve import resolve as resolve_bytes
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
@@ -183,7 +183,7 @@ def takes_bytes(viewer, monkeypatch, taken: list) -> np.ndarray:
             taken.append(waits)
             return waits
 
-        def make(as_window: bool = False, overlay: Overlay | None = None) -> np.ndarray:
+        def make(as_window: bool = False, overlay: WindowOverlay | None = None) -> np.ndarray:
             return resolve_bytes(device(), image, (0, 0, 0), as_window=as_window, overlay=overlay)
 
         resolve.copy(make, framebuffer, taker)
