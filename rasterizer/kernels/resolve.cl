@@ -3,9 +3,8 @@
 // Reads:   image (H, W, 4), premultiplied, row 0 on top; a palette; heat (H, W, 2) or none; a sky's
 //          rows or none.
 // Writes:  pixels (H, W, 4) bytes: red first and row 0 at the bottom, as GL wants it, or blue first
-//          and row 0 on top, as the memory of a window has it.
+//          and row 0 on top, as the memory of a window has it; lay_over: an overlay over these.
 // Units:   display sRGB; a palette's places are luminance 0..1.
-// lay_over, after it, lays an overlay of 8 bits over a window's picture.
 #define STEPS 256  // colours of a palette
 #define GROUP 16   // pixels whose values are found at once
 
@@ -66,8 +65,8 @@ __kernel void resolve(int width, int height, float red, float green, float blue,
   __global const float2* warm = heat ? heat + (size_t)y * width : 0;
   for (int first = 0; first < width; first += GROUP) {
     const int count = min(width - first, GROUP);
-    // Of each pixel which entry of the palette is the last one below its value, how far the value is
-    // above it, and how much of the pixel has a value: all of a group at once, then its colours.
+    // Of each pixel which entry of the palette is the last one below its value, how far the value
+    // is above it, and how much of the pixel has one: of a group at once, then its colours.
     int below[GROUP];
     float beyond[GROUP], weight[GROUP];
     values(count, row + first, warm ? warm + first : 0, below, beyond, weight);
@@ -84,8 +83,8 @@ __kernel void resolve(int width, int height, float red, float green, float blue,
   }
 }
 
-// Four pixels of a premultiplied layer over a picture, products to the nearest in steps of 8 bits as
-// llvmpipe's blending has them, to the bit.
+// Four pixels of a premultiplied layer over a picture; products to the nearest in steps of 8 bits,
+// as llvmpipe's blending has them, to the bit.
 inline uchar16 over(uchar16 layer, uchar16 picture) {
   const ushort16 upper = convert_ushort16(layer);
   const ushort16 seen = (ushort16)(255) - upper.s33337777bbbbffff;
