@@ -29,7 +29,7 @@ inline void values(int count, __global const float4* color, __global const float
   for (int i = 0; i < GROUP; i++) {
     // What of the pixel's value is of how much of it: the palette colours what is there, not the
     // background.
-    const int at = min(i, count - 1);
+    const int at = min(i, count - 1);  // a fixed count of steps becomes vectors
     const float4 of = color[at];
     value[i] = heat ? heat[at].x : 0.2126f * of.x + 0.7152f * of.y + 0.0722f * of.z;
     weight[i] = heat ? heat[at].y : of.w;
@@ -90,6 +90,7 @@ inline uchar16 over(uchar16 layer, uchar16 picture) {
   const ushort16 seen = (ushort16)(255) - upper.s33337777bbbbffff;
   const ushort16 product = convert_ushort16(picture) * seen;  // up to 255 * 255
   const ushort16 lower = (product + (product >> 8) + (ushort16)(128)) >> 8;
+  // At most white: a layer that was rounded often may have a step more colour than alpha.
   return convert_uchar16(min(upper + lower, (ushort16)(255)));
 }
 
@@ -109,6 +110,7 @@ __kernel void lay_over(int width, int count, __global const int4* boxes,
                                 vload16(0, (__global const uchar*)(row + x)));
       vstore16(four, 0, (__global uchar*)(row + x));
     }
+    // What is left of a row's end: by the same steps, as one of four alike.
     for (; x < box.z; x++) row[x] = over((uchar16)(from[x], from[x], from[x], from[x]),
                                          (uchar16)(row[x], row[x], row[x], row[x])).s0123;
   }
