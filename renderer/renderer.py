@@ -343,8 +343,8 @@ class Renderer:
                 make = partial(self.drawing.presentable_bytes, i, *looks)
                 self._resolve.copy(make, framebuffer, self.taker)
             else:
-                looks = (1.0 if self._debug else self.drawing.unit_of(i), view)
-                self._resolve.draw(image, framebuffer, background, palette, heat, *looks)
+                how = (1.0 if self._debug else self.drawing.unit_of(i), view)
+                self._resolve.draw(image, framebuffer, background, palette, heat, *how)
 
     def coverage(self, i: int = 0) -> moderngl.Texture | np.ndarray:
         """How much splats hide in view i: the alpha of a GL texture, or (H, W), row 0 on top."""
