@@ -33,6 +33,8 @@ WHITE, BLACK, SKY = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.62, 0.75, 0.9)
 GOLDEN = (5**0.5 - 1) / 2
 WRONG_METRES, WRONG_DEGREES = 0.3, 8.0  # of a wrong pose, where things are a metre away
 EXPOSURE = 0.3  # by how much photos may be brighter or darker
+PHONE_LENS = (-0.11, 0.02)  # k1 and k2 of nerfstudio's OPENCV: lines at the rim bow outwards
+EXIF_ORIENTATION, ON_ITS_SIDE = 0x0112, 6  # the tag, and what it says of a phone held upright
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,9 @@ class Kind:
     backdrop: bool = False  # a patterned wall behind, that stands still while the object turns
     exposure: float = 0.0  # share by which photos differ in brightness
     wrong: float = 0.0  # share of the photos whose pose is wrong
+    lens: tuple[float, float] = (0.0, 0.0)  # k1 and k2
+    missing: float = 0.0  # share of the photos that are named and not there
+    phone: bool = False  # JPEGs that say in EXIF that they lie on their side, as poses know them
     views_usually: int = 48
 
 
@@ -201,6 +206,9 @@ KINDS = {
     "twelve": Kind(a_table, around((0, 0.1, 0), 1.5, 15, 60), WHITE, views_usually=12),
     "wrong_poses": Kind(a_table, around((0, 0.1, 0), 1.5, 12, 60), SKY, wrong=0.02,
                         views_usually=100),
+    "table_white": Kind(a_table, around((0, 0.1, 0), 1.5, 12, 60), WHITE, views_usually=42),
+    "phone": Kind(a_room, from_inside, exposure=0.15, lens=PHONE_LENS, missing=0.15, phone=True,
+                  views_usually=64),
 }  # fmt: skip
 
 
@@ -214,6 +222,29 @@ def radiance(kind: Kind, here: Place, wall: Pattern):
         return color, hits.index
 
     return look_along
+
+
+def straightened(x: np.ndarray, y: np.ndarray, lens: tuple[float, float]) -> tuple:
+    """Tangents of the rays whose pixels a lens k1, k2 puts at x, y (OpenCV's model)."""
+    k1, k2 = lens
+    straight_x, straight_y = x, y
+    for _ in range(30):  # fixed point; from 20 on nothing changes any more
+        square = straight_x**2 + straight_y**2
+        factor = 1 + k1 * square + k2 * square**2
+        straight_x, straight_y = x / factor, y / factor
+    return straight_x, straight_y
+
+
+def through_lens(view: View, lens: tuple[float, float], look_along):
+    """The same radiance, of the rays that a view's pixels get through a lens."""
+    world_from_eye = view.world_from_eye.matrix()[:3, :3]
+
+    def bent(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        x, y, z = (d @ world_from_eye).T
+        x, y = straightened(x / -z, y / -z, lens)
+        return look_along(o, unit(np.stack([x, y, -np.ones_like(x)], 1) @ world_from_eye.T))
+
+    return bent
 
 
 def still_wall(view: View, wall: Pattern) -> Pattern:
@@ -238,8 +269,14 @@ def frame_of(name: str, view: View, ours_from: np.ndarray) -> dict:
 
 
 def save_photo(path: Path, image: np.ndarray) -> None:
+    photo = Image.fromarray(np.rint(255 * np.clip(image, 0, 1)).astype(np.uint8))
     with whole_file(path) as file:
-        Image.fromarray(np.rint(255 * np.clip(image, 0, 1)).astype(np.uint8)).save(file, "PNG")
+        if path.suffix == ".png":
+            photo.save(file, "PNG")
+            return
+        exif = Image.Exif()
+        exif[EXIF_ORIENTATION] = ON_ITS_SIDE
+        photo.save(file, "JPEG", quality=92, exif=exif)
 
 
 def make_stranger(
@@ -257,17 +294,24 @@ def make_stranger(
     views = kind.views(kind.views_usually if count is None else count, size)
     make_folders(folder, "images")
     frames, wrong = [], set(rng.permutation(len(views))[: round(kind.wrong * len(views))].tolist())
+    lost: set[int] = set()
+    if kind.missing:  # else nothing is drawn, so that older kinds stay as they are
+        lost = set(rng.permutation(len(views))[: round(kind.missing * len(views))].tolist())
     for i, view in enumerate(views):
-        file = f"images/frame_{i:05}.png"
+        file = f"images/frame_{i:05}.{'jpg' if kind.phone else 'png'}"
         behind = still_wall(view, wall) if kind.backdrop else wall
-        image, _ = photograph(view, radiance(kind, here, behind))
+        seen = radiance(kind, here, behind)
+        if any(kind.lens):
+            seen = through_lens(view, kind.lens, seen)
         gain = 1 + kind.exposure * rng.uniform(-1, 1)
-        save_photo(folder / file, gain * image)
+        if i not in lost:
+            save_photo(folder / file, gain * photograph(view, seen)[0])
         stated = view
         if i in wrong:
             eye = np.asarray(view.world_from_eye.position)
             stated = wrong_pose(view, rng, float(np.sqrt(dot(eye[None], eye[None])[0])))
         frames.append(frame_of(file, stated, Z_UP))
-    data = {"camera_model": "OPENCV", "frames": frames}
+    bends = dict(zip(("k1", "k2"), kind.lens, strict=True)) if any(kind.lens) else {}
+    data = {"camera_model": "OPENCV"} | bends | {"frames": frames}
     write_whole(folder / "transforms.json", json.dumps(data, indent=1).encode())
     return here, views
