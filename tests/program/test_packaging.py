@@ -81,7 +81,7 @@ def test_committed_rows_name_a_program_that_is_there():
 
 
 def test_nothing_is_kept_in_git_that_is_ignored():
-    """An environment or a link to one, once: whoever checks that out loses the one that is there."""
+    """A link to an environment was, once: whoever checked it out lost the one that was there."""
     listed = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=False)
     if done.returncode:
