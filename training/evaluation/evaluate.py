@@ -129,7 +129,7 @@ def evaluate_model(
     model: Model,
     capture: Capture,
     downscale: int | None = None,
-    masks: str = "object",
+    masks: str = "auto",
     background: str = "auto",
     distance: Callable[..., float] | None = None,
 ) -> dict[str, ModalityScore]:
