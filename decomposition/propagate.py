@@ -158,9 +158,15 @@ def decide(
     at = choose(judged, [candidate.score for candidate in candidates], own)
     if at is None:
         return Decision(view, REJECTED)
-    support.learn(insides[at], total)
+    # Sums are rounded in each part that the masks cut the picture into: measured once more without
+    # the others, so that who goes on from this mask alone learns the same from it.
     chosen = candidates[at]
-    return Decision(view, ACCEPTED, chosen.mask, judged[at].f * known, chosen.score)
+    (inside,), total = shown(view, [chosen.mask])
+    alone = judge(support, inside, total, int(chosen.mask.sum()))
+    if choose([alone], [chosen.score], own) is None:
+        return Decision(view, REJECTED)
+    support.learn(inside, total)
+    return Decision(view, ACCEPTED, chosen.mask, alone.f * known, chosen.score)
 
 
 def merge(

@@ -6,6 +6,12 @@ from typing import Protocol
 
 import numpy as np
 
+Throttle = Callable[[int], None]  # told how many pixels were decoded since; it may wait
+
+
+def unpaced(pixels: int) -> None:
+    """Nothing to wait for."""
+
 
 @dataclass(frozen=True)
 class LeafLevels:
@@ -61,9 +67,9 @@ class LeafSource(Protocol):
     def broken(self) -> np.ndarray:
         """(parts,) bool: what can never be read."""
 
-    def load(self, part: int, pace: Callable[[], None] = lambda: None) -> None:
-        """Decodes a part, so that it is at hand; any thread.  pace is called between pieces of the
-        work, and may wait.  Raises BadFile.
+    def load(self, part: int, pace: Throttle = unpaced) -> None:
+        """Decodes a part, so that it is at hand; any thread.  pace is called after each piece of
+        the work.  Raises BadFile.
         """
 
     def read(self, leaves: np.ndarray, levels: np.ndarray) -> Iterator[LeafSplats]:

@@ -7,7 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.model import AnchorModel, BadFile, Model, SplatLayers
+from shapeshift.runtime_models.bounds import frame_points
+from shapeshift.runtime_models.model import (
+    AnchorModel,
+    BadFile,
+    CoarserAnchors,
+    Model,
+    SplatLayers,
+)
 from shapeshift.runtime_models.shapes import three
 
 BACKGROUND = 0  # its label
@@ -64,13 +71,37 @@ def part_of(model: Model, label: int) -> tuple[Model, Place]:
     if isinstance(model, AnchorModel):
         part = labelled_anchors(model, label)
         middle = middle_of(part.anchors, label)
-        moved = (part.anchors - middle).astype(np.float32)
-        return replace(part, anchors=moved), three(middle)
+        moved = replace(part, anchors=(part.anchors - middle).astype(np.float32))
+        coarser = coarser_part(model, part, middle, label)
+        return moved.with_coarser(coarser) if coarser else moved, three(middle)
     assert isinstance(model, SplatLayers) and model.labels is not None, "find_label refuses others"
     few = model.with_rows(model.labels == label)
     middle = middle_of(few.means, label)
     origin = three(np.add(few.origin, middle))
     return replace(few, means=(few.means - middle).astype(np.float32), origin=origin), three(middle)
+
+
+def coarser_part(
+    model: AnchorModel, part: AnchorModel, middle: np.ndarray, label: int
+) -> tuple[CoarserAnchors, ...]:
+    """The part's rows of each level of detail, which keep labels apart, as far as they have any.
+
+    A level was measured by the size of the whole: the part takes it at as many pixels a metre.
+    """
+    if not model.coarser:
+        return ()
+    _, whole = frame_points(model.anchors, np.ones(len(model.anchors)))
+    _, mine = frame_points(part.anchors, np.ones(len(part.anchors)))
+    out = []
+    for level, one in zip(model.levels[1:], model.coarser, strict=True):
+        assert level.labels is not None, "a level has labels where its model has"
+        rows = level.with_anchors(np.flatnonzero(level.labels == label))
+        if not len(rows.anchors):
+            break
+        pixels, anchors = one.from_pixels * mine / whole, rows.anchors - middle
+        columns = {name: getattr(rows, name) for name in ("features", "frames", "labels", "light")}
+        out.append(replace(one, anchors=anchors.astype(np.float32), from_pixels=pixels, **columns))
+    return tuple(out)
 
 
 def labelled_anchors(model: AnchorModel, label: int) -> AnchorModel:

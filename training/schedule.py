@@ -10,6 +10,10 @@ import numpy as np
 from shapeshift.training.photos import BLACK, LoadedPhoto
 
 TRAINED = 0.5  # of the seconds at least: a start that took more makes the run as much longer
+# Of the run: until then things find their places, and photos their exposures.  With light by
+# direction that learns from the first step on, veils stand in the air that look right from each
+# photo and wrong from elsewhere: docs/bench/README.md, "Strangers".
+LIGHT_FROM = 0.3
 WARM_UP_STEPS = 200
 LEAST_RATE = 0.01  # of the networks' rates, at the first step of a warm-up
 

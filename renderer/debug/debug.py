@@ -4,6 +4,7 @@ The drawings give what they hold (splat_points), take other colours (write_color
 fragments (overdraw); everything else is numpy on the CPU, the same for quads and tiles.
 """
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +20,7 @@ from shapeshift.renderer.settings import (
     FrameStats,
     RenderSettings,
 )
+from shapeshift.renderer.streaming.stream import has_leaves
 from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.parts import name_of, splat_labels
 from shapeshift.runtime_models.shapes import three
@@ -74,8 +76,22 @@ def prepare_debug(drawing: DebugDrawing, views: list[View], scene: Scene, name: 
     """Before the draw: other colours for depth and object; True where the scene's are gone."""
     if name not in RECOLORED or not scene.splat_count:
         return False
-    drawing.write_colors(splat_colors(drawing.splat_points(), views[0], scene, name))
+    given = drawing.splat_points()
+    points, rows = by_object(given)
+    colors = np.zeros((len(given[1]), 3), np.float32)
+    colors[rows] = splat_colors(points, views[0], scene, name)
+    drawing.write_colors(colors)
     return True
+
+
+def by_object(points: Points) -> tuple[Points, np.ndarray]:
+    """The points of all objects, one object after the other, and which rows (n,) they were: in
+    pages they lie anywhere, and pages that are free belong to object -1.
+    """
+    rows = np.argsort(points[1], kind="stable")
+    rows = rows[np.searchsorted(points[1][rows], 0) :]
+    mean_opacity, owner, covariance = (array[rows] for array in points)
+    return (mean_opacity, owner, covariance), rows
 
 
 def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndarray:
@@ -91,7 +107,8 @@ def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndar
     for i, start, end in runs(points[1], len(scene.objects)):
         # Its near side bright and its far side dark, or an object would be a flat shape.
         mine = np.nan_to_num(depth[start:end])
-        near, far = np.percentile(mine, [2, 98])
+        there = points[0][start:end, 3] > 0  # rows of a page that is not full are nowhere
+        near, far = np.percentile(mine[there] if there.any() else mine, [2, 98])
         shade = 1 - 0.75 * np.clip((mine - near) / max(far - near, 1e-6), 0, 1)
         table = np.array([object_color(k) for k in range(firsts[i], firsts[i] + counts[i])])
         colors[start:end] = shade[:, None] * table[ranks[i]]
@@ -120,8 +137,9 @@ def debug_image(
     if settings.debug in EDGES:
         return drawing.edges(i, view, settings, settings.debug)[..., :3].copy(), {}
     if settings.debug == "object":
-        return np.ascontiguousarray(rgba[..., :3]), object_counts(scene)
-    points, poses = drawing.splat_points(), object_poses(scene)
+        there = shown_splats(by_object(drawing.splat_points())[0], len(scene.objects))
+        return np.ascontiguousarray(rgba[..., :3]), object_counts(scene, there)
+    points, poses = by_object(drawing.splat_points())[0], object_poses(scene)
     if settings.debug == "depth":
         return depth_picture(rgba, -eye_places(points, poses, view.eye_from_world())[2])
     antialiased = tuple(is_antialiased(obj.model) for obj in scene.objects)
@@ -203,16 +221,24 @@ def object_poses(scene: Scene) -> np.ndarray:
     return np.reshape(poses, (-1, 4, 4))
 
 
-def object_counts(scene: Scene) -> dict[str, float]:
-    """Splats of each part of each object by its name; equal names get a number."""
+def object_counts(scene: Scene, shown: Sequence[int]) -> dict[str, float]:
+    """Splats of each part of each object by its name; equal names get a number.  Of objects whose
+    splats come and go as many as are shown (O,).
+    """
     counts: dict[str, float] = {}
     for i, (obj, parts) in enumerate(zip(scene.objects, object_parts(scene), strict=True)):
-        for label, count in parts:
+        for label, count in [(None, shown[i])] if has_leaves(obj.model) else parts:
             name = obj.name
             if label is not None:
                 name += f", {name_of(obj.model, label) or f'label {label}'}"
             counts[name if name not in counts else f"{name} {i + 1}"] = float(count)
     return counts
+
+
+def shown_splats(points: Points, objects: int) -> Sequence[int]:
+    """(O,) splats of each object that are there."""
+    mean_opacity, owner, _ = points
+    return np.bincount(owner[mean_opacity[:, 3] > 0], minlength=objects).tolist()
 
 
 def object_parts(scene: Scene) -> list[list[tuple[int | None, int]]]:

@@ -100,10 +100,7 @@ def choose(
         return level, worth
     left = budget - int(used[len(taken) - 1])
     mine = level[steps.leaf] != NOT_DRAWN
-    value = steps.gain * weight[steps.leaf]
-    if held is not None:
-        at = held[steps.leaf]
-        value = np.where((at != NOT_DRAWN) & (at <= steps.level), KEPT * value, value)
+    value = step_values(steps, weight, held)
     rows = np.flatnonzero(mine)
     # Upgrades of no gain come last, and within a leaf they keep their order.
     rows = rows[np.argsort(-value[rows], kind="stable")]
@@ -111,3 +108,12 @@ def choose(
     level[steps.leaf[rows]] = steps.level[rows]  # of several of a leaf the last one stays
     worth[steps.leaf[rows]] = value[rows]
     return level, worth
+
+
+def step_values(steps: Upgrades, weight: np.ndarray, held: np.ndarray | None) -> np.ndarray:
+    """(S,) what each finer level is worth; one that is drawn already KEPT times as much."""
+    value = steps.gain * weight[steps.leaf]
+    if held is None:
+        return value
+    at = held[steps.leaf]
+    return np.where((at != NOT_DRAWN) & (at <= steps.level), KEPT * value, value)

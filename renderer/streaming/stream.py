@@ -16,9 +16,15 @@ from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import StreamStats
 from shapeshift.renderer.streaming.ahead import views_ahead
-from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, steps_of
+from shapeshift.renderer.streaming.choose import NOT_DRAWN, base_of, joined, steps_of
+from shapeshift.renderer.streaming.choose_tree import (
+    BESIDE,
+    choose_nodes,
+    is_crowded,
+    joined_trees,
+)
 from shapeshift.renderer.streaming.fade import Fades
-from shapeshift.renderer.streaming.fetch import Fetcher
+from shapeshift.renderer.streaming.fetch import PIXELS, Fetcher
 from shapeshift.renderer.streaming.pages import (
     ROOM,
     PageTable,
@@ -30,12 +36,12 @@ from shapeshift.renderer.streaming.upload import Uploader
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
+from shapeshift.runtime_models.splats.lod.parents import NodeTree, with_parents
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
 CHANGED = 0.025  # of the budget: what a frame in motion may upload, in splats
 EACH = 8  # frames, one in so many looks ahead
-BESIDE = 1e-6  # pixels that a leaf beside the picture counts: last, and the coarsest of all
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
 LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
 
@@ -71,13 +77,18 @@ class Stream:
                 f"objects without levels of detail have {fixed:,} splats and the budget is "
                 f"{self.budget:,}; give a larger --budget, or make levels of them: launch.py lod."
             )
+        nodes, self._tree = self._nodes()
         made = {id(source): steps_of(source.levels) for source in self._sources}
         self._steps = joined([made[id(source)] for source in self._sources])
         sizes = [len(source.part) for source in self._sources]
         self.first = np.concatenate([[0], np.cumsum(sizes, dtype=int)])
         self._object = np.repeat(np.arange(len(sizes)), sizes)  # of each leaf, in self.objects
         self._every_count = every_count(self._sources)  # (L, K) splats
-        self._finest = np.concatenate([source.levels.finest_counts for source in self._sources])
+        self._is_leaf = np.ones(len(self._object), bool) if self._tree is None else (
+            self._tree.height == 0
+        )  # fmt: skip
+        finest = np.concatenate([source.levels.finest_counts for source in self._sources])
+        self._finest = np.where(self._is_leaf, finest, 0)
         self._pages = pages_for(self._finest, self._left)
         coefficients = max(source.coefficients for source in self._sources)
         stored = min(self._pages, pages_of_all(self._sources))
@@ -85,7 +96,7 @@ class Stream:
         self.follows_eye = coefficients > 1  # then its colours are decoded a frame
         self.table = PageTable(self._pages, int(self.first[-1]))
         self._fades = Fades(drawing, self.table)
-        self._uploader = Uploader(drawing, self.table, self.objects, self._models, self.first)
+        self._uploader = Uploader(drawing, self.table, self.objects, nodes, self.first)
         self.weights = Weights(int(self.first[-1]), self._look())
         self._fetcher = Fetcher()
         self._last: tuple = ()  # the views and poses that all is there for
@@ -96,6 +107,20 @@ class Stream:
         self.stats = StreamStats(self.budget, 0, 0, int(self._finest.sum()), 0, False, "")
         self.reads = True  # what is wanted and not at hand
         self.converges = True  # each frame gets all that it wants, and forgets the one before
+
+    def _nodes(self) -> tuple[list[SplatLayers], NodeTree | None]:
+        """The models, with parents where leaves may crowd the budget: the sources have them then,
+        and what the models' splats are of.
+        """
+        least = sum(int(base_of(source.levels).sum()) for source in self._sources)
+        if not is_crowded(least, self._left):
+            return self._models, None
+        once = {id(model.leaves): model for model in self._models}
+        made = {number: with_parents(model) for number, model in once.items()}
+        pairs = [made[id(source)] for source in self._sources]
+        nodes = [model for model, _ in pairs]
+        self._sources = [model.leaves for model in nodes if model.leaves is not None]
+        return nodes, joined_trees([tree for _, tree in pairs])
 
     def _look(self) -> CoarseLook | None:
         try:
@@ -118,7 +143,6 @@ class Stream:
             self.stats = self._stats(0, False, self.stats.in_sight)
             return []
         moving = not self.converges and now[: len(views)] != self._last[: len(views)]
-        self._fetcher.tick(moving)
         taken = self._drawing.trim()
         for source in self._sources:
             source.share_memory(taken)
@@ -126,6 +150,7 @@ class Stream:
         self._poses, self._shown = poses, shown
         sight = self.find_sight(poses, shown, views)
         weight = self.weights.of(sight, views, poses, shown, fresh=self.converges)
+        self._fetcher.tick(moving, 0 if self.weights.looked else PIXELS)  # one or the other
         wanted, worth = self._choose(weight, sight)
         changed, moved = self._change(wanted, worth)
         self._last = now
@@ -149,7 +174,8 @@ class Stream:
         held = None if self.converges else self.table.level
         left = self._left
         while True:
-            level, worth = choose(self._steps, np.where(beside, BESIDE, weight), left, held)
+            pixels = np.where(beside, BESIDE, weight)
+            level, worth = choose_nodes(self._steps, self._tree, pixels, left, held)
             level = np.where(beside & (level >= 0), self._steps.coarsest, level)
             if not self.converges:
                 level = self._finest_of(level, [~source.broken() for source in self._sources])
@@ -194,7 +220,7 @@ class Stream:
             np.concatenate([getattr(one, name) for one in each])
             for name in ("held", "wide", "cover", "distance")
         )
-        there = np.array(shown)[self._object]
+        there = np.array(shown)[self._object] & self._is_leaf
         return LeafSight(held & there, wide & there, cover, distance)
 
     def _change(self, wanted: np.ndarray, worth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -268,7 +294,7 @@ class Stream:
             return []
         sight = self.find_sight(self._poses, self._shown, views)
         weight = np.where(sight.held, self.weights.guessed(sight), 0.0)
-        wanted, worth = choose(self._steps, weight, self._left)
+        wanted, worth = choose_nodes(self._steps, self._tree, weight, self._left)
         return self._missing(wanted, worth, at_hand)
 
     def _at_hand(self) -> list[np.ndarray]:

@@ -39,16 +39,18 @@ class Uploader:
                 self._coarse[id(model.leaves)] = CoarseLevels(model, model.leaves)
         self._source_of = np.array([id(model.leaves) for model in models])  # of each object
         self._waiting: list[tuple[np.ndarray, Filled]] = []  # pages that are still to be written
-        self.placed = np.zeros(0, np.int64)  # pages that were filled by the last `upload`
+        self._filled: list[np.ndarray] = []  # pages that were filled since this `upload` began
+        self.placed = np.zeros(0, np.int64)  # those of the last one, rising
         self.edited = np.zeros(len(models), bool)  # objects whose splats are not as they were read
 
     def upload(self, leaves: np.ndarray, levels: np.ndarray) -> None:
         """Leaves (n,) at levels (n,) into free pages.  Raises BadFile."""
-        self.placed = np.zeros(0, np.int64)
+        self._filled.clear()
         for number in np.unique(self._source_of[self._object[leaves]]):
             mine = self._source_of[self._object[leaves]] == number
             self._upload(int(number), leaves[mine], levels[mine])
         self._flush()
+        self.placed = np.sort(np.concatenate([np.zeros(0, np.int64), *self._filled]))
 
     def _upload(self, number: int, leaves: np.ndarray, levels: np.ndarray) -> None:
         """The same of one source."""
@@ -90,7 +92,7 @@ class Uploader:
             pages = self._table.reserve(leaves, levels, counts)
             owner = np.repeat(self._owner[self._object[leaves]], pages_needed(counts))
             self._drawing.share_pages(pages, owner, before)
-            self.placed = np.union1d(self.placed, pages)
+            self._filled.append(pages)
 
     def _read_into(
         self, source: LeafSource, own: np.ndarray, levels: np.ndarray, leaves: np.ndarray
@@ -131,7 +133,7 @@ class Uploader:
         pages = np.concatenate([np.zeros(0, np.int64), *(each for each, _ in self._waiting)])
         if len(pages):
             self._drawing.place_pages(pages, *together([filled for _, filled in self._waiting]))
-            self.placed = np.union1d(self.placed, pages)
+            self._filled.append(pages)
         self._waiting.clear()
 
 

@@ -177,4 +177,5 @@ class PagedTiles(TilesDrawing):
                 self.device.download(array[:first]) if first else rows[:0].reshape(0, rows.shape[2])
             )
             out.append(np.concatenate([fixed, rows.reshape(-1, rows.shape[2])]))
-        return out[0], self.device.download(self._object_index), out[1]
+        owner = self.device.download(self._object_index)[:first]
+        return out[0], np.concatenate([owner, np.repeat(self.paged.owner, PAGE)]), out[1]

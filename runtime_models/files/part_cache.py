@@ -30,6 +30,7 @@ class PartCache(Generic[P]):
         self.most, self.taken = most, 0  # bytes
         self._lent = 0  # of them, to others
         self.decoded = 0  # how often a part was made
+        self.version = 0  # rises whenever other parts are kept
         self._parts: OrderedDict[Hashable, P] = OrderedDict()
         self._lock = threading.Lock()
         self._making: dict[Hashable, threading.Lock] = {}
@@ -75,6 +76,7 @@ class PartCache(Generic[P]):
         while self._parts and self.taken + size > most:
             _, old = self._parts.popitem(last=False)
             self.taken -= old.size
+            self.version += 1
             gone.append(old)
         return gone
 
@@ -85,6 +87,7 @@ class PartCache(Generic[P]):
             if part.size <= self.most:
                 self._parts[key] = part
                 self.taken += part.size
+                self.version += 1
             else:
                 gone.append(part)
         for old in gone:

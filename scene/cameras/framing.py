@@ -4,6 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shapeshift.runtime_models.bounds import (
+    FALLBACK_RADIUS,
+    MIN_OPACITY,
+    PERCENTILES,
+    frame_points,
+    seen_points,
+)
 from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.pose import View, look_at, perspective
@@ -12,8 +19,6 @@ from shapeshift.scene.scene import Scene
 FOV_Y = 0.8  # radians, vertical
 ELEVATION = 0.3  # radians above the horizon: slightly down
 MARGIN = 1.08  # of the distance at which the bounding sphere just fits
-MIN_OPACITY = 0.1  # fainter splats are mostly floaters; they do not count for the bounds
-PERCENTILES = (2, 98)
 ROUND_ENOUGH = 1.3  # length over depth below which no side is the long one
 OUTLYING = 1.25  # times the distance for 98 % of the splats: more only floaters ask for
 COMMON = 0.5  # mean length of the cameras' directions: of a full circle 0, of a half one 0.64
@@ -21,33 +26,7 @@ FAR_RADII = 200.0
 NEAR_RADII = 0.01
 RAY_POINTS = 24
 RAY_REACH = 0.05  # tangent of the angle up to which a point can be meant by a ray
-SMALLEST_RADIUS, SMALLEST_PART = 1e-30, 1e-9  # metres; of how far from zero the centre is
 MOMENTS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of what moves in time
-FALLBACK_RADIUS = 1.0  # metres, when nothing is there to be framed
-
-
-def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre (3,) and radius in metres of splats with means (N, 3) and opacity (N,).
-
-    The 2nd to 98th percentile of what can be seen: a few far floaters move neither.  With nothing
-    that opaque every finite mean counts; with no mean at all, a metre about the origin.
-    """
-    points = _seen(means, opacity)  # (P, 3)
-    if not len(points):
-        return np.zeros(3), FALLBACK_RADIUS
-    low, high = np.percentile(points, PERCENTILES, axis=0)
-    centre = (low + high) / 2
-    radius = float(np.percentile(np.linalg.norm(points - centre, axis=1), PERCENTILES[1]))
-    # next to its numbers a smaller one is lost in rounding: the eye would lie in what it looks at
-    least = max(SMALLEST_PART * float(np.abs(centre).max()), SMALLEST_RADIUS)
-    return centre, radius if radius > least else max(FALLBACK_RADIUS, 1000 * least)
-
-
-def _seen(means: np.ndarray, opacity: np.ndarray) -> np.ndarray:
-    """(P, 3) float64 means that count for the bounds."""
-    finite = np.isfinite(means).all(axis=1)
-    seen = finite & (opacity > MIN_OPACITY)  # NaN opacity is not seen
-    return means[seen if seen.any() else finite].astype(np.float64)
 
 
 def fit_distance(radius: float, size: tuple[int, int], fov_y: float = FOV_Y) -> float:
@@ -68,7 +47,7 @@ def fit_points(
     Tighter than `fit_distance` for what is long or flat.  All splats are in the picture unless the
     last few would need a much larger distance: those are floaters.
     """
-    points = _seen(means, opacity)
+    points = seen_points(means, opacity)
     if not len(points):
         return MARGIN * FALLBACK_RADIUS / min(tangents[1], tangents[3])
     in_eye = (points - centre) @ world_from_eye[:3, :3]  # (P, 3) right, up, towards the eye
@@ -82,7 +61,7 @@ def broadside(means: np.ndarray, opacity: np.ndarray) -> float:
 
     0 for what is about as deep as it is wide, else in -pi/2..pi/2: the side towards +Z.
     """
-    points = _seen(means, opacity)[:, [2, 0]]  # (P, 2) z, x
+    points = seen_points(means, opacity)[:, [2, 0]]  # (P, 2) z, x
     if len(points) < 3:
         return 0.0
     square, axes = np.linalg.eigh(np.cov(points.T))

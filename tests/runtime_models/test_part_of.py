@@ -5,8 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.runtime_models.bounds import frame_points
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
-from shapeshift.runtime_models.model import BadFile, ObjectLabel, SplatLayers, Stop
+from shapeshift.runtime_models.lod.average_anchors import average_anchors
+from shapeshift.runtime_models.model import (
+    AnchorFrames,
+    AnchorModel,
+    BadFile,
+    CoarserAnchors,
+    ObjectLabel,
+    SplatLayers,
+    Stop,
+)
 from shapeshift.runtime_models.parts import find_label, name_of, part_of, splat_labels
 from tests.support.models import make_random_model
 
@@ -28,6 +38,52 @@ def layers(count: int = 40) -> SplatLayers:
         labels=np.resize(np.int32([0, 300, 2]), count), origin=(5.0, 6.0, 7.0),
         extra={"heat": np.arange(count, dtype=f)},
     )  # fmt: skip
+
+
+def levelled() -> AnchorModel:
+    """WHOLE with two coarser levels."""
+    coarser = []
+    for cell, pixels in ((0.8, 60.0), (1.6, 20.0)):
+        one = average_anchors(WHOLE, cell)
+        columns = (one.anchors, one.features, one.frames, one.labels, one.light)
+        coarser.append(CoarserAnchors(*columns, cell, pixels))
+    return WHOLE.with_coarser(tuple(coarser))
+
+
+def test_levels_of_a_part_are_its_rows_of_each_level_at_as_many_pixels_a_metre():
+    whole, ones = levelled(), np.ones(60)
+    for label in (0, 1, 3):
+        part, place = part_of(whole, label)
+        assert len(part.coarser) == 2
+        assert len(part.levels[2].anchors) <= len(part.levels[1].anchors) < len(part.anchors)
+        metres = [frame_points(m.anchors, ones[: len(m.anchors)])[1] for m in (part, whole)]
+        for mine, theirs, one in zip(part.levels[1:], whole.levels[1:], part.coarser, strict=True):
+            rows = splat_labels(theirs) == label
+            found, expected = evaluate(mine, 0.3, EYE), evaluate(theirs, 0.3, EYE)
+            assert np.abs(found.means + place - expected.means[rows]).max() < 1e-5
+            assert np.allclose(found.opacity, expected.opacity[rows], atol=1e-5)
+            assert set(mine.labels) == {label}
+            wanted = next(two.from_pixels for two in whole.coarser if two.cell_m == one.cell_m)
+            assert one.from_pixels / metres[0] == pytest.approx(
+                wanted / metres[1],
+                rel=1e-6,  # anchors are moved in float32
+            )
+    none, _ = part_of(WHOLE, 1)
+    assert none.coarser == ()
+
+
+def test_a_part_without_rows_at_a_level_has_the_levels_before_it():
+    whole = levelled()
+    first, second = whole.coarser
+    gone = second.labels != 1
+    few = replace(
+        second, anchors=second.anchors[gone], features=second.features[gone],
+        labels=second.labels[gone], frames=AnchorFrames(
+            second.frames.scales[gone], second.frames.wxyz[gone]
+        ),
+    )  # fmt: skip
+    whole = whole.with_coarser((first, few))
+    assert len(part_of(whole, 1)[0].coarser) == 1 and len(part_of(whole, 3)[0].coarser) == 2
 
 
 EYE = np.float32([0.3, 2.0, 1.0])
@@ -114,6 +170,6 @@ def test_the_debug_view_colours_every_splat_by_its_anchors_label():
     labels, ranks = label_ranks(WHOLE)
     assert labels == [3, 0, 1]  # the commonest first
     assert np.array_equal(np.array(labels)[ranks], splat_labels(WHOLE))
-    counts = object_counts(Scene((SceneObject("room", WHOLE),)))
+    counts = object_counts(Scene((SceneObject("room", WHOLE),)), [WHOLE.splat_count])
     k = WHOLE.splats_per_anchor
     assert counts == {"room, 7": 30 * k, "room, label 0": 15 * k, "room, mug": 15 * k}

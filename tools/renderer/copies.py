@@ -6,8 +6,9 @@ FOLDER is streamed SOG, as launch.py lod writes it.  Copies stand in a square, a
 half apart, each turned otherwise, seen from a corner.  Each row is measured in a process of its
 own: "shared" are objects of one model, "apart" of as many that were read one by one.  first_cpu_ms
 is the frame that reads, frame_cpu_ms the median of still ones, walk_cpu_ms that of 60 frames in
-motion, of all threads; arena_mb is what the splats, their colours and harmonics take.  same: the
-largest difference of a pixel to the picture of the row "apart".
+motion, of all threads; copies_drawn are those of which anything is drawn; arena_mb is what the
+splats, their colours and harmonics take.  same: the largest difference of a pixel to the picture of
+the row "apart".
 """
 
 import argparse
@@ -36,9 +37,10 @@ SIZE = (1280, 720)
 STILL, WALK = 5, 60  # frames
 WAYS = (("apart", 1), ("shared", 1), ("apart", 10), ("shared", 10), ("apart", 100),
         ("shared", 100), ("shared", 1000))  # fmt: skip
+SMALL = (200_000, 60_000, 20_000)  # budgets of the last of these besides
 COLUMNS = (
-    "scene", "way", "copies", "budget", "splats", "pages_drawn", "pages_stored", "arena_mb",
-    "first_cpu_ms", "frame_cpu_ms", "walk_cpu_ms", "peak_mb", "same",
+    "scene", "way", "copies", "budget", "splats", "copies_drawn", "pages_drawn", "pages_stored",
+    "arena_mb", "first_cpu_ms", "frame_cpu_ms", "walk_cpu_ms", "peak_mb", "same",
 )  # fmt: skip
 
 
@@ -56,8 +58,9 @@ def main() -> None:
         return
     rows = []
     with tempfile.TemporaryDirectory() as pictures:
-        for way, copies in WAYS:
-            words = [sys.executable, __file__, str(given.folder), "--budget", str(given.budget)]
+        every = [(*way, given.budget) for way in WAYS]
+        for way, copies, budget in [*every, *((*WAYS[-1], small) for small in SMALL)]:
+            words = [sys.executable, __file__, str(given.folder), "--budget", str(budget)]
             words += ["--child", way, str(copies), pictures]
             done = subprocess.run(words, stdout=subprocess.PIPE, check=True)
             rows.append(json.loads(done.stdout.splitlines()[-1]))
@@ -114,6 +117,7 @@ def measure(folder: Path, way: str, copies: int, budget: int, pictures: Path) ->
         row |= memory_of(renderer)
         assert stats.streaming is not None
         row["splats"] = stats.streaming.shown
+        row["copies_drawn"] = len(np.unique(renderer.drawing.paged.owner)) - 1  # -1: free pages
         row["frame_cpu_ms"] = frames(renderer, scene, step, np.zeros(STILL))
         renderer.streaming.converges = False
         row["walk_cpu_ms"] = frames(renderer, scene, step, np.linspace(0, 1, WALK))

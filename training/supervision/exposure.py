@@ -76,17 +76,36 @@ class Exposures:
         self.begin = fraction + FROM
         self.begin_step = step + VISITS * len(self.row)
 
+    def known(self, modality: str) -> np.ndarray | None:
+        """(n, 3) logarithms of the gains of a modality's photos that were looked at.
+
+        None while they are too few, or the model shows too little of its photos.
+        """
+        logs, like = (of[self.rows[modality]] for of in (self.log_gain, self.correlation))
+        seen = np.isfinite(logs).all(axis=1)
+        enough = seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE
+        return logs[seen] if enough else None
+
     def spread(self, modality: str) -> float:
         """Of the logarithms of a modality's gains, by their median deviation, as a standard one.
 
-        0 while too few of them are known, or the model shows too little of its photos.
+        0 while nothing is known of them.
         """
-        known, like = (of[self.rows[modality]] for of in (self.log_gain, self.correlation))
-        seen = np.isfinite(known).all(axis=1)
-        if not (seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE):
+        known = self.known(modality)
+        if known is None:
             return 0.0
-        away = np.abs(known[seen] - np.median(known[seen], axis=0))
+        away = np.abs(known - np.median(known, axis=0))
         return float(NORMAL * np.sqrt((np.median(away, axis=0) ** 2).mean()))
+
+    def alike(self, modality: str) -> bool:
+        """Whether the photos of a modality are known to have one exposure.
+
+        Else light by direction would learn the brightness of each photo, as no two are taken from
+        one place.  Fewer than FEWEST never tell, and count as alike.
+        """
+        if self.one_exposure or len(self.rows[modality]) < FEWEST:
+            return True
+        return self.known(modality) is not None and self.spread(modality) <= NOISE
 
     def gain(self, photo: LoadedPhoto) -> Gain:
         """What the photo's colours are times the model's; NONE where all photos are alike."""

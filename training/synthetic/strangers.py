@@ -34,6 +34,8 @@ WHITE, BLACK, SKY = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.62, 0.75, 0.9)
 GOLDEN = (5**0.5 - 1) / 2
 WRONG_METRES, WRONG_DEGREES = 0.3, 8.0  # of a wrong pose, where things are a metre away
 EXPOSURE = 0.3  # by how much photos may be brighter or darker
+PHONE_LENS = (-0.11, 0.02)  # k1 and k2 of nerfstudio's OPENCV: lines at the rim bow outwards
+EXIF_ORIENTATION, ON_ITS_SIDE = 0x0112, 6  # the tag, and what it says of a phone held upright
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,9 @@ class Kind:
     backdrop: bool = False  # a patterned wall behind, that stands still while the object turns
     exposure: float = 0.0  # share by which photos differ in brightness
     wrong: float = 0.0  # share of the photos whose pose is wrong
+    lens: tuple[float, float] = (0.0, 0.0)  # k1 and k2
+    missing: float = 0.0  # share of the photos that are named and not there
+    phone: bool = False  # JPEGs that say in EXIF that they lie on their side, as poses know them
     views_usually: int = 48
     masks: str = ""  # "object": white where it is; "passers": black where somebody stands
 
@@ -203,6 +208,9 @@ KINDS = {
     "twelve": Kind(a_table, around((0, 0.1, 0), 1.5, 15, 60), WHITE, views_usually=12),
     "wrong_poses": Kind(a_table, around((0, 0.1, 0), 1.5, 12, 60), SKY, wrong=0.02,
                         views_usually=100),
+    "table_white": Kind(a_table, around((0, 0.1, 0), 1.5, 12, 60), WHITE, views_usually=42),
+    "phone": Kind(a_room, from_inside, exposure=0.15, lens=PHONE_LENS, missing=0.15, phone=True,
+                  views_usually=64),
     "cut_out": Kind(an_object, around((0, 0.22, 0), 1.3, -25, 65), backdrop=True, masks="object"),
     "passers": Kind(a_room, from_inside, masks="passers"),
 }  # fmt: skip
@@ -218,6 +226,29 @@ def radiance(kind: Kind, here: Place, wall: Pattern):
         return color, hits.index
 
     return look_along
+
+
+def straightened(x: np.ndarray, y: np.ndarray, lens: tuple[float, float]) -> tuple:
+    """Tangents of the rays whose pixels a lens k1, k2 puts at x, y (OpenCV's model)."""
+    k1, k2 = lens
+    straight_x, straight_y = x, y
+    for _ in range(30):  # fixed point; from 20 on nothing changes any more
+        square = straight_x**2 + straight_y**2
+        factor = 1 + k1 * square + k2 * square**2
+        straight_x, straight_y = x / factor, y / factor
+    return straight_x, straight_y
+
+
+def through_lens(view: View, lens: tuple[float, float], look_along):
+    """The same radiance, of the rays that a view's pixels get through a lens."""
+    world_from_eye = view.world_from_eye.matrix()[:3, :3]
+
+    def bent(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        x, y, z = (d @ world_from_eye).T
+        x, y = straightened(x / -z, y / -z, lens)
+        return look_along(o, unit(np.stack([x, y, -np.ones_like(x)], 1) @ world_from_eye.T))
+
+    return bent
 
 
 def passer(view: View, rng: np.random.Generator) -> list[Solid]:
@@ -266,8 +297,14 @@ def frame_of(name: str, view: View, ours_from: np.ndarray) -> dict:
 
 
 def save_photo(path: Path, image: np.ndarray) -> None:
+    photo = Image.fromarray(np.rint(255 * np.clip(image, 0, 1)).astype(np.uint8))
     with whole_file(path) as file:
-        Image.fromarray(np.rint(255 * np.clip(image, 0, 1)).astype(np.uint8)).save(file, "PNG")
+        if path.suffix == ".png":
+            photo.save(file, "PNG")
+            return
+        exif = Image.Exif()
+        exif[EXIF_ORIENTATION] = ON_ITS_SIDE
+        photo.save(file, "JPEG", quality=92, exif=exif)
 
 
 def make_stranger(
@@ -288,13 +325,19 @@ def make_stranger(
     if kind.masks:
         make_folders(folder, "masks")
     frames, wrong = [], set(rng.permutation(len(views))[: round(kind.wrong * len(views))].tolist())
+    lost: set[int] = set()
+    if kind.missing:  # else nothing is drawn, so that older kinds stay as they are
+        lost = set(rng.permutation(len(views))[: round(kind.missing * len(views))].tolist())
     for i, view in enumerate(views):
-        file = f"images/frame_{i:05}.png"
+        file = f"images/frame_{i:05}.{'jpg' if kind.phone else 'png'}"
         behind = still_wall(view, wall) if kind.backdrop else wall
-        seen = here if kind.masks != "passers" else Place.of(solids + passer(view, rng))
-        image, _ = photograph(view, radiance(kind, seen, behind))
+        there = here if kind.masks != "passers" else Place.of(solids + passer(view, rng))
+        seen = radiance(kind, there, behind)
+        if any(kind.lens):
+            seen = through_lens(view, kind.lens, seen)
         gain = 1 + kind.exposure * rng.uniform(-1, 1)
-        save_photo(folder / file, gain * image)
+        if i not in lost:
+            save_photo(folder / file, gain * photograph(view, seen)[0])
         stated = view
         if i in wrong:
             eye = np.asarray(view.world_from_eye.position)
@@ -303,10 +346,11 @@ def make_stranger(
         if kind.masks:
             mask = frames[-1]["mask_path"] = f"masks/frame_{i:05}.png"
             people = kind.masks == "passers"
-            share = mask_of(view, seen, len(solids) if people else 0)
+            share = mask_of(view, there, len(solids) if people else 0)
             white = share == 0 if people else share >= 0.5  # of people no edge is left
-            with whole_file(folder / mask) as there:
-                Image.fromarray(np.uint8(255) * white.astype(np.uint8)).save(there, "PNG")
-    data = {"camera_model": "OPENCV", "frames": frames}
+            with whole_file(folder / mask) as to:
+                Image.fromarray(np.uint8(255) * white.astype(np.uint8)).save(to, "PNG")
+    bends = dict(zip(("k1", "k2"), kind.lens, strict=True)) if any(kind.lens) else {}
+    data = {"camera_model": "OPENCV"} | bends | {"frames": frames}
     write_whole(folder / "transforms.json", json.dumps(data, indent=1).encode())
     return here, views

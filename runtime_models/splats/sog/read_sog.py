@@ -123,11 +123,13 @@ class Sog:
         self.known[part, key].flags.writeable = False
         return self.known[part, key]
 
-    def pixels(self, part: str, number: int = 0) -> np.ndarray:
-        """(N, 4) uint8: of each splat the pixel of one of a part's pictures."""
+    def pixels(self, part: str, number: int = 0, channels: int = 4) -> np.ndarray:
+        """(N, 4) uint8: of each splat the pixel of one of a part's pictures; (N, 3) where three
+        channels are wanted and no more are in the file.
+        """
         most = 4 * self.count + ROOM
-        picture = self.files.image(self.names(part)[number], self.count, most)
-        return picture.reshape(-1, 4)[: self.count]
+        picture = self.files.image(self.names(part)[number], self.count, most, channels)
+        return picture.reshape(-1, picture.shape[2])[: self.count]
 
     def palette(self) -> np.ndarray:
         """(P, M - 1, 3) sets of harmonics; of one colour from all sides (1, 0, 3)."""

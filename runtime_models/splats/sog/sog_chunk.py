@@ -1,12 +1,12 @@
 """A SOG kept as the bytes of its pictures, 17 a splat: any of its rows become splats when asked."""
 
-from collections.abc import Callable
 from copy import copy
 from pathlib import Path
 
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import Account, unlimited
+from shapeshift.runtime_models.leaf_levels import Throttle, unpaced
 from shapeshift.runtime_models.splats.plain_splats import RawSplats
 from shapeshift.runtime_models.splats.sog.read_sog import (
     PICTURES,
@@ -22,10 +22,8 @@ CHANNELS = {"means": 3, "scales": 3, "quats": 4, "sh0": 4, "shN": 2}  # of the p
 class SogChunk:
     """Decoded pictures of one SOG; `size` bytes of them are charged until `release`."""
 
-    def __init__(
-        self, path: Path, memory: Account, pace: Callable[[], None] = lambda: None
-    ) -> None:
-        """pace is called after each picture.  Raises BadFile."""
+    def __init__(self, path: Path, memory: Account, pace: Throttle = unpaced) -> None:
+        """pace is called after each picture, with its splats.  Raises BadFile."""
         sog = open_sog(path, memory)
         self._sog, self._memory = sog, memory
         self.count = sog.count
@@ -35,12 +33,12 @@ class SogChunk:
             for number in range(len(sog.names(part))):
                 if part == "shN" and number == 0:  # the palette
                     continue
-                pixels = sog.pixels(part, number)[:, : CHANNELS[part]]
+                pixels = sog.pixels(part, number, CHANNELS[part])[:, : CHANNELS[part]]
                 self._pixels[part, number] = np.ascontiguousarray(pixels)
                 del pixels
                 memory.release(sog.files.held)
                 sog.files.held = 0
-                pace()
+                pace(sog.count)
         kept = [*self._pixels.values()] + ([] if self._palette is None else [self._palette])
         self.size = sum(array.nbytes for array in kept)  # bytes
         memory.charge(self.size, f"{sog.count:,} splats")
@@ -67,7 +65,7 @@ class SogRows(Sog):
         super().__init__(files, sog.meta, sog.version, count, known=sog.known)
         self._kept, self._palette = pixels, palette
 
-    def pixels(self, part: str, number: int = 0) -> np.ndarray:
+    def pixels(self, part: str, number: int = 0, channels: int = 4) -> np.ndarray:
         return self._kept[part, number]
 
     def palette(self) -> np.ndarray:

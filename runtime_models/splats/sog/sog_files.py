@@ -43,8 +43,10 @@ class SogFiles:
         where = f"{self.name}: its {META}"
         return Fields(parse_json(data, where), where, EXPORT_AGAIN)
 
-    def image(self, name: str, least: int, most: int) -> np.ndarray:
-        """(H, W, 4) uint8 of a WebP with `least` to `most` pixels, charged.  Raises BadFile."""
+    def image(self, name: str, least: int, most: int, channels: int = 4) -> np.ndarray:
+        """(H, W, 4) uint8 of a WebP with `least` to `most` pixels, charged; (H, W, 3) where it is
+        opaque and no more channels are wanted.  Raises BadFile.
+        """
         data = self.read(name, 5 * most + SMALL)  # more than uncoded pixels take
         width, height = webp_size(data)
         if not least <= width * height <= most:
@@ -59,7 +61,9 @@ class SogFiles:
             try:
                 with Image.open(io.BytesIO(data), formats=("WEBP",)) as picture:
                     if picture.size == (width, height):
-                        return np.asarray(picture.convert("RGBA"))
+                        wanted = "RGB" if (picture.mode, channels) == ("RGB", 3) else "RGBA"
+                        kept = picture if picture.mode == wanted else picture.convert(wanted)
+                        return np.asarray(kept)
             except UNREADABLE:
                 pass
         raise BadFile(f"{self.name}: {name[:60]!r} is no WebP that can be read; copy it again.")

@@ -1,13 +1,13 @@
 """A streamed SOG leaf by leaf and level by level: what is to be drawn is decoded, nothing else."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import shown
-from shapeshift.runtime_models.leaf_levels import LeafLevels, LeafSplats
+from shapeshift.runtime_models.leaf_levels import LeafLevels, LeafSplats, Throttle, unpaced
 from shapeshift.runtime_models.lint.lint_rows import repair_rows
 from shapeshift.runtime_models.lint.lint_whole import (
     refuse_boundless,
@@ -51,6 +51,7 @@ class StreamedLeaves:
             files.append(environment)
         self._files, self._folder = files, streamed.folder
         self._broken = np.zeros(len(files), bool)
+        self._at_hand = (-1, self._broken)  # version of the cache, what of the files it had
         self._key = (str(streamed.folder.resolve()),)
         count, kinds = len(nodes) + (environment is not None), len(streamed.levels)
         shape = (count, kinds)
@@ -125,7 +126,10 @@ class StreamedLeaves:
         return [path.relative_to(self._folder).as_posix() for path in every]
 
     def at_hand(self) -> np.ndarray:
-        return np.array([(*self._key, n) in self.cache for n in range(len(self._files))])
+        if self._at_hand[0] != (version := self.cache.version):  # a frame asks, a city has 30,000
+            there = [(*self._key, n) in self.cache for n in range(len(self._files))]
+            self._at_hand = version, np.array(there)
+        return self._at_hand[1]
 
     def share_memory(self, taken: int) -> None:
         self.cache.lend(taken)
@@ -133,7 +137,7 @@ class StreamedLeaves:
     def broken(self) -> np.ndarray:
         return self._broken
 
-    def load(self, part: int, pace: Callable[[], None] = lambda: None) -> None:
+    def load(self, part: int, pace: Throttle = unpaced) -> None:
         self._chunk(part, pace)
 
     def read(self, leaves: np.ndarray, levels: np.ndarray) -> Iterator[LeafSplats]:
@@ -151,7 +155,7 @@ class StreamedLeaves:
             for rows in np.split(mine, np.flatnonzero(np.diff(block)) + 1):
                 yield int(file), leaves[rows], levels[rows]
 
-    def _chunk(self, file: int, pace: Callable[[], None] = lambda: None) -> SogChunk:
+    def _chunk(self, file: int, pace: Throttle = unpaced) -> SogChunk:
         """A file's pictures.  Raises BadFile, then and ever after."""
         path = self._files[file]
 

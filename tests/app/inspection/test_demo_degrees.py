@@ -33,7 +33,8 @@ def measured():
 
 @pytest.mark.slow
 def test_degrees_of_four_views(measured):
-    """0.54 °C in the mean and 94.4 % within 2 °C were measured; a twentieth of slack for rounding.
+    """0.474 °C in the mean and 94.96 % within 2 °C were measured, of 0.5 °C that it is to have; the
+    slack is for rounding.
 
     Where a pixel of the tracer is of the scene by less than a half, neither knows a value.
     """
@@ -41,8 +42,8 @@ def test_degrees_of_four_views(measured):
         np.abs(values.values - celsius)[values.known & (share >= 0.5)]
         for values, celsius, share in measured[:4]
     ]
-    assert np.mean([each.mean() for each in errors]) <= 0.57
-    assert np.mean([(each <= 2).mean() for each in errors]) >= 0.94
+    assert np.mean([each.mean() for each in errors]) <= 0.5
+    assert np.mean([(each <= 2).mean() for each in errors]) >= 0.945
     covered = [(values.known & (s >= 0.5)).sum() / (s >= 0.5).sum() for values, _, s in measured]
     assert min(covered) > 0.98  # it does not win by knowing little
 
@@ -77,14 +78,14 @@ def test_one_mark_from_five_views(measured):
     errors = np.array(errors)
     print(len(views), np.mean(views), errors.mean(), (errors <= 1).mean(), errors.max())
     assert len(views) >= 50 and np.mean(views) >= 3
-    assert (errors <= 1).mean() >= 0.95 and errors.mean() <= 0.3
+    assert (errors <= 1).mean() >= 0.98 and errors.mean() <= 0.15  # 0.994 and 0.12 measured
 
 
 @pytest.mark.slow
 def test_hottest_pixels_and_depths(measured):
-    """Measured in these six views: the hottest off by 0.48 to 0.99 °C in four, 4.6 and 6.8 °C in
-    two; depths off by 5.7 to 8.2 mm in the median, 2.5 to 7.6 mm too far.  A twentieth of slack for
-    rounding.
+    """Measured in these six views: the hottest off by 0.07 to 0.34 °C in three, 1.8, 3.2 and 4.1 °C
+    in the others; depths off by 5.3 to 7.4 mm in the median, 5.0 to 7.1 mm too far.  A twentieth of
+    slack for rounding.
     """
     here, _ = place(opened=False)
     hot, middle, lean = [], [], []
@@ -101,6 +102,6 @@ def test_hottest_pixels_and_depths(measured):
         away = (shown - far / length)[known]
         middle.append(float(np.median(np.abs(away))))
         lean.append(float(np.median(away)))
-    assert sorted(hot)[3] <= 1.04 and max(hot) <= 7.1
-    assert max(middle) <= 0.0086 and np.mean(middle) <= 0.0068
-    assert 0 < min(lean) and max(lean) <= 0.0080
+    assert sorted(hot)[2] <= 0.36 and sorted(hot)[3] <= 1.91 and max(hot) <= 4.36
+    assert max(middle) <= 0.0078 and np.mean(middle) <= 0.0069
+    assert 0 < min(lean) and max(lean) <= 0.0075

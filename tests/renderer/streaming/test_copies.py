@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.renderer.debug.debug import object_color
 from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.splats.lod.parents import with_parents
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import Pose
-from shapeshift.scene.scene import Scene, Tint
+from shapeshift.scene.scene import Scene, SceneObject, Tint
 from shapeshift.scene.sections.read_section import read_section
 from tests.support.splat_scenes import random_layers, shell
 from tests.support.streamed_scenes import open_levels, scene_of, view_at, write_levels
@@ -26,6 +29,9 @@ EDITS = {
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return write_levels(shell(3000, 1), tmp_path_factory.mktemp("levels") / "shell")
+
+
+UPRIGHT = np.array([1.0, 0, 0, 0])
 
 
 def standing(scene: Scene, **first) -> Scene:
@@ -116,8 +122,35 @@ def test_a_hundred_copies_lie_in_the_pages_of_one(folder):
         stats = renderer.draw([view_at((0, 2, 8))])
         drawn, stored = pages_in_use(renderer)
         assert stats.streaming.shown <= 20_000 and drawn > 4 * stored
-        every = model.leaves.levels.counts
+        every = with_parents(model)[0].leaves.levels.counts  # parents have pages, too
+        assert len(every) > len(model.leaves.levels.counts)
         assert len(renderer.drawing.paged.uses) == (-(-every // 32)).sum()
+
+
+@pytest.mark.parametrize("converges", [True, False])
+def test_a_small_budget_shows_something_of_every_copy(folder, converges):
+    """Where their coarsest levels are seven times the budget: parents stand for them."""
+    model, places = open_levels(folder, 6000), np.mgrid[-4:5, -3:4].reshape(2, -1).T
+    assert 63 * int(np.bincount(model.leaves.coarse_leaf).sum()) > 7 * 6000
+    objects = [
+        SceneObject(f"object {i}", model, Pose(np.array([3.0 * x, 3.0 * y, 0]), UPRIGHT))
+        for i, (x, y) in enumerate(places)
+    ]
+    with Renderer(None, "tiles") as renderer:
+        renderer.streaming.converges = converges
+        renderer.update(Scene(tuple(objects)))
+        for step in range(4):
+            view = view_at((step, 0.2 * step, 30), size=(320, 240))
+            stats = renderer.draw([view])
+            assert 3000 < stats.streaming.shown <= 6000
+            assert set(renderer.drawing.paged.owner) >= set(range(63))
+            eyes = view.eye_from_world() @ np.c_[3.0 * places, 0 * places + [0, 1]].T
+            assert (eyes[2] < 0).all()
+            left, right, down, up = view.tangents
+            across = (eyes[0] / -eyes[2] - left) / (right - left) * 320
+            below = (up - eyes[1] / -eyes[2]) / (up - down) * 240
+            alpha = renderer.image(0)[below.astype(int), across.astype(int), 3]
+            assert alpha.min() > 0.5
 
 
 def test_objects_in_full_and_other_models_stand_beside(folder, tmp_path):
@@ -142,3 +175,29 @@ def test_objects_in_full_and_other_models_stand_beside(folder, tmp_path):
             points.append(rows[np.lexsort(rows.T)])
     np.testing.assert_array_equal(*pictures)
     np.testing.assert_array_equal(*points)
+
+
+def test_the_debug_picture_of_objects_tells_copies_apart(folder):
+    """Pages lie anywhere: each copy has its own colour, and the legend its own number."""
+    scene = standing(both(folder)[0])
+    with Renderer(None, "tiles") as renderer:
+        renderer.settings = RenderSettings(debug="object")
+        renderer.update(scene)
+        for view in (view_at((0, 1, 9)), view_at((4, 1, 8)), view_at((0, 1, 9))):
+            stats = renderer.draw([view])
+        mean_opacity, owner, _ = renderer.drawing.splat_points()
+        shown = np.bincount(owner[mean_opacity[:, 3] > 0], minlength=4)
+        assert list(stats.debug.values()) == shown.tolist() and shown.sum() == stats.streaming.shown
+        picture = renderer.resolved(0)
+        renderer.settings = RenderSettings()
+        for i, obj in enumerate(scene.objects):
+            one = replace(scene, objects=tuple(
+                replace(other, visible=other is obj) for other in scene.objects))  # fmt: skip
+            renderer.update(one)
+            renderer.draw([view])
+            alone = renderer.image(0)[..., 3] > 0.99
+            others = np.stack([object_color(k) for k in range(4)])
+            unit = picture / np.maximum(picture.max(axis=2, keepdims=True), 1e-6)
+            off = np.abs(unit[:, :, None] - others / others.max(axis=1, keepdims=True)).sum(axis=3)
+            mine = alone & (np.argmin(off, axis=2) == i)
+            assert mine.sum() > 0.3 * alone.sum() > 0  # copies before it hide the rest

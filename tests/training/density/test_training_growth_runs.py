@@ -14,7 +14,9 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.first_anchors.first_anchors import base_colors
 from shapeshift.training.losses.min_opacity import SHARE
+from shapeshift.training.schedule import LIGHT_FROM
 from shapeshift.training.settings import TrainSettings
+from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import SETTLE, Trainer
 from tests.support.training.training_runs import bits
@@ -95,6 +97,21 @@ def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
     assert write_package(trainer.model(), tmp_path / "a.shift") <= 0.085e6
     finite = all(np.isfinite(a).all() for a in trainer.adam.state().values())
     assert finite
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_light_rests_until_its_share_of_the_run_and_where_exposures_differ(
+    device, balls, alike, monkeypatch
+):
+    """Step 6 of 20 is the first that moves it, where photos are alike."""
+    monkeypatch.setattr(Exposures, "alike", lambda self, modality: alike)
+    settings = replace(BASE, **WAYS["with light"], iterations=20, grow=False)
+    trainer, moved = Trainer(device, balls, settings), []
+    for _ in trainer.steps():
+        moved.append(bool(device.download(trainer.adam["light"]).any()))
+    begun = round(LIGHT_FROM * 20)
+    assert LIGHT_FROM * 20 == begun == 6, "no step lies on either side by rounding alone"
+    assert moved == [False] * begun + [alike] * (20 - begun)
 
 
 def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):

@@ -97,6 +97,7 @@ def test_gains_count_from_the_noise_on(device, spread):
     logs = 0.3 + spread / NORMAL * np.array([-1.0, 1] * 5)[:, None] * np.ones(3)
     exposures, photos = known(device, logs)
     gains = np.array([exposures.gain(photo) for photo in photos])
+    assert exposures.alike("RGB") == (spread < NOISE)  # then light may be learned
     if spread < NOISE:
         assert (gains == 1).all() and exposures.warnings() == []
         return
@@ -130,6 +131,7 @@ def test_a_model_that_does_not_show_the_photos_says_nothing_of_them(device, like
     exposures, photos = known(device, logs)
     exposures.correlation[4:] = like  # the median of ten, four of which are at the bound
     assert (exposures.gain(photos[0]) != NONE) == counts == bool(exposures.warnings())
+    assert not exposures.alike("RGB"), "they differ, or nobody knows"
 
 
 def test_photos_of_one_exposure_are_not_looked_at(device):
@@ -137,6 +139,10 @@ def test_photos_of_one_exposure_are_not_looked_at(device):
     photos = {"RGB": [photo_of(opaque(np.full((4, 4, 3), 128, np.uint8)))]}
     assert Exposures(device, photos).has_begun(FROM, 0)
     assert not Exposures(device, photos, one_exposure=True).has_begun(1.0, 1 << 30)
+    many = {"RGB": [photo_of(photos["RGB"][0].rgba, name=str(i)) for i in range(FEWEST)]}
+    assert Exposures(device, many, one_exposure=True).alike("RGB")
+    assert not Exposures(device, many).alike("RGB"), "not looked at yet"
+    assert Exposures(device, {"RGB": many["RGB"][1:]}).alike("RGB"), "too few to tell"
 
 
 def test_few_or_unknown_photos_are_left_as_they_are(device):

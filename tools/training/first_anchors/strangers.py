@@ -6,7 +6,9 @@
 Kinds are those of training/synthetic/strangers.py, each another place for another seed, made on the
 spot and read as a stranger's files are.  Both models have the same processor seconds of one core
 and start from what the program itself finds.  psnr_db: of all held-out photos; worst_db: of the
-worst of them; start_s: processor seconds until the first step, which --seconds counts.
+worst of them; fitted_db: of their right halves, with the colours fitted on the left ones, which is
+what counts where exposures differ; start_s: processor seconds until the first step, which --seconds
+counts.
 """
 
 import argparse
@@ -32,30 +34,41 @@ from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.training.baselines.plain import PlainTrainer  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
 from shapeshift.training.photos import BLACK  # noqa: E402
-from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.settings import TrainSettings, suited  # noqa: E402
+from shapeshift.training.supervision.exposure import fitted_psnr  # noqa: E402
 from shapeshift.training.synthetic.strangers import KINDS, make_stranger  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 
 COLUMNS = (
-    "capture", "seed", "model", "psnr_db", "worst_db", "seconds", "steps", "start_s", "count",
-    "origin", "said",
+    "capture", "seed", "model", "psnr_db", "worst_db", "fitted_db", "seconds", "steps", "start_s",
+    "count", "origin", "said",
 )  # fmt: skip
 MODELS = {"anchors": (Trainer, TrainSettings), "splats": (PlainTrainer, PlainSettings)}
 
 
 def trained(device, capture: Capture, model: str, options: argparse.Namespace, seed: int) -> dict:
     make, settings = MODELS[model]
+    asked = settings(iterations=None, seconds=options.seconds, seed=seed)
+    if isinstance(asked, TrainSettings):
+        asked = suited(asked, (), capture)
     before = processor_s()
-    run = make(device, capture, settings(iterations=None, seconds=options.seconds, seed=seed))
+    run = make(device, capture, asked)
     start_s = processor_s() - before
     for _ in run.steps():
         pass
     background = run.schedule.background or BLACK
-    each = [run.psnr_of(draw(run, photo.view), photo, background) for photo in run.held_out]
+    drawn = [draw(run, photo.view) for photo in run.held_out]
+    pairs = list(zip(drawn, run.held_out, strict=True))
+    each = [run.psnr_of(drawing, photo, background) for drawing, photo in pairs]
+    fitted = [
+        fitted_psnr(picture_of(device, drawing), photo, photo.over(background))
+        for drawing, photo in pairs
+    ]
     if options.pictures:
         save_pictures(run, options.pictures / f"{capture.folder.name}_{seed}_{model}.png")
     return {
         "psnr_db": f"{sum(each) / len(each):.2f}", "worst_db": f"{min(each):.2f}",
+        "fitted_db": f"{sum(fitted) / len(fitted):.2f}",
         "seconds": f"{run.elapsed:.1f}", "steps": run.iteration, "start_s": f"{start_s:.1f}",
         "count": len(run.adam[run.param_group]), "origin": run.origin,
         "said": " ".join(run.warnings).replace(str(capture.folder), capture.folder.name),
@@ -70,11 +83,16 @@ def draw(run, view: View):
     return run.step.draw(view, run.control(run.stops[0].name), background)
 
 
+def picture_of(device, drawing) -> np.ndarray:
+    """(H, W, 3) of what is drawn."""
+    return device.download(drawing.frame.image).transpose(1, 2, 0)
+
+
 def save_pictures(run, path: Path) -> None:
     """Up to six held-out photos, and below them what the run draws."""
     columns, background = [], run.schedule.background or BLACK
     for photo in run.held_out[:6]:
-        drawn = run.device.download(draw(run, photo.view).frame.image).transpose(1, 2, 0)
+        drawn = picture_of(run.device, draw(run, photo.view))
         columns.append(np.concatenate([photo.over(background), drawn]))
     sheet = np.rint(255 * np.clip(np.concatenate(columns, axis=1), 0, 1)).astype(np.uint8)
     Image.fromarray(sheet).save(path)
@@ -84,7 +102,8 @@ def asked() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS),
+                        default=[name for name, kind in KINDS.items() if not kind.masks])
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--models", nargs="+", choices=list(MODELS), default=list(MODELS))
     parser.add_argument("--pictures", type=Path, help="a folder for photos beside drawings")
