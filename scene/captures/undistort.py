@@ -105,10 +105,10 @@ def pinhole_of(lens: ColmapCamera) -> Pinhole:
     make too much of it.
     """
     if is_panorama(lens):
-        focal, (across, down) = max(round(lens.focal[0]), 1), face_size(lens)
-        size = (2 * across, 2 * down)
+        focal, half = max(round(lens.focal[0]), 1), face_size(lens)
+        size = (2 * half[0], 2 * half[1])
         refuse_grown(lens, size)
-        return Pinhole((focal, focal), (across, down), size)
+        return Pinhole((focal, focal), half, size)
     limit, (fx, fy), (width, height) = min(fold(lens), WIDEST), lens.focal, lens.size
     along = np.linspace(0, limit, SAMPLES)
     none = np.zeros_like(along)

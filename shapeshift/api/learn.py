@@ -332,8 +332,8 @@ def evaluate(
     photos = photos if modality is None else only(photos, modality)
     photos = with_extrinsics(photos, rig_of(model.provenance))
     factor = downscale or trained_downscale(model.provenance)
-    masks = trained_masks(model.provenance, masks)
-    scores = evaluate_model(open_device(device), model, photos, factor, masks, background, distance)
+    meant = trained_masks(model.provenance, masks)
+    scores = evaluate_model(open_device(device), model, photos, factor, meant, background, distance)
     result = report(scene.path, scores, started)
     return result if distance is None else result | {"vgg_file": distance.name}
 
