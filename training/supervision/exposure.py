@@ -9,6 +9,9 @@ A model that is not trained to the end, or cannot show everything, leaves gains 
 where there are none.  NOISE of them is taken for that, and with it a share of all gains (Wiener's
 filter): where photos do not differ by more, nothing is changed.  A model that does not show the
 photos yet, such as the fog that a run from random points begins with, says nothing of them.
+
+Gains that follow where the cameras stand, another in each channel, are no camera's doing: they are
+what a model of normal maps that is not sharp yet lacks at the sides that a view shows.
 """
 
 import numpy as np
@@ -23,6 +26,11 @@ from shapeshift.training.photos import LoadedPhoto
 FROM, VISITS = 0.25, 2.5
 NOISE = 0.04  # standard deviation of the gains' logarithms; docs/bench/exposure.csv
 LIKE = 0.8  # squared correlation of drawings and photos, median; docs/bench/exposure.csv
+# Of exposures with some white balance 0.93 of the gains' variance is common to the channels, of
+# channels that know nothing of each other a third.  A quadric of the camera's place foretells 0.80
+# of the variance in normal maps, below 0.4 of chance gains.  docs/bench/README.md, "Brightness".
+COMMON, BY_PLACE = 0.6, 0.4
+OUTLIER = 2.0  # standard deviations, beyond which a gain tells no more of the others
 FEWEST = 6  # known photos of a modality, and half of them: then a mean means something
 NORMAL = 1.4826  # standard deviations a median deviation, of a normal spread
 MOST = 4.0  # times brighter or darker; beyond it is no exposure
@@ -43,6 +51,8 @@ class Exposures:
         names = [(photo.modality, photo.name) for each in photos.values() for photo in each]
         self.row = {name: row for row, name in enumerate(names)}
         self.rows = {m: [self.row[m, p.name] for p in each] for m, each in photos.items()}
+        views = [photo.view for each in photos.values() for photo in each]
+        self.eyes = np.array([v.world_from_eye.position for v in views], np.float64).reshape(-1, 3)
         self.log_gain = np.full((len(names), 3), np.nan)  # NaN: not looked at yet
         self.correlation = np.full(len(names), np.nan)  # squared correlation with what was drawn
         self.begin = FROM  # share of the run from which on photos are looked at
@@ -86,16 +96,28 @@ class Exposures:
         enough = seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE
         return logs[seen] if enough else None
 
+    def seen_from(self, modality: str) -> np.ndarray:
+        """(n, 3) metres: the places of the cameras of the photos in `known`."""
+        rows = np.array(self.rows[modality])
+        return self.eyes[rows[np.isfinite(self.log_gain[rows]).all(axis=1)]]
+
     def spread(self, modality: str) -> float:
         """Of the logarithms of a modality's gains, by their median deviation, as a standard one.
 
-        0 while nothing is known of them.
+        0 while nothing is known of them, or where gains follow the cameras' places and have little
+        in common.
         """
         known = self.known(modality)
         if known is None:
             return 0.0
-        away = np.abs(known - np.median(known, axis=0))
-        return float(NORMAL * np.sqrt((np.median(away, axis=0) ** 2).mean()))
+        away = known - np.median(known, axis=0)
+        each = NORMAL * np.median(np.abs(away), axis=0)
+        spread = float(np.sqrt((each**2).mean()))
+        if not spread > NOISE:  # nothing is evened out; no need to ask why
+            return spread
+        usual = np.clip(away, -OUTLIER * each, OUTLIER * each)
+        alike = common(usual) >= COMMON
+        return spread if alike or by_place(usual, self.seen_from(modality)) <= BY_PLACE else 0.0
 
     def alike(self, modality: str) -> bool:
         """Whether the photos of a modality are known to have one exposure.
@@ -139,6 +161,30 @@ class Exposures:
             self.log_gain = kept.copy()
             self.begin, self.begin_step = map(float, state["exposure.begin"])
             self.correlation = state["exposure.correlation"].copy()
+
+
+def common(values: np.ndarray) -> float:
+    """The share of the variance of values (N, c) that their means over c have; no variance: 1."""
+    variance = values.var(axis=0).mean()
+    return float(values.mean(axis=1).var() / variance) if variance > 0 else 1.0
+
+
+def by_place(values: np.ndarray, eyes: np.ndarray) -> float:
+    """The share, at most 1, of the variance of values (N, c) that places (N, 3) foretell.
+
+    By least squares of 1, the coordinates and the square of the distance from the middle, which
+    holds the square of the distance from any point; each row foretold by all others.
+    """
+    away = eyes - eyes.mean(axis=0)
+    terms = np.column_stack([away, (away**2).sum(axis=1)])
+    terms = terms - terms.mean(axis=0)
+    terms /= np.maximum(np.abs(terms).max(axis=0), 1e-12)
+    basis, sizes, _ = np.linalg.svd(np.column_stack([np.ones(len(eyes)), terms]), False)
+    basis = basis[:, sizes > 1e-6 * sizes[0]]
+    left = values - basis @ (basis.T @ values)
+    left /= np.maximum(1 - (basis**2).sum(axis=1, keepdims=True), 1e-6)  # without the row itself
+    variance = ((values - values.mean(axis=0)) ** 2).sum()
+    return float(1 - (left**2).sum() / variance) if variance > 0 else 0.0
 
 
 def log_gain(product: np.ndarray, square: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.exposure import (
+    BY_PLACE,
     FEWEST,
     FROM,
     LIKE,
@@ -23,6 +24,8 @@ from shapeshift.training.supervision.exposure import (
     NONE,
     NORMAL,
     Exposures,
+    by_place,
+    common,
     fitted_psnr,
     log_gain,
 )
@@ -112,6 +115,63 @@ def test_single_photos_change_no_others(device):
     logs[:4] = -0.8
     exposures, photos = known(device, logs)
     assert all(exposures.gain(photo) == NONE for photo in photos) and exposures.warnings() == []
+
+
+@pytest.mark.parametrize("count", [7, 8, 24, 72])
+def test_what_places_foretell_is_a_fit_to_all_other_photos(count):
+    """The twin: each photo left out in turn, and foretold by numpy's least squares."""
+    rng = RNG(count)
+    eyes, values = rng.normal(size=(count, 3)) + 5, rng.normal(size=(count, 3))
+    values += (eyes[:, :1] - 4) ** 2 / 2
+    terms = np.column_stack([np.ones(count), eyes, (eyes**2).sum(axis=1)])
+    left = np.empty_like(values)
+    for row in range(count):
+        others = np.arange(count) != row
+        fit = np.linalg.lstsq(terms[others], values[others], rcond=None)[0]
+        left[row] = values[row] - terms[row] @ fit
+    want = 1 - (left**2).sum() / ((values - values.mean(axis=0)) ** 2).sum()
+    assert by_place(values, eyes) == pytest.approx(want, rel=1e-6)
+
+
+def test_places_that_are_one_or_gains_that_are_one_foretell_nothing():
+    assert by_place(np.ones((9, 3)), RNG(0).normal(size=(9, 3))) == 0
+    assert by_place(RNG(0).normal(size=(9, 3)), np.ones((9, 3))) < 0
+    assert by_place(np.zeros((1, 3)), np.zeros((1, 3))) == 0
+
+
+@pytest.mark.parametrize("count", [24, 72])
+def test_gains_that_follow_the_cameras_channel_by_channel_are_no_exposure(device, count):
+    """Each channel's with the distance to another point, as of normal maps: its own side.
+
+    The same gains in any other order are a camera's (at most one in a hundred not), and so are
+    gains that follow the cameras alike in all channels: photos of a thing by a window.
+    """
+    rng, points = RNG(count), 0.3 * np.eye(3)
+    eyes = rng.normal(size=(count, 3))
+    eyes *= rng.uniform(1.2, 2, (count, 1)) / np.linalg.norm(eyes, axis=1, keepdims=True)
+    away = np.linalg.norm(eyes[:, None] - points, axis=2)
+    away /= away.mean(axis=1, keepdims=True)
+    logs = -0.8 * np.log(away) + rng.normal(scale=0.01, size=(count, 3))
+    logs[: count // 50] = -1.0  # a dark photo of 72 changes nothing of it
+    exposures, photos = known(device, logs)
+    exposures.eyes[:] = eyes
+    assert all(exposures.gain(photo) == NONE for photo in photos) and exposures.warnings() == []
+    chance = [by_place(rng.permutation(logs), eyes) for _ in range(200)]
+    assert np.mean(np.array(chance) > BY_PLACE) <= 0.01
+    exposures.log_gain[:] = logs[:, :1]
+    assert exposures.gain(photos[-1]) != NONE and exposures.warnings()
+    exposures.log_gain[:], exposures.eyes[:] = logs, rng.permutation(eyes)
+    assert exposures.gain(photos[-1]) != NONE and exposures.warnings()
+
+
+@pytest.mark.parametrize(("values", "share"), [
+    (np.zeros((4, 3)), 1.0),
+    (np.arange(4.0)[:, None] * np.ones(3), 1.0),
+    (np.array([[1.0, -1, 0], [-1, 1, 0]]), 0.0),
+    (np.array([[1.0, 0, 0], [-1, 0, 0]]), 1 / 3),
+])  # fmt: skip
+def test_what_channels_have_in_common(values, share):
+    assert common(values) == pytest.approx(share, abs=1e-12)
 
 
 @pytest.mark.parametrize(("sign", "like"), [(1, 1.0), (-1, -1.0), (0, 0.0)])
