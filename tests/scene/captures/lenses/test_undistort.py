@@ -11,8 +11,7 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.capture_photos import of_size, posed_photo
-from shapeshift.scene.captures.colmap_tables import BROWN, BROWN_FISHEYE, LENSES, ColmapCamera
-from shapeshift.scene.captures.lenses.brown import brown_tangents
+from shapeshift.scene.captures.colmap_tables import LENSES, ColmapCamera
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.undistort import (
@@ -26,6 +25,7 @@ from shapeshift.scene.captures.undistort import (
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.photos import load_photos
 from tests.support.scene.captures import simple, write_transforms
+from tests.support.scene.lenses import FISH, KEYS, brown, eighth_power, fisheye
 
 SIZE = (200, 150)
 F, CENTRE = 160.0, (103.0, 72.0)
@@ -87,51 +87,6 @@ def test_as_pycolmap_undistorts_it(tmp_path, bend):
     assert away.mean() < 2 and np.percentile(away, 99) < 8
 
 
-def brown(xyz: np.ndarray, params: tuple) -> np.ndarray:
-    """(N, 2) pixels of points: the formula of OpenCV's documentation, radial and tangential."""
-    fx, fy, cx, cy, k1, k2, p1, p2, k3 = params
-    x, y = xyz[:, 0] / xyz[:, 2], xyz[:, 1] / xyz[:, 2]
-    r2 = x * x + y * y
-    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return np.stack([fx * u + cx, fy * v + cy], axis=1)
-
-
-def fisheye(xyz: np.ndarray, params: tuple) -> np.ndarray:
-    fx, fy, cx, cy, *k = params
-    r = np.hypot(xyz[:, 0], xyz[:, 1])
-    theta = np.arctan2(r, xyz[:, 2])
-    bent = theta * (1 + sum(c * theta ** (2 * i + 2) for i, c in enumerate(k)))
-    return xyz[:, :2] / r[:, None] * bent[:, None] * (fx, fy) + (cx, cy)
-
-
-def eighth_power(xyz: np.ndarray, params: tuple) -> np.ndarray:
-    """Brown's polynomial with nerfstudio's k4: brown, and k4 r^8 more of the tangents."""
-    fx, fy, *_, k4 = params
-    xy = xyz[:, :2] / xyz[:, 2:]
-    r8 = (xy**2).sum(axis=1, keepdims=True) ** 4
-    return brown(xyz, params[:-1]) + k4 * r8 * xy * (fx, fy)
-
-
-def rational(xyz: np.ndarray, params: tuple) -> np.ndarray:
-    """OpenCV's eight-number lens without tangential ones: a quotient of two polynomials."""
-    fx, fy, cx, cy, k1, k2, k3, k4, k5, k6 = params
-    xy = xyz[:, :2] / xyz[:, 2:]
-    r2 = (xy**2).sum(axis=1, keepdims=True)
-    over = (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
-    return xy * over * (fx, fy) + (cx, cy)
-
-
-def leaning_fisheye(xyz: np.ndarray, params: tuple) -> np.ndarray:
-    """nerfstudio's fisheye with p1 and p2: Brown's lens, of angles where that has tangents."""
-    r = np.hypot(xyz[:, 0], xyz[:, 1])
-    angles = xyz[:, :2] * (np.arctan2(r, xyz[:, 2]) / r)[:, None]
-    return eighth_power(np.column_stack([angles, np.ones(len(angles))]), params)
-
-
-KEYS = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-FISH = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4")
 FORMULAS = [
     (brown, KEYS, (620, 615, 410, 290, -0.28, 0.09, 0.002, -0.001, -0.01), {}),
     (brown, KEYS, (620, 615, 410, 290, 0.12, 0.03, 0, 0, 0), {"camera_model": "OPENCV"}),
@@ -141,30 +96,6 @@ FORMULAS = [
     (eighth_power, (*KEYS, "k4"), (620, 615, 410, 290, -0.28, 0.09, 0.002, -0.001, -0.01, 0.03),
      {"camera_model": "opencv"}),
 ]  # fmt: skip
-
-
-FILES = [
-    *FORMULAS,
-    (leaning_fisheye, (*KEYS, "k4"), (330, 330, 395, 305, 0.04, -0.01, 0.003, -0.002, 0.002, 1e-4),
-     {"camera_model": "opencv_fisheye"}),
-    (rational, ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "k5", "k6"),
-     (620, 615, 410, 290, 0.4, 0.1, 0.01, 0.6, 0.15, 0.02), {}),
-    (rational, ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "k5", "k6"),
-     (620, 615, 410, 290, 0.4, 0.1, 0.01, 0.2, 0, 0), {"camera_model": "FULL_OPENCV"}),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("formula, keys, numbers, more", FILES)
-def test_the_lens_of_a_file_is_its_formula(tmp_path, formula, keys, numbers, more):
-    frames, _ = simple(tmp_path, 2)
-    for path in (tmp_path / "images").iterdir():
-        Image.new("RGB", (800, 600)).save(path)
-    said = dict(zip(keys, numbers, strict=True)) | more
-    write_transforms(tmp_path, frames, w=800, h=600, **said)
-    lens = read_capture(tmp_path).photos[0].lens
-    at = np.random.default_rng(0).uniform(-0.8, 0.8, (50, 2))
-    want = formula(np.column_stack([at, np.ones(50)]), numbers)
-    np.testing.assert_allclose(pixels_of(lens, at), want, atol=1e-9)
 
 
 @pytest.mark.parametrize("factor, least", [(1, 16), (2, 16), (2, 1), (3, 16), (3, 1), (7, 16)])
@@ -351,46 +282,6 @@ def test_every_model_of_colmap_is_read_or_refused(model):
         assert 0.25 * 150 * 200 <= np.prod(straight.size) <= 8 * 150 * 200
         assert lost(lens, straight.size, 1).shape == straight.size[::-1]
         assert is_straight(lens, "here") in (True, False)
-
-
-@pytest.mark.parametrize("model", [BROWN, BROWN_FISHEYE])
-def test_lenses_of_nerfstudio_are_turned_back(model):
-    """Pixels of tangents of pixels, and with k4, p1, p2 of 0 what pycolmap has."""
-    numbers = (0.04, -0.02, 0.01, 0.005, 0.002, -0.001)
-    lens = ColmapCamera(model, SIZE, (F, 1.01 * F, *CENTRE, *numbers))
-    x, y = np.meshgrid(np.linspace(0, SIZE[0], 21), np.linspace(0, SIZE[1], 16))
-    pixels = np.stack([x.ravel(), y.ravel()], axis=1)
-    np.testing.assert_allclose(pixels_of(lens, brown_tangents(lens, pixels)), pixels, atol=1e-9)
-    fisheye_of = model == BROWN_FISHEYE
-    k1, k2, k3 = numbers[:3]
-    theirs = ("OPENCV_FISHEYE", (k1, k2, k3, 0.0)) if fisheye_of else (
-        "FULL_OPENCV", (k1, k2, 0.0, 0.0, k3, 0.0, 0.0, 0.0))  # fmt: skip
-    same = replace(lens, params=(*lens.params[:4], k1, k2, k3, 0.0, 0.0, 0.0))
-    other = ColmapCamera(theirs[0], SIZE, (*lens.params[:4], *theirs[1]))
-    at = np.random.default_rng(0).uniform(-1, 1, (50, 2))
-    np.testing.assert_allclose(pixels_of(same, at), pixels_of(other, at), atol=1e-9)
-    assert np.isfinite(pixels_of(lens, np.zeros((1, 2)))).all()
-    assert not np.isfinite(pixels_of(lens, np.full((1, 2), np.nan))).any()
-
-
-def test_beyond_a_fisheyes_crop_radius_nothing_counts(tmp_path):
-    frames, _ = simple(tmp_path, 2)
-    for path in (tmp_path / "images").iterdir():
-        Image.new("RGB", (200, 150), (200, 100, 50)).save(path)
-    lens = {"w": 200, "h": 150, "fl_x": 110.0, "k1": 0.03, "camera_model": "OPENCV_FISHEYE"}
-    write_transforms(tmp_path, frames, **lens, fisheye_crop_radius=60.0)
-    for factor in (1, 2, 3):
-        capture = read_capture(tmp_path)
-        (photo, _) = load_photos(capture, "train", factor, "object")
-        height, width = photo.weight.shape
-        x, y = np.meshgrid(*((np.arange(side) + 0.5) * factor for side in (width, height)))
-        straight = pinhole_of(capture.photos[0].lens)
-        tangents = (np.stack([x, y], 2) - straight.centre) / straight.focal
-        xyz = np.concatenate([tangents, np.ones((height, width, 1))], 2).reshape(-1, 3)
-        off = np.hypot(*(fisheye(xyz, (110, 110, 0, 0, 0.03, 0, 0, 0))).T).reshape(height, width)
-        np.testing.assert_array_equal(photo.weight > 0, off <= 60)
-    half = of_size(capture.photos[0].lens, (100, 75), tmp_path)
-    assert half.crop == 30
 
 
 def test_numbers_that_blow_a_photo_up_are_refused():

@@ -1,6 +1,6 @@
 """What it costs to take masks for something else: an object cut out, or people who are hidden.
 
-    python3 tools/training/masks_meaning.py --out docs/bench/masks_meaning.csv \
+    python3 tools/training/first_anchors/masks_meaning.py --out docs/bench/masks_meaning.csv \
         [--seconds 20] [--masks object valid] [--seeds 0]
 
 Two kinds of training/synthetic/strangers.py whose files do not say what their masks mean: cut_out,
@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE / "first_anchors"), str(HERE)]
+sys.path[:0] = [str(HERE.parents[2]), str(HERE.parent), str(HERE)]
 
 from strangers import draw  # noqa: E402
 
@@ -85,7 +85,9 @@ def asked() -> argparse.Namespace:
 def main() -> None:
     options, device = asked(), open_device("cpu")
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as above:
-        file.write(f"# python3 tools/training/masks_meaning.py {shlex.join(sys.argv[1:])}\n")
+        file.write(
+            f"# python3 tools/training/first_anchors/masks_meaning.py {shlex.join(sys.argv[1:])}\n"
+        )
         file.write(f"# {device.name}, {device.platform}\n")
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
         rows.writeheader()
