@@ -14,13 +14,19 @@ AUTO = "auto"
 
 def camera_reading(options, size: tuple[int, int] | None = None) -> "CameraReading":
     """The same of options with up and flip, and fov_y (degrees) if they have that; UsageError."""
-    from shapeshift.app.errors import UsageError
     from shapeshift.scene.cameras.camera_list import CameraReading
 
     fov_y = getattr(options, "fov_y", 0.0)
-    if not (fov_y == 0 or 0 < fov_y < 180):
-        raise UsageError(f"--fov-y is {fov_y}, expected degrees between 0 and 180.")
+    refuse_fov(fov_y)
     return CameraReading(size, math.radians(fov_y), options.up, options.flip)
+
+
+def refuse_fov(fov_y: float) -> None:
+    """Raises UsageError for what is no angle, degrees, nor 0 for one that is not known."""
+    from shapeshift.app.errors import UsageError
+
+    if not 0 <= fov_y < 180:
+        raise UsageError(f"--fov-y is {fov_y}, expected degrees between 0 and 180.")
 
 
 def named_cameras(

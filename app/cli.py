@@ -263,9 +263,20 @@ def answer(arguments: list[str]) -> int:
             return answer(["headless"])
         return refuse(f"{command}: {error}")
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and is_folder_gone():
+            return refuse(f"{command}: the folder that this was started in is gone; go to another.")
         return refuse(f"{command}: {error.strerror or error}: {error.filename or 'no file named'}")
     except Exception as error:
         return report_fault(command, error)
+
+
+def is_folder_gone() -> bool:
+    """Whether the current folder was deleted since somebody went there."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def no_command(word: str) -> str:

@@ -103,6 +103,8 @@ def is_our_png(path: Path) -> bool:
 
 
 def make_folder(path: Path) -> None:
+    if path.exists() and not path.is_dir():
+        raise UsageError(f"{path} is a file; name a folder, there or new.")
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

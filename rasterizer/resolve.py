@@ -1,4 +1,4 @@
-"""resolve: a drawn image -> bytes for GL or a window: background, palette, 8 bits."""
+"""resolve: a drawn image -> bytes for GL or a window: background, palette, 8 bits, overlay."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,6 +26,14 @@ class Behind:
     tangents: tuple[float, float, float, float]  # left, right, down, up
 
 
+@dataclass(frozen=True)
+class WindowOverlay:
+    """What is laid over a window's picture."""
+
+    layer: np.ndarray  # (H, W, 4) uint8, premultiplied; blue first and row 0 on top
+    boxes: np.ndarray  # (B, 4) int32: left, top, right, low of where it is; no pixel is in two
+
+
 NO_PALETTE = np.zeros((1, 3), np.float32)  # its place in the kernel's arguments
 
 
@@ -37,13 +45,14 @@ def resolve(
     heat: np.ndarray | None = None,
     *,
     as_window: bool = False,
+    overlay: WindowOverlay | None = None,
 ) -> np.ndarray:
     """(H, W, 4) uint8, opaque, of image (H, W, 4) float32: red first and row 0 at the bottom, as GL
     wants it, or as a window has it in memory: blue first and row 0 on top.
 
     image, and its heat (H, W, 2): as rasterize_rgba gives them.  palette (256, 3): makes
     colours of the heat, where there is any, else of the image.  Read only; on a CPU it is the
-    device's own memory, which is reused when the array goes.
+    device's own memory, which is reused when the array goes.  overlay: of a window's picture.
     """
     height, width = image.shape[:2]
     pixels = device.empty((height, width, 4), np.uint8)
@@ -53,11 +62,18 @@ def resolve(
     table = np.zeros((2, len(colors), 4), np.float32)  # colours, differences
     table[0, :, :3], table[1, :-1, :3] = colors, np.diff(colors, axis=0)
     plain, sky = sky_rows(device, background, (width, height))
+    kernels = device.program(KERNEL)
     device.launch(
-        device.program(KERNEL)["resolve"], height, 1,
+        kernels["resolve"], height, 1,
         width, height, *(float(c) for c in plain), int(mixed),
         device.shared(image), device.constants(table), pixels, beside, sky, int(as_window),
     )  # fmt: skip
+    if overlay is not None and len(overlay.boxes):
+        assert as_window and overlay.layer.shape == pixels.shape, "the overlay is a window's"
+        boxes = device.constants(np.asarray(overlay.boxes, np.int32))
+        layer = device.shared(overlay.layer)
+        over = (width, len(overlay.boxes), boxes, layer, pixels)
+        device.launch(kernels["lay_over"], height, 1, *over)
     return device.view(pixels)
 
 

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 import moderngl
 import numpy as np
 
+from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
@@ -192,13 +193,13 @@ class Drawing(ABC):
 
     def presentable_bytes(
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
-        heat: bool = False, as_window: bool = False,
+        heat: bool = False, as_window: bool = False, overlay: WindowOverlay | None = None,
     ) -> np.ndarray:  # fmt: skip
         """(H, W, 4) uint8 of view i as a window shows it, opaque: red first and row 0 at the
         bottom, or as a window has it in memory, blue first and row 0 on top.
 
         view: whose directions a sky is seen in.  palette: of the heat, where the view has any, else
-        of the picture.  Only where presentable() is an array.
+        of the picture.  overlay: over a window's.  Only where presentable() is an array.
         """
         raise TypeError("this drawing's pictures are textures; present them by GL.")
 

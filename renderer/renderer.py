@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 
 import moderngl
 import numpy as np
@@ -38,7 +39,7 @@ from shapeshift.renderer.cut import place_splats, restore_shapes
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import BESIDE_SET, DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.resolve import Resolve
+from shapeshift.renderer.gl.resolve import Resolve, WindowTaker
 from shapeshift.renderer.levels import LevelChoice, decoded_objects, exchange_levels
 from shapeshift.renderer.resample import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
@@ -88,6 +89,7 @@ class Renderer:
         self._geometry_runs = self._color_runs = 0
         self._views: list[View] = []  # of the last frame, in the size that is shown
         self._ways: list[FalseColors] = []  # how their colours came about
+        self.taker: WindowTaker | None = None  # asked first where bytes would fill a window
         self.keeps_beside = False  # a set of colours for `draw_beside`, from the next frame on
         self._beside_timer = PassTimer(ctx)
         self._debug: list[tuple[np.ndarray, dict[str, float]]] = []  # picture and numbers, a view
@@ -111,9 +113,9 @@ class Renderer:
                 if not obj.seen:
                     continue
                 key, first = control_key(obj), decoded.key is None
+                x = control_of(obj) if decoded.key != key else decoded.x
                 # Another key with the same x: a selector changed where nothing is.
-                if decoded.key != key and (first or not same_controls(control_of(obj), decoded.x)):
-                    x = control_of(obj)
+                if decoded.key != key and (first or not same_controls(x, decoded.x)):
                     # What follows the eye is decoded with the colours, once the eye is known.
                     follows = first or shape_follows_control(obj.model)
                     # What has leaves comes with the stream.
@@ -337,17 +339,15 @@ class Renderer:
         as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
             if as_array and self._resolve.takes_bytes(framebuffer, image.shape[1::-1]):
-                as_window = self._resolve.is_window(framebuffer)
-                looks = (background, view, palette, heat is not None, as_window)
-                self._resolve.copy(self.drawing.presentable_bytes(i, *looks), framebuffer)
+                looks = (background, view, palette, heat is not None)
+                make = partial(self.drawing.presentable_bytes, i, *looks)
+                self._resolve.copy(make, framebuffer, self.taker)
             else:
-                unit = 1.0 if self._debug else self.drawing.unit_of(i)
-                self._resolve.draw(image, framebuffer, background, palette, heat, unit, view)
+                how = (1.0 if self._debug else self.drawing.unit_of(i), view)
+                self._resolve.draw(image, framebuffer, background, palette, heat, *how)
 
     def coverage(self, i: int = 0) -> moderngl.Texture | np.ndarray:
-        """How much splats hide of what is behind them in view i, as drawn: the alpha of a GL
-        texture, row 0 at the bottom, or without GL (H, W) float32, row 0 on top.
-        """
+        """How much splats hide in view i: the alpha of a GL texture, or (H, W), row 0 on top."""
         image = self.drawing.presentable(i)
         return image[..., 3] if isinstance(image, np.ndarray) else image
 

@@ -155,7 +155,10 @@ class StopBlend:
             return end if part else start
         if self._walks(start, end):
             return start + (end - start) * part  # type: ignore[operator]  # numbers: they walk
-        way = self._mixed(self.weights(start), self.weights(end), part)
+        before, after = self.weights(start), self.weights(end)
+        if np.ndim(part):
+            return self._mixed_each(before, after, np.asarray(part))
+        way = self._mixed(before, after, part)
         if way.ndim == 2:
             return way
         return StopWeights(tuple(zip(self.names, (way / way.sum()).tolist(), strict=True)))
@@ -183,6 +186,15 @@ class StopBlend:
         xs = sorted(stop.x for stop in self.stops)
         low, high = min(np.min(start), end), max(np.max(start), end)
         return any(a <= low and high <= b for a, b in pairwise([-np.inf, *xs, np.inf]))
+
+    def _mixed_each(self, start: np.ndarray, end: np.ndarray, part: np.ndarray) -> np.ndarray:
+        """(A, S) at parts (A,), most of them 0 or 1: of a section all but those at its edge."""
+        way = np.where(part[:, None] >= 1, end, start)
+        between = ~((part <= 0) | (part >= 1))
+        if between.any():
+            starts = start[between] if start.ndim == 2 else start
+            way[between] = self._mixed(starts, end, part[between])
+        return way
 
     def _mixed(self, start: np.ndarray, end: np.ndarray, part: float | np.ndarray) -> np.ndarray:
         """Weights (S,) or (A, S) between weights."""

@@ -37,12 +37,14 @@ class Options:
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.commands.simulate import refuse_model
     from shapeshift.app.opening import ReadingOptions
     from shapeshift.app.scene_files import open_scene_file
     from shapeshift.scene.colliders.collider_files import collider_key
     from shapeshift.scene.document.scene_file import HULLS
     from shapeshift.scene.document.write_scene_file import write_scene_file
 
+    refuse_model(options.scene, "colliders makes what is touched")
     file, models, _ = open_scene_file(options.scene, ReadingOptions())
     paths = paths_of(file, options.out)
     refuse(options, file, list(paths.values()))

@@ -295,11 +295,11 @@ def with_words(settings, stereo_colors: str, foveation: str):
 
 
 def choose_cameras(options: Options, size: tuple[int, int] | None):
-    """The CameraList of the files that --camera names, in their own world; None: views around the
-    scene.  `size` None leaves the pixels to the file.
-    """
-    from shapeshift.app.camera_files import named_cameras
+    """What --camera names, in its own world; None: views around the scene.  `size` None leaves the
+    pixels to the file."""
+    from shapeshift.app.camera_files import named_cameras, refuse_fov
 
+    refuse_fov(options.fov_y)
     if options.camera in AROUND:
         return None
     cameras = named_cameras(options.camera, options.scene, options, size)

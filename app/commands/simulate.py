@@ -78,13 +78,13 @@ def run(options: Options) -> int:
     return 0
 
 
-def refuse_model(path: Path) -> None:
+def refuse_model(path: Path, command: str = "simulate moves the objects") -> None:
     """Raises UsageError for a scene that is no file of objects, and would be read as none."""
     from shapeshift.app.errors import UsageError
 
     if path.exists() and path.suffix.lower() != ".json":
         raise UsageError(
-            f"{path} is no scene file: simulate moves the objects of a NAME.scene.json (see "
+            f"{path} is no scene file: {command} of a NAME.scene.json (see "
             "docs/scene.md), which the viewer writes of a scene by Ctrl+S."
         )
 

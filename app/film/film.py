@@ -42,7 +42,7 @@ class Options(ClusterOptions, DrawingOptions):
     """What the scene shows when: "RGB@0 Thermal@3s Opened@6s", or in % of the camera's way:
     "RGB@20% Opened@80%".  Two equal neighbours hold.  Default: as the scene opens."""
     seconds: float | None = None
-    """Default: 10, or what the file of the path says."""
+    """How long the film is.  Default: 10, or what the file of the path says."""
     fps: float | None = None
     """Frames a second.  Default: 30, or what the file of the path says."""
     size: Annotated[str, SIZE] = ""
@@ -66,8 +66,8 @@ class Options(ClusterOptions, DrawingOptions):
     every: int = 1
     """Draw each N-th frame alone, for a first look; the film stays as long."""
     codec: Literal["", "h264", "av1", "vp9"] = ""
-    """Default: h264 in .mp4, vp9 in .webm.  With av1 and vp9 the file is the same to the byte each
-    time; of h264 only the frames are."""
+    """How a video is packed.  Default: h264 in .mp4, vp9 in .webm.  With av1 and vp9 the file is
+    the same to the byte each time; of h264 only the frames are."""
     background: tuple[float, float, float] | None = None
     """Red, green and blue behind everything, 0 to 1 as displayed.  Default: what the scene was
     trained on, else black."""
@@ -94,12 +94,14 @@ class Options(ClusterOptions, DrawingOptions):
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.camera_files import refuse_fov
     from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.document import open_document
     from shapeshift.app.film.film_plan import read_style
     from shapeshift.app.film.frame_folder import FrameFolder
 
     check_cluster(options)
+    refuse_fov(options.fov_y)
     # What needs no scene comes before it: large ones take a while to open.
     path, cameras = named_path(options)
     clock = clock_of(options, path)

@@ -72,7 +72,8 @@ class Options(DrawingOptions):
     Default: none; the panel has one, too."""
     passthrough: bool | None = None
     """Show the room itself behind the scene, and of a scene of objects these alone, where the
-    runtime blends pictures by their alpha.  Default: as set last, at first not."""
+    runtime blends pictures by their alpha or shows the room by a layer of its own.  Default: as set
+    last, at first not."""
     floor: bool = True
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
     visibility: Annotated[bool, EXPERT] = True

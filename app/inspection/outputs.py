@@ -100,7 +100,7 @@ def three_pictures(inspected: InspectedView, scale: ColorScale) -> list[tuple[st
     heat = heat_picture(values, scale)
     marked = with_marks(heat, values, inspected.readings)
     unit = values.unit
-    title = f"Thermal, level {scale.level:g}, span {scale.span:g} {unit}".rstrip()
+    title = f"Thermal, level {scale.level:.4g}, span {scale.span:.4g} {unit}".rstrip()
     pictures = [(title, with_scale_bar(marked, scale, unit))]
     if inspected.photo is not None:
         photo = with_lengths(np.clip(inspected.photo, 0, 1), values.view, inspected.lengths)

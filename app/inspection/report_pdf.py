@@ -123,14 +123,17 @@ def write_head(report: InspectionReport, pages: ReportPages) -> None:
 
 
 def write_view(view: ReportView, pages: ReportPages) -> None:
-    """Pictures, sentences, profiles, and the table over as many pages as it takes."""
+    """Pictures, the table over as many pages as it takes, sentences, profiles."""
     pages.line(view.title, 11, "bold")
     write_pictures(view.pictures, pages)
+    if view.rows:
+        pages.room(LINE * min(len(view.rows) + 4, 8))  # its heading stands on no page alone
+        pages.line("Marks", 11, "bold")
+    for first in range(0, len(view.rows), ROWS):
+        write_table(view.rows[first : first + ROWS], pages)
     for line in (*view.lines, *view.notes):
         pages.line(line)
     pages.gap()
-    for first in range(0, len(view.rows), ROWS):
-        write_table(view.rows[first : first + ROWS], pages)
     for first in range(0, len(view.photos), PHOTOS_A_ROW):
         write_pictures(view.photos[first : first + PHOTOS_A_ROW], pages, SMALLER)
     for profile in view.profiles:

@@ -13,6 +13,7 @@ from shapeshift.app.training.train_options import Asked
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 10000  # 7 minutes of a core
 MOST_ANCHORS = 18000
+LEAST_SIDE = 16  # pixels of a photo: below it nothing is to be seen
 BLENDED_SHAPES = 0.5  # see TrainSettings
 ATTRIBUTES = "frame,stop_color"  # what several modalities have without being asked
 
@@ -45,6 +46,7 @@ def run(options: Options) -> int:
     from shapeshift.app.training import train
 
     size = parse_size(options.size)
+    check(options, size)
     folder = options.out / "capture"
     recipe = {"size": list(size), "views": options.views, "test_views": options.test_views}
     if made_before(folder, recipe):
@@ -70,6 +72,24 @@ def run(options: Options) -> int:
     if code == 0 and options.package is not None:
         publish(package, options.package)
     return code
+
+
+def check(options: Options, size: tuple[int, int]) -> None:
+    """Raises UsageError before photos are taken, which lasts minutes, for what is no demo."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.train_options import settings_of
+
+    if min(size) < LEAST_SIDE:
+        raise UsageError(f"--size is {options.size}; each side must be {LEAST_SIDE} or more.")
+    for name, value, least in (
+        ("views", options.views, 2),
+        ("test-views", options.test_views, 1),
+        ("processes", options.processes, 0),
+    ):
+        if value < least:
+            raise UsageError(f"--{name} is {value}, expected {least} or more.")
+    seconds = {} if options.seconds is None else {"seconds": options.seconds}
+    settings_of({"iterations": options.iterations, **seconds})
 
 
 def publish(package: Path, target: Path) -> None:

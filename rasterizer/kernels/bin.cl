@@ -8,8 +8,10 @@
 //          tile.
 // Units:   pixels and tiles; depths in metres, sorted as the bits of floats above 0.
 #include "common/tile_bounds_of_lanes.cl"
-#define AHEAD 24  // splats: the next tile bounds are fetched while these are counted
-#define SOON 8    // splats: the ends of lists are fetched while these are written
+// How many splats ahead memory is asked for, each the best of a row of doubled distances:
+#define AHEAD 96     // the next tile bounds, while these are counted
+#define SOON 12      // the ends of lists, while these are written: they move meanwhile
+#define DIGITS 128   // the places of keys of an order, which are farther apart
 #define SPARE 16  // ints of a cache line: chunks must not write to the same one
 
 // What a chunk gathers: its visible splats, packed at its start, and a histogram of low digits.
@@ -185,7 +187,7 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   const int last = packed ? first + (int)status[c].x : min(count, first + chunk);
   for (int i = first; i < last; i++) {
     // Bins lie far apart: the place of a key that comes soon is asked for now.
-    const uint2 pair = pairs[i], soon = pairs[min(i + SOON, last - 1)];
+    const uint2 pair = pairs[i], soon = pairs[min(i + DIGITS, last - 1)];
     const int its_place = next[(soon.y - origin) >> shift & mask_of(bins)];
     if (final)
       PREFETCH_TO_WRITE(sorted_splats + its_place);

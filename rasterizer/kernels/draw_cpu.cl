@@ -12,11 +12,10 @@
 //          corner that four pixels share, or their mean; the image has no pixels of coarse tiles
 //          then, which foveate.cl fills.
 // Units:   pixels, row 0 on top; display sRGB; transmittance T in 0..1.
-#include "common/vector.cl"
-#include "common/tiles.cl"
 #define SIDE 4     // pixels of a block, and blocks of a tile
 #define BLOCKS 16  // bits of a ushort
 #define BATCH 32   // bits of a uint
+#include "common/draw_batch.cl"
 // Kinds of tiles with FOVEATED: those between, 0, have all their pixels and no samples.
 #define COARSE 1   // samples alone
 #define SEAM 2     // both
@@ -27,25 +26,17 @@
 #define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
                          2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
 
-typedef struct {
-  // Conic and threshold times -log2(e) / 2: exp(-power / 2) = 2^(...), with no factor left to
-  // apply.
-  float splats[BATCH * RECORD];
-  uint block_splats[BLOCKS];  // per block: bit j where splat j reaches it
-#ifdef HEAT
-  float2 heat[BATCH];         // value and weight of each
-#endif
-} Batch;
-
 // A kernel's arguments and those of its calls, with and without the heat of thermal stops.
 #ifdef HEAT
 #define AND_HEAT , __global const float4* heat, __global float2* heat_image
 #define AND_HEAT_OF(view) , __global const float4* heat_##view, __global float2* heat_image_##view
 #define GIVE_HEAT(view) , heat_##view, heat_image_##view
+#define GIVE_HEAT_IN , heat
 #else
 #define AND_HEAT
 #define AND_HEAT_OF(view)
 #define GIVE_HEAT(view)
+#define GIVE_HEAT_IN
 #endif
 #if defined(FOVEATED) && defined(HEAT)
 #define AND_FINE , __global const uchar* kinds, __global float* halved, __global float2* hot_halved
@@ -76,118 +67,6 @@ inline float16 exp2_16(float16 x) {
   return as_float16(as_int16(p) + (as_int16(shifted) << 23));
 }
 
-// Sixteen words of sixteen bits, turned: bit j of word k becomes bit k of word j.
-inline ushort16 transpose_bits(ushort16 a) {
-  // Four rounds of a butterfly, as for a matrix: halves of 8, 4, 2 and 1 words change places with
-  // halves of as many bits.
-  ushort16 other = a.s89abcdef01234567, low, high;
-  low = (a & (ushort16)0x00ff) | other << (ushort16)8;
-  high = (a & (ushort16)0xff00) | other >> (ushort16)8;
-  a = (ushort16)(low.lo, high.hi);
-  other = a.s45670123cdef89ab;
-  low = (a & (ushort16)0x0f0f) | (other & (ushort16)0x0f0f) << (ushort16)4;
-  high = (a & (ushort16)0xf0f0) | (other & (ushort16)0xf0f0) >> (ushort16)4;
-  a = (ushort16)(low.s0123, high.s4567, low.s89ab, high.scdef);
-  other = a.s23016745ab89efcd;
-  low = (a & (ushort16)0x3333) | (other & (ushort16)0x3333) << (ushort16)2;
-  high = (a & (ushort16)0xcccc) | (other & (ushort16)0xcccc) >> (ushort16)2;
-  a = (ushort16)(low.s01, high.s23, low.s45, high.s67, low.s89, high.sab, low.scd, high.sef);
-  other = a.s1032547698badcfe;
-  low = (a & (ushort16)0x5555) | (other & (ushort16)0x5555) << (ushort16)1;
-  high = (a & (ushort16)0xaaaa) | (other & (ushort16)0xaaaa) >> (ushort16)1;
-  return (ushort16)(low.s0, high.s1, low.s2, high.s3, low.s4, high.s5, low.s6, high.s7, low.s8,
-                    high.s9, low.sa, high.sb, low.sc, high.sd, low.se, high.sf);
-}
-
-// Columns of a batch's ellipses for vectors of sixteen; x and y of the mean from the centre of the
-// tile's first pixel.
-typedef struct {
-  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH],
-      power_threshold[BATCH];
-} Columns;
-
-// The tile walk once more, for blocks in a tile: bit SIDE row + column of each block that the
-// ellipse reaches, for sixteen splats from 16 g on.  In every row of blocks the interval of x, with
-// the same slope, extremes and roots as in tiles.cl; here divided by A beforehand.
-inline ushort16 blocks_of_sixteen(const Columns* e, int g, float x0, float y0) {
-  // Means and half axes, relative to the tile's first pixel centre.
-  const float16 x = vload16(g, e->x) - x0, y = vload16(g, e->y) - y0;
-  const float16 a = vload16(g, e->a), b = vload16(g, e->b),
-      power_threshold = vload16(g, e->power_threshold);
-  const float16 ey = vload16(g, e->half_y);
-  const float16 inv_a = 1.0f / a, slope = -b * inv_a;
-  const float16 y_extreme = -b / vload16(g, e->c) * vload16(g, e->half_x);
-  // 1.0001: float rounding must not lose a pixel.
-  const float16 threshold = 1.0001f * power_threshold * inv_a,
-      inv_yy = power_threshold / fmax(ey * ey, FLT_MIN) * inv_a;
-  // From the mean to the first row of pixel centres in the strip.
-  float16 top = -y;
-  uint16 mask = 0;
-  const float16 zero = 0, end = TILE;
-  for (int row = 0; row < SIDE; row++) {
-    const float16 bottom = top + (SIDE - 1);
-    const float16 y_right = MINIMUM(MAXIMUM(y_extreme, top), bottom),
-        y_left = MINIMUM(MAXIMUM(-y_extreme, top), bottom);
-    const float16 right_x =
-        x + slope * y_right + sqrt(MAXIMUM(threshold - y_right * y_right * inv_yy, zero));
-    const float16 left_x =
-        x + slope * y_left - sqrt(MAXIMUM(threshold - y_left * y_left * inv_yy, zero));
-    // Clamped before the conversion, since an ellipse may be as wide as any; >> 2 is / SIDE.  Both
-    // are shifted so that a conversion, which cuts towards 0, rounds down and up: 4 + floor(right)
-    // and 16 - ceil(left).  What the sums round, rounds to the next block's side.
-    // The pixels that the strip's ellipse reaches, of the tile's sixteen.
-    const float16 last_x = MINIMUM(MAXIMUM(right_x, zero - 1.0f), end - 1.0f),
-        first_x = MINIMUM(MAXIMUM(left_x, zero), end);
-    const int16 after = convert_int16(last_x + SIDE) >> 2;
-    const int16 first = (TILE - convert_int16(end - first_x)) >> 2;
-    // Blocks before `after`, less those before `first`.
-    const uint16 until = ((uint16)1 << as_uint16(after)) - 1u;
-    const uint16 before = ((uint16)1 << as_uint16(first)) - 1u;
-    // A strip above or below the ellipse: its roots were held at 0 and mean nothing.
-    const int16 meets = (top <= ey) & (bottom >= -ey);
-    mask |= (until & ~before & as_uint16(meets)) << (uint16)(SIDE * row);
-    top += SIDE;
-  }
-  return convert_ushort16(mask);
-}
-
-// Fills a batch from the list [p, end) and returns how many it got.
-inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
-                 __global const float* record, Batch* batch) {
-  const int n = min(BATCH, end - p), ahead = min(BATCH, end - p - n);
-  // Records go to the batch scaled for exp2, and their shapes to columns for the masks.
-  Columns e;
-  const float h = -HALF_LOG2E;
-  for (int j = 0; j < n; j++) {
-    if (j < ahead) {  // of the next batch: the drawing of this one hides the misses
-      __global const float* next = record + (size_t)RECORD * intersections[p + n + j];
-      PREFETCH(next);
-      PREFETCH(next + RECORD - 1);
-    }
-    __global const float* from = record + (size_t)RECORD * intersections[p + j];
-    const float8 s = vload8(0, from);
-    const float4 t = vload4(0, from + 8);
-    e.x[j] = s.s0;
-    e.y[j] = s.s1;
-    e.a[j] = s.s2;
-    e.b[j] = s.s3;
-    e.c[j] = s.s4;
-    e.half_x[j] = t.s1;
-    e.half_y[j] = t.s2;
-    e.power_threshold[j] = t.s3;
-    vstore8(s * (float8)(1, 1, h, 2 * h, h, 1, 1, 1), 0, batch->splats + RECORD * j);
-    vstore4(t * (float4)(1, 1, 1, h), 0, batch->splats + RECORD * j + 8);
-  }
-  // From "blocks of a splat" to "splats of a block": the bit matrix is transposed.
-  const float x = x0 + 0.5f, y = y0 + 0.5f;
-  uint16 block_splats = convert_uint16(transpose_bits(blocks_of_sixteen(&e, 0, x, y)));
-  if (n > 16)
-    block_splats |= convert_uint16(transpose_bits(blocks_of_sixteen(&e, 1, x, y))) << (uint16)16;
-  // Bits beyond the n splats of the last batch are cleared.
-  vstore16(block_splats & (0xffffffffu >> (BATCH - n)), 0, batch->block_splats);
-  return n;
-}
-
 // Pixels of a block, (4 rows) of (4 pixels) of rgba, to the image.
 inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int y0, int width,
                         int height, __global float* image) {
@@ -211,6 +90,18 @@ inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int 
       vstore16(vload16(i, rows), 0, to);
     else
       for (int j = 0; j < columns; j++) vstore4(vload4(SIDE * i + j, rows), j, to);
+  }
+}
+
+// Pixels of a tile that no splat reaches: nothing, straight to the image.
+inline void clear_tile(int x0, int y0, int width, int height, __global float* image) {
+  const int columns = min(TILE, width - x0);
+  for (int i = 0; i < TILE && y0 + i < height; i++) {
+    __global float* to = image + 4 * ((size_t)(y0 + i) * width + x0);
+    if (columns == TILE && width % SIDE == 0)  // cache lines, as below
+      for (int j = 0; j < SIDE; j++) STREAM((float16)(0), (__global float16*)to + j);
+    else
+      for (int j = 0; j < columns; j++) vstore4((float4)(0), j, to);
   }
 }
 
@@ -266,6 +157,13 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
                       __global const int* intersections, __global const float* record,
                       float min_transmittance, __global float* image AND_HEAT AND_FINE) {
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+  const int begin = tile_start[tile], end = tile_start[tile + 1];
+#if !defined(HEAT) && !defined(FOVEATED)
+  if (begin == end) {  // most of a picture with one object in it
+    clear_tile(x0, y0, width, height, image);
+    return;
+  }
+#endif
 #ifdef FOVEATED
   // Pixels from a sample to the next.  A coarse tile has 8 x 8 samples, in its blocks 0, 2, 8 and
   // 10, each of which takes the place of four.
@@ -277,11 +175,16 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
   const int step = 1, last_x = width, last_y = height;
   const uint used = 0xffff;
 #endif
+  // Pixel centres of the columns and rows of blocks.
+  float16 column_x[SIDE], row_y[SIDE];
+  for (int k = 0; k < SIDE; k++) {
+    column_x[k] = LANE_X * (float)step + (float)(x0 + k * SIDE);
+    row_y[k] = LANE_Y * (float)step + (float)(y0 + k * SIDE);
+  }
   // T is the transmittance so far, R G B the sum of c alpha T, of all 16 blocks of the tile.
   float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
-    const float16 x = LANE_X * (float)step + (float)(x0 + k % SIDE * SIDE);
-    const float16 y = LANE_Y * (float)step + (float)(y0 + k / SIDE * SIDE);
+    const float16 x = column_x[k % SIDE], y = row_y[k / SIDE];
     // Pixels outside the image are done from the start.
     const int16 inside = isless(x, (float16)(last_x)) & isless(y, (float16)(last_y));
     T[k] = select((float16)(0), (float16)(1), inside);
@@ -291,28 +194,28 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
   float16 H[BLOCKS], W[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) H[k] = W[k] = 0;
 #endif
-  Batch batch;
   // Bit k: block k still takes splats.
   uint open = used;
-  const int end = tile_start[tile + 1];
-  for (int p = tile_start[tile]; p < end && open;) {
-    const int n = fetch(p, end, x0, y0, intersections, record, &batch);
-#ifdef HEAT
-    for (int j = 0; j < n; j++) batch.heat[j] = heat[intersections[p + j]].xw;
-#endif
+  // A batch is made before the one that precedes it is drawn: the processor has its masks by the
+  // time that a block asks for them.  The last one is often in vain.
+  Batch batches[2];
+#define FETCH(p, into) fetch(p, end, x0, y0, intersections, record, into GIVE_HEAT_IN)
+  int p = begin, n = FETCH(p, batches);
+  for (int which = 0; n && open; which ^= 1) {
+    Batch* batch = batches + which;
     p += n;
+    n = FETCH(p, batches + (which ^ 1));
 #ifdef FOVEATED
     for (int k = 0; k < BLOCKS && step > 1; k++) {
       if (!(used >> k & 1)) continue;
-      uint* of = batch.block_splats + k;  // and of the blocks to the right, below and across
+      uint* of = batch->block_splats + k;  // and of the blocks to the right, below and across
       of[0] |= of[1] | of[SIDE] | of[SIDE + 1];
     }
 #endif
     for (int k = 0; k < BLOCKS; k++) {
-      uint left = open >> k & 1 ? batch.block_splats[k] : 0;
+      uint left = open >> k & 1 ? batch->block_splats[k] : 0;
       if (!left) continue;
-      const float16 x = LANE_X * (float)step + (float)(x0 + k % SIDE * SIDE);
-      const float16 y = LANE_Y * (float)step + (float)(y0 + k / SIDE * SIDE);
+      const float16 x = column_x[k % SIDE], y = row_y[k / SIDE];
       // One block's pixels, in registers for all of the batch's splats that reach it.
       float16 t = T[k], r = R[k], g = G[k], b = B[k];
 #ifdef HEAT
@@ -321,7 +224,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       // Bits in order, lowest first: near to far, as the list is.
       for (; left; left &= left - 1) {
         const int lowest = popcount(~left & (left - 1));
-        const float* s = batch.splats + RECORD * lowest;
+        const float* s = batch->splats + RECORD * lowest;
         const float16 dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
         // -log2(e) / 2 times the power, by Horner in dx.
         const float16 power =
@@ -335,8 +238,8 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
         g = fma(w, s[GREEN], g);
         b = fma(w, s[BLUE], b);
 #ifdef HEAT
-        hot = fma(w, batch.heat[lowest].x, hot);
-        weight = fma(w, batch.heat[lowest].y, weight);
+        hot = fma(w, batch->heat[lowest].x, hot);
+        weight = fma(w, batch->heat[lowest].y, weight);
 #endif
         // T (1 - alpha) = T - alpha T.
         t -= w;
@@ -349,8 +252,10 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       R[k] = r;
       G[k] = g;
       B[k] = b;
-      // A positive test: what is not a number closes the block.
-      if (!(max8(fmax(t.lo, t.hi)) >= min_transmittance)) open &= ~(1u << k);
+      // A positive test: what is not a number closes the block.  The mask's bytes as two words, in
+      // half the instructions of the greatest of sixteen.
+      const ulong2 some = as_ulong2(convert_char16(t >= min_transmittance));
+      if (!(some.x | some.y)) open &= ~(1u << k);
     }
   }
   // Premultiplied, over nothing: the background is put behind it when it is shown.

@@ -1,5 +1,8 @@
 """resolve: a float image over a background, palette applied, into any framebuffer."""
 
+from collections.abc import Callable
+from functools import partial
+
 import moderngl
 import numpy as np
 
@@ -9,6 +12,10 @@ from shapeshift.scene.appearance import Background, Sky, up_of_eye
 from shapeshift.scene.pose import View
 
 STEPS = 256  # colours of a palette
+MakeBytes = Callable[..., np.ndarray]  # presentable_bytes of drawing.py without its first arguments
+# May keep what would fill the viewport of a window, as a function that makes its bytes, until it is
+# known what lies over it.  False: they are to be copied there now.
+WindowTaker = Callable[[MakeBytes, moderngl.Framebuffer], bool]
 
 
 class Resolve:
@@ -84,7 +91,9 @@ class Resolve:
         """Whether it is a window's, which is filled fastest by bytes as its own memory has them."""
         return framebuffer.glo == 0 and self._window.works
 
-    def copy(self, pixels: np.ndarray, framebuffer: moderngl.Framebuffer) -> None:
+    def copy(
+        self, make: MakeBytes, framebuffer: moderngl.Framebuffer, taker: WindowTaker | None = None
+    ) -> None:
         """Fills a framebuffer that takes_bytes with (H, W, 4) uint8, opaque.
 
         For a window that is_window blue is first and row 0 on top, else red and at the bottom: so
@@ -92,9 +101,12 @@ class Resolve:
         bytes in GL's order 2.6).
         """
         if self.is_window(framebuffer):
-            with self._gpu.drawing_into(framebuffer):
-                self._window.copy(pixels, framebuffer)
+            make = partial(make, as_window=True)
+            if taker is None or not taker(make, framebuffer):
+                with self._gpu.drawing_into(framebuffer):
+                    self._window.copy(make(), framebuffer)
             return
+        pixels = make()
         size = (pixels.shape[1], pixels.shape[0])
         if self._bytes is None or self._bytes.size != size:
             self._release_bytes()

@@ -21,7 +21,7 @@ from shapeshift.rasterizer.paging.pages import PageMap
 from shapeshift.rasterizer.project import CULL_REASONS, Projected
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
-from shapeshift.rasterizer.resolve import resolve
+from shapeshift.rasterizer.resolve import WindowOverlay, resolve
 from shapeshift.rasterizer.splat_edges import draw_edges
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.colors.palette import palette_colors
@@ -335,10 +335,11 @@ class TilesDrawing(Drawing):
 
     def presentable_bytes(
         self, i: int, background: Background, view: View, palette: np.ndarray | None = None,
-        heat: bool = False, as_window: bool = False,
+        heat: bool = False, as_window: bool = False, overlay: WindowOverlay | None = None,
     ) -> np.ndarray:  # fmt: skip
-        values, seen = self._heat_images[i] if heat else None, behind(background, view)
-        return resolve(self.device, self._images[i], seen, palette, values, as_window=as_window)
+        given = (self._images[i], behind(background, view), palette)
+        beside = self._heat_images[i] if heat else None
+        return resolve(self.device, *given, beside, as_window=as_window, overlay=overlay)
 
     def presentable_depth(self, i: int) -> np.ndarray:
         return self._depths[i]

@@ -95,3 +95,21 @@ def test_a_display_that_gives_no_window_means_headless(monkeypatch, capsys):
     assert asked == ["view", "headless"]
     assert "does not answer" in capsys.readouterr().err
     assert cli.main(["view"]) == 2  # a window that was asked for is not replaced by pictures
+
+
+def test_a_folder_that_is_gone_under_ones_feet_is_said(tmp_path, monkeypatch, capsys):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+
+    def run_command(command: str, arguments: list[str]) -> int:
+        return len(str(Path("scene.shift").resolve()))
+
+    monkeypatch.setattr(cli, "run_command", run_command)
+    assert cli.main(["info", "--json"]) == 2
+    assert "info: the folder that this was started in is gone" in capsys.readouterr().err
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli, "run_command", lambda *_: open("not there"))
+    assert cli.main(["info", "--json"]) == 2
+    assert capsys.readouterr().err.rstrip().endswith("No such file or directory: not there")

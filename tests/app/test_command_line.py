@@ -181,6 +181,7 @@ def test_every_option_of_every_command_says_what_it_does_and_what_holds_without_
         text = " ".join(block.split())
         assert len(arguments[name].help) >= 15 and arguments[name].help[0].isalnum(), name
         assert arguments[name].help.endswith((".", "]")), name
+        assert not arguments[name].help.startswith("Default"), f"{name}: what is it?"
         stated = re.search(r"[dD]efault: |\(required\)", text)
         is_switch = arguments[name].kind is bool
         assert stated or is_switch or arguments[name].opt.positional, f"{command} {name}: {text}"

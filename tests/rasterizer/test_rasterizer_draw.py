@@ -3,12 +3,14 @@
 import os
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import Camera, Projected, project
 from shapeshift.rasterizer.raster import (
     MIN_TRANSMITTANCE,
@@ -73,6 +75,35 @@ def test_an_early_stop_costs_what_it_leaves_out_and_no_more(form, least):
 @pytest.mark.parametrize("count", [0, 1, BATCH - 1, BATCH, BATCH + 1, 2 * BATCH + 1, 500])
 def test_every_size_and_length_of_a_list_matches_float64(size, count):
     check(random_splats(count, seed=count + size[0], scale=0.2), off_centre_camera(size), 70)
+
+
+class Used(Device):
+    """A device whose memory holds what is not a number where nothing was written."""
+
+    def empty(self, shape, dtype=np.float32):
+        array = super().empty(shape, dtype)
+        if array.size and dtype == np.float32:
+            array.set(np.full(shape, np.nan, np.float32))
+        return array
+
+
+# Widths of whole cache lines, of whole blocks alone, and of neither.
+@pytest.mark.parametrize("size", [(16, 16), (64, 48), (64, 41), (36, 33), (83, 45)])
+@pytest.mark.parametrize("count", [0, 1])
+def test_tiles_that_no_splat_reaches_are_nothing_in_every_pixel(size, count):
+    splats, camera = random_splats(count, seed=3, scale=1e-3), off_centre_camera(size)
+    d = device()
+    used = Used(*(getattr(d, field.name) for field in fields(Device)))
+    projected = project(d, *upload(splats), camera)
+    tiles = bin_tiles(d, projected, size)
+    lengths = np.diff(d.view(tiles.starts)[: tiles.grid[0] * tiles.grid[1] + 1])
+    image = rasterize_rgba(used, projected, tiles, size)
+    hit = np.repeat(np.repeat(lengths.reshape(tiles.grid[::-1]), 16, 0), 16, 1)[
+        : size[1], : size[0]
+    ]
+    assert np.isfinite(image).all()
+    assert (image[hit == 0] == 0).all()
+    assert (hit == 0).any() or size == (16, 16)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -136,6 +136,23 @@ def test_a_way_with_a_part_for_each_anchor_is_each_alone(blend):
                 np.testing.assert_allclose(together[i], alone, atol=1e-9)
 
 
+@pytest.mark.parametrize("blend", (EVEN, PACED))
+def test_where_a_part_is_0_or_1_both_ends_are_what_was_given_to_the_bit(blend):
+    """Those of a section are, but for the splats at its edge."""
+    part = np.array([0, 0.3, 1, 5e-324, 0, 1, np.nextafter(1, 0)])
+    start, end = 0.23, StopWeights((("RGB", 0.3), ("Opened", 0.7)))
+    each = np.linspace(0.1, 0.9, len(part))
+    for given in (start, each):
+        got = blend.between(given, end, part)
+        starts = np.broadcast_to(blend.weights(given), got.shape)
+        assert np.array_equal(got[part == 0], starts[part == 0])
+        assert np.array_equal(got[part == 1], blend.weights(end)[None].repeat(2, 0))
+        np.testing.assert_allclose(got[3], starts[3], atol=1e-12)
+        np.testing.assert_allclose(got[6], blend.weights(end), atol=1e-12)
+        alone = blend.between(float(each[1]) if given is each else start, end, 0.3)
+        np.testing.assert_allclose(got[1], blend.weights(alone), atol=1e-12)
+
+
 def test_the_ends_of_a_way_are_what_was_given():
     start, end = StopWeights((("RGB", 0.3), ("Opened", 0.7))), 0.4
     assert PACED.between(start, end, 0.0) is start and PACED.between(start, end, 1.0) is end

@@ -8,19 +8,20 @@ The bundled demo with its panel; "kept" is the window's way on software GL, "eac
 of a GPU, the overlay drawn over the picture in every frame; eight frames each in turns, all in one
 run, medians.
 nothing: a frame that somebody asked for and in which nothing changes; button: the mouse goes to
-another button; picture: other pixels under the same overlay, their splats not counted; both.
-presenting: the picture to the window, the overlay's drawing, and the swap; widgets: the panel's own
-code; frame: the whole function that the loop calls.  apart: the largest difference of a pixel
-between the two ways, of 255.
+another button; picture: other pixels under the same overlay, as when somebody orbits, their splats
+not counted; both; slider: x moves, and with it the picture, the knob and the legend.
+presenting: the picture's bytes and their way to the window, the overlay's drawing, and the swap;
+widgets: the panel's own code; frame: the whole function that the loop calls.  apart: the largest
+difference of a pixel between the two ways, of 255.
 """
 
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import replace
-from itertools import cycle
+from itertools import cycle, repeat
 from pathlib import Path
 from statistics import median
 
@@ -78,26 +79,44 @@ def way_of_a_gpu(kept: Presented) -> Presented:
 def changes(viewer: Viewer) -> dict[str, Callable[[int], None]]:
     """What happens before a frame, by name."""
     window, state = viewer.window, viewer.state
-    grays = cycle(np.linspace(0.1, 0.3, 5).tolist())
+    path = cycle(np.linspace(0.3, 0.7, 41).tolist())
 
     def button(number: int) -> None:
         window.on_cursor(window.handle, *BUTTONS[number % 2])
 
     def picture(number: int) -> None:
-        state.settings = replace(state.settings, background=(next(grays),) * 3)
         viewer.shown.forget()
 
     def both(number: int) -> None:
         button(number)
         picture(number)
 
-    return {"nothing": lambda number: None, "button": button, "picture": picture, "both": both}
+    def slider(number: int) -> None:
+        state.set_x(0, next(path))
+        picture(number)
+
+    return {
+        "nothing": lambda number: None, "button": button, "picture": picture, "both": both,
+        "slider": slider,
+    }  # fmt: skip
 
 
-def present_alone(viewer: Viewer, target: moderngl.Framebuffer) -> FrameStats:
-    """The splats that there are as another picture: what a frame costs without drawing them."""
-    viewer.renderer.present(target)
-    return viewer.readings.stats
+def steps() -> Iterator[float]:
+    return cycle(np.linspace(0.1, 0.3, 5).tolist())
+
+
+class Alone:
+    """Presents the splats that there are as another picture: a frame without drawing them."""
+
+    def __init__(self, viewer: Viewer) -> None:
+        self._viewer = viewer
+        self.grays: Iterator[float] = steps()
+
+    def draw(self, views: object, target: moderngl.Framebuffer) -> FrameStats:
+        renderer = self._viewer.renderer
+        renderer.settings = replace(renderer.settings, background=(next(self.grays),) * 3)
+        renderer.present(target)
+        return self._viewer.readings.stats
 
 
 def measure(viewer: Viewer) -> list[str]:
@@ -110,7 +129,8 @@ def measure(viewer: Viewer) -> list[str]:
     watch.over(viewer, "draw_overlay", "widgets")
     watch.over(viewer.shown, "draw", "presenting")
     setattr(viewer.renderer, "update", lambda scene: None)  # noqa: B010  methods
-    setattr(viewer.renderer, "draw", lambda _, target: present_alone(viewer, target))  # noqa: B010
+    alone = Alone(viewer)
+    setattr(viewer.renderer, "draw", alone.draw)  # noqa: B010
     for each in ways.values():
         for name in ("keep_picture", "lay_over", "swap"):
             watch.over(each, name, "presenting")
@@ -118,7 +138,7 @@ def measure(viewer: Viewer) -> list[str]:
         taken: dict[tuple[str, str], list[float]] = defaultdict(list)
         for _ in range(TURNS):
             for way, presented in ways.items():
-                window.presented = presented
+                window.presented, viewer.renderer.taker = presented, presented.take_picture
                 for number in range(FRAMES):
                     change(number)
                     window.wait(0.0)
@@ -129,10 +149,12 @@ def measure(viewer: Viewer) -> list[str]:
                             taken[way, part].append(sum(ms))
         seen = []
         for presented in ways.values():
-            window.presented = presented
+            window.presented, viewer.renderer.taker = presented, presented.take_picture
+            alone.grays = repeat(0.2)
             viewer.shown.forget()
             viewer.frame(0.0)
             seen.append(window.picture().astype(int))
+        alone.grays = steps()
         apart = int(np.abs(seen[0] - seen[1]).max())
         for way in ways:
             ms = [median(taken[way, part]) for part in ("presenting", "widgets", "frame")]

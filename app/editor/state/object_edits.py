@@ -5,6 +5,7 @@ from collections.abc import Callable
 from shapeshift.app.editor.state.arrange import as_it_stands, copy_offset, edit, redo, undo
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.texts.deeds import said_deed
 from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.framing import model_points
@@ -87,7 +88,7 @@ class ObjectEdits:
         except BadFile as error:
             self.state.say(str(error))
             return
-        self.state.say(words.format(what=said(what)) if what else nothing)
+        self.state.say(words.format(what=said_deed(what)) if what else nothing)
         if len(self.state.scene.objects) != count:
             self.count_changed()
 

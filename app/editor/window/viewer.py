@@ -85,7 +85,7 @@ class Viewer:
             drawing=renderer.backends["drawing"],
         )
         self.viewpoint = Viewpoint(state, lambda: window.size, self._free_wanted, self._pictures)
-        self.shown = Shown(renderer, self.readings)
+        self.shown, renderer.taker = Shown(renderer, self.readings), window.presented.take_picture
         target_ms, floor_db = options.target_ms or TARGET_MS, options.floor_db or FLOOR_DB
         wanted = (options.target_ms or options.floor_db) is not None
         self.dial = QualityController(target_ms, floor_db, wanted=wanted)

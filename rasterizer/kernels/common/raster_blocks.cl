@@ -2,7 +2,7 @@
 // intersections that it takes.  A block is one vector of PIXELS pixels.  Blocks are numbered down
 // their column first, then to the right, so that a column's blocks are neighbouring bits of a mask.
 // Reads:   STOP (common/raster.cl), RECORD (common/record.cl); PIXELS; EVERY_BLOCK, for a test.
-// Defines: floatp, intp, their loads, stores and largest(); BLOCK_W, BLOCK_H, BLOCKS, ALL_BLOCKS,
+// Defines: floatp, intp, their loads, stores and some(); BLOCK_W, BLOCK_H, BLOCKS, ALL_BLOCKS,
 //          BATCH; exp2p(), sums12(); copy_record(); Batch and fetch(); inside(), lowest(),
 //          still_open().
 // Units:   pixels, row 0 on top; exponents are of 2.
@@ -34,7 +34,11 @@ typedef int16 intp;
                          0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
                          2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
-inline float largest(floatp a) { return max8(fmax(a.lo, a.hi)); }
+// Whether some lane of a comparison is true: its bytes as two words.
+inline int some(intp mask) {
+  const ulong2 bytes = as_ulong2(convert_char16(mask));
+  return (bytes.x | bytes.y) != 0;
+}
 #else
 // Two rows of four.  As halves of wider vectors, sixteen would take all registers twice.
 #define SHIFT_H 1
@@ -46,7 +50,7 @@ typedef int8 intp;
 #define STORE_PIXELS vstore8
 #define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
-inline float largest(floatp a) { return max8(a); }
+inline int some(intp mask) { return as_ulong(convert_char8(mask)) != 0; }
 #endif
 
 // 2^x for the exponents that a splat's falloff has, [-126, 0.1]; relative error 2e-7.
@@ -126,24 +130,24 @@ inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
   const float8 inv_c = 1.0f / c, slope = -b * inv_c, x_extreme = -b / a * ey;
   const float8 threshold =
       (1.0001f * power_threshold + 5e-7f * (a * ex * ex + c * ey * ey)) * inv_c;
-  const float8 inv_xx = power_threshold / fmax(ex * ex, FLT_MIN) * inv_c;
+  const float8 inv_xx = power_threshold / MAXIMUM(ex * ex, (float8)(FLT_MIN)) * inv_c;
   const float8 rounding = 1e-6f * (fabs(slope) * (ex + fabs(x)) + ey + fabs(y));
   // The room for rounding, added to the two ends once.
-  const float8 above = y - rounding, below = y + rounding, low = -1, high = TILE;
+  const float8 above = y - rounding, below = y + rounding, zero = 0, low = -1, high = TILE;
   float8 left = -x;
   uint8 mask = 0;
   for (int column = 0; column < ACROSS; column++) {
     const float8 right = left + (BLOCK_W - 1);
-    const float8 x_top = fmin(fmax(-x_extreme, left), right),
-        x_bottom = fmin(fmax(x_extreme, left), right);
+    const float8 x_top = MINIMUM(MAXIMUM(-x_extreme, left), right),
+        x_bottom = MINIMUM(MAXIMUM(x_extreme, left), right);
     const float8 highest =
-        above + slope * x_top - sqrt(fmax(threshold - x_top * x_top * inv_xx, 0.0f));
+        above + slope * x_top - sqrt(MAXIMUM(threshold - x_top * x_top * inv_xx, zero));
     const float8 lowest =
-        below + slope * x_bottom + sqrt(fmax(threshold - x_bottom * x_bottom * inv_xx, 0.0f));
+        below + slope * x_bottom + sqrt(MAXIMUM(threshold - x_bottom * x_bottom * inv_xx, zero));
     // Rows of blocks: from the one that holds the first pixel centre to the one that holds the
     // last.
-    const int8 top = convert_int8(ceil(fmin(fmax(highest, 0.0f), high))) / BLOCK_H;
-    const int8 bottom = convert_int8(floor(fmin(fmax(lowest, low), high - 1))) >> SHIFT_H;
+    const int8 top = convert_int8(ceil(MINIMUM(MAXIMUM(highest, zero), high))) / BLOCK_H;
+    const int8 bottom = convert_int8(floor(MINIMUM(MAXIMUM(lowest, low), high - 1))) >> SHIFT_H;
     // Ones from top to bottom; a shift by more than the column empties it.
     const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
                        ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom)) & COLUMN_BITS;
@@ -203,6 +207,6 @@ inline int lowest(uint bits) { return popcount(~bits & (bits - 1)); }  // number
 // number stops it, too.
 inline uint still_open(uint open, const floatp* T) {
   for (int k = 0; k < BLOCKS; k++)
-    if (!(largest(T[k]) >= STOP)) open &= ~(1u << k);
+    if (!some(T[k] >= STOP)) open &= ~(1u << k);
   return open;
 }

@@ -30,6 +30,17 @@ class Layered:
         self._picture.copy_window(window)
         self._holds = False
 
+    def keep_bytes(self, pixels: np.ndarray) -> None:
+        """The same of a picture that no window has yet, (H, W, 4) uint8 as a window has them."""
+        self._picture.upload(pixels)
+        self._holds = False
+
+    def show_bytes(self, pixels: np.ndarray, window: moderngl.Framebuffer) -> None:
+        """Fills the window with a picture and all that is over it."""
+        self._whole.upload(pixels)
+        self._whole.show(window)
+        self._holds = False
+
     def show_picture(self, window: moderngl.Framebuffer) -> bool:
         """Puts the kept picture into the window; False where none of its size is kept."""
         if self._picture.size != window.viewport[2:]:

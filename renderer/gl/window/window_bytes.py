@@ -56,9 +56,7 @@ class WindowBytes:
 
     def copy(self, pixels: np.ndarray, framebuffer: moderngl.Framebuffer) -> None:
         """Fills the viewport of a window's, which is bound, with (H, W, 4) uint8 of its size."""
-        height, width = pixels.shape[:2]
-        self.lay_out((width, height))
-        self._write(np.ascontiguousarray(pixels).ctypes.data, width, height)
+        self.upload(pixels)
         self._show(framebuffer)
 
     def show(self, framebuffer: moderngl.Framebuffer) -> None:
@@ -78,6 +76,23 @@ class WindowBytes:
         with self._gpu.drawing_into(self.framebuffer):
             taken = (left, below + height, left + width, below)
             self._blit(framebuffer, taken, (0, 0, width, height))
+
+    def upload(self, pixels: np.ndarray) -> None:
+        """Holds (H, W, 4) uint8 from now on."""
+        height, width = pixels.shape[:2]
+        self.lay_out((width, height))
+        self._write(np.ascontiguousarray(pixels).ctypes.data, width, height)
+
+    def read_box(self, box: PixelBox) -> np.ndarray:
+        """(H, W, 4) uint8 of a part of what was drawn into it by GL's rules: row 0 on top."""
+        left, top, right, low = box
+        pixels = np.empty((low - top, right - left, 4), np.uint8)
+        place = (left, self.size[1] - low, right - left, low - top)
+        order = (GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, pixels.ctypes.data)
+        with self._gpu.drawing_into(self.framebuffer):
+            kinds = (*(c_int,) * 4, c_uint, c_uint, c_void_p)
+            self._call("glReadPixels", kinds, *place, *order)
+        return pixels[::-1]
 
     def copy_box(self, other: "WindowBytes", box: PixelBox) -> None:
         """Copies a part of another one of this size to the same place."""

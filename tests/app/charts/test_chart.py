@@ -180,7 +180,7 @@ def test_bad_input_on_the_command_line(package, tmp_path):
     assert_refused(launch("chart", package, "--cameras", cameras, "--frames", 4), "leave --frames")
     taken = tmp_path / "file"
     taken.write_text("")
-    assert_refused(launch("chart", package, "--out", taken), "cannot make the folder")
+    assert_refused(launch("chart", package, "--out", taken), "file is a file; name a folder")
 
 
 def make_row(name=EXACT, eyes=1, ratio=1.0, db=MOST_DB, changes=""):

@@ -115,3 +115,9 @@ def test_a_link_in_place_of_the_folder_is_not_followed(scene, tmp_path, capsys):
     assert cli.main(asked) == 2
     assert "through which nothing is written" in capsys.readouterr().err
     assert not any((tmp_path / "victim").iterdir())
+
+
+def test_what_is_no_scene_file_is_told_what_is(tmp_path):
+    (tmp_path / "room.shift").write_bytes(b"PK\x03\x04")
+    with pytest.raises(UsageError, match=r"room.shift is no scene file: colliders makes .* NAME\."):
+        run(Options(tmp_path / "room.shift", tmp_path / "out.scene.json"))

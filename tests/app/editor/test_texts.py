@@ -10,7 +10,7 @@ from PIL import ImageFont
 
 from shapeshift.app.editor.panels import keys_sheet
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.texts import fonts, table
+from shapeshift.app.editor.texts import deeds, fonts, table
 from shapeshift.app.editor.texts.fonts import (
     font_files,
     has_letters,
@@ -19,7 +19,12 @@ from shapeshift.app.editor.texts.fonts import (
     why_not,
 )
 from shapeshift.app.editor.texts.table import all_languages, said, use_language
-from tests.support.desktop.overlay_texts import KEY_TABLES, overlay_texts, unsaid_texts
+from tests.support.desktop.overlay_texts import (
+    KEY_TABLES,
+    deeds_in_source,
+    overlay_texts,
+    unsaid_texts,
+)
 
 OTHERS = [code for code in all_languages() if code != table.ENGLISH]
 PERCENT = re.compile(r"%[-+.\d]*[a-z%]")
@@ -54,6 +59,28 @@ def test_no_text_is_missing_and_none_is_left_over(code):
 
 def test_no_item_of_the_panel_goes_past_the_tables():
     assert unsaid_texts() == []
+
+
+def test_what_edits_are_called_is_in_the_tables():
+    """Of those that are named in the call itself; {word} {name} stands for two of them."""
+    known = {text.replace("{name}", "{}").replace("{count}", "{}") for text in deeds.TEMPLATES}
+    found = deeds_in_source()
+    assert {"delete {}", "add a section", "key of a stop", "hide {} anchors"} <= found
+    assert found - known - {*deeds.DEEDS} == {"{} {}", "{} {} anchors"}
+
+
+def test_an_edit_is_called_by_the_language_in_use():
+    use_language("de")
+    assert deeds.said_deed("delete my cube") == "my cube l\u00f6schen"
+    assert deeds.said_deed("hide 1,204 anchors") == "1,204 Anker verbergen"
+    assert deeds.said_deed("hide 12 monkeys") == "12 monkeys verbergen"
+    assert deeds.said_deed("exposure of the scene") == "Belichtung von der Szene"
+    assert deeds.said_deed("move the floor") == said("move the floor") != "move the floor"
+    assert deeds.said_deed("add {odd}") == "{odd} hinzuf\u00fcgen"
+    assert deeds.said_deed("what nobody knows") == "what nobody knows"
+    use_language(table.ENGLISH)
+    for text in ("delete my cube", "exposure of the scene", "move the floor", "crop 3 anchors"):
+        assert deeds.said_deed(text) == text
 
 
 @pytest.mark.parametrize("code", OTHERS)

@@ -117,7 +117,7 @@ def test_a_picture_is_a_png_and_a_folder_that_is_none_is_said(tmp_path):
     broken.expose(picture)
     broken.close()
     broken.poll(said.append, said.append)
-    assert "cannot make the folder" in said[1]
+    assert "file is a file; name a folder" in said[1]
 
 
 def test_work_is_not_lost_by_one_press(ctx):

@@ -12,6 +12,7 @@ from PIL import Image
 
 from shapeshift.app import cli
 from shapeshift.app.inspection.inspect_view import InspectedView, with_readings
+from shapeshift.app.inspection.outputs import three_pictures
 from shapeshift.app.inspection.pictures import ColorScale
 from shapeshift.app.inspection.report import (
     ReportHead,
@@ -162,3 +163,32 @@ def test_the_command_writes_both(tmp_path, capsys):
     assert "exists" in capsys.readouterr().err
     assert cli.main(["thermal", str(wall), "--report", "r.docx"]) == 2
     assert ".html or .pdf" in capsys.readouterr().err
+
+
+def test_pdf_says_the_same_in_the_same_order_as_html(tmp_path, monkeypatch):
+    """Marks have their heading and come before what is said of them; it stood after, without."""
+    from matplotlib.figure import Figure
+
+    found: list[str] = []
+    text = Figure.text
+    monkeypatch.setattr(
+        Figure, "text", lambda self, x, y, s, **how: (found.append(s), text(self, x, y, s, **how))
+    )
+    written(tmp_path / "a.pdf", views=1)
+    written(tmp_path / "a.html", views=1)
+    inside = Page((tmp_path / "a.html").read_text()).texts
+    order = ("Marks", "mark", "Sp1", "Profile of Li1", "How right it is", "Settings")
+    for texts in (found, inside):
+        places = [texts.index(words) for words in order if words in texts]
+        assert len(places) >= 5 and places == sorted(places)
+        (difference,) = (i for i, words in enumerate(texts) if words.startswith("Sp1 less Ar1"))
+        assert texts.index("Sp1") < difference < texts.index("How right it is")
+
+
+def test_a_scale_has_no_more_digits_than_anybody_reads():
+    picture = inspected()[1][0]
+    (title, _), *_ = (
+        each for each in three_pictures(picture, ColorScale(14.42735, 101.3641, "ironbow"))
+        if each[0].startswith("Thermal")
+    )  # fmt: skip
+    assert title == "Thermal, level 57.9, span 86.94 \u00b0C"

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapeshift.app.errors import UsageError
 from shapeshift.app.training import demo
 from shapeshift.renderer.pace import EVEN_ENOUGH, largest_step
 from shapeshift.renderer.renderer import Renderer
@@ -36,6 +37,25 @@ def test_the_bundled_package_is_small_whole_and_of_these_stops():
     assert min(alive) > 5000
     low, high = splats.means.min(0), splats.means.max(0)
     assert (high - low > (1.0, 0.3, 0.6)).all()  # metres: a bench
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"size": "1x1"}, "--size is 1x1; each side must be 16 or more"),
+        ({"size": "384x15"}, "each side must be 16"),
+        ({"views": 0}, "--views is 0, expected 2"),
+        ({"test_views": -1}, "--test-views is -1, expected 1"),
+        ({"processes": -1}, "--processes is -1, expected 0"),
+        ({"iterations": 0}, "iterations is 0"),
+        ({"seconds": float("nan")}, "seconds is nan"),
+    ],
+)
+def test_what_is_no_demo_is_refused_before_minutes_of_photos(tmp_path, monkeypatch, changes, said):
+    monkeypatch.setattr(demo, "photograph", lambda *_: pytest.fail("photos were taken"))
+    with pytest.raises(UsageError, match=said):
+        demo.run(replace(demo.Options(out=tmp_path / "out"), **changes))
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

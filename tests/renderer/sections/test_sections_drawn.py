@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.renderer import renderer as renderer_module
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
@@ -212,3 +213,19 @@ def test_two_stops_come_from_one_sort_where_both_are_cut_alike(renderer):
         # Quads draw two views at once with another arithmetic than one.
         np.testing.assert_allclose(drawn(renderer, *scene.objects), picture, atol=1e-5)
     assert not same_shape(left, Scene((replace(right.objects[0], sections=()),)))
+
+
+def test_a_plane_that_moves_is_asked_once_a_frame_what_it_shows(renderer, monkeypatch):
+    """Weights of all anchors are a fifteenth of such a frame."""
+    asked = []
+    of = renderer_module.control_of
+    monkeypatch.setattr(renderer_module, "control_of", lambda obj: (asked.append(1), of(obj))[1])
+    obj = SceneObject("thing", NETWORKS, TURN, x=0.3)
+    for offset_m in (0.0, 0.05, 0.05, 0.1):
+        asked.clear()
+        plane = cut(PlaneShape((0.6, 0.8, 0.0), offset_m), "soft", beyond=0.8)
+        drawn(renderer, replace(obj, sections=(plane,)))
+        assert len(asked) <= 1
+    asked.clear()
+    drawn(renderer, replace(obj, sections=(plane,)), resort_frames=2)
+    assert not asked, "nothing has moved"

@@ -48,7 +48,7 @@ class PlainRenderer:
         self.streaming = SimpleNamespace(due=False, stats=None, converges=True)
         self.levels = SimpleNamespace(all_whole=nullcontext)
         self.updates = self.draws = self.presents = 0
-        self.view, self.drawn_at = None, self.settings
+        self.view, self.drawn_at, self.taker = None, self.settings, None
 
     def update(self, scene) -> None:
         self.updates += 1

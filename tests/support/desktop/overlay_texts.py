@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from shapeshift.app.editor.texts import deeds
 from shapeshift.renderer.debug.debug import REASON_TEXTS
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -163,12 +164,47 @@ def overlay_texts() -> set[str]:
         module = importlib.import_module(f"shapeshift.app.editor.state.{name}")
         for text in texts:
             found |= set(texts_of(getattr(module, text)))
-    found |= BY_VARIABLES
+    found |= BY_VARIABLES | {*deeds.TEMPLATES, *deeds.DEEDS, deeds.THE_SCENE}
     found |= set(texts_of(REASON_TEXTS, VALUES))  # in the legend of a debug view
     for name in KEY_TABLES:
         module = importlib.import_module(f"shapeshift.app.editor.window.{name}")
         found |= set(texts_of(module.KEYS))
     return {text.split("##")[0] for text in found if is_text(text.split("##")[0])}
+
+
+# Where a function is told what an edit is called: at which place among its arguments, from 0.
+DEED_PLACES = {
+    "edit": (2,), "_edit": (0, 2), "_changed": (0,), "record": (1,), "_record": (1,),
+    "change": (1,), "cut": (4,),
+}  # fmt: skip
+
+
+def deeds_in_source() -> set[str]:
+    """What edits are called, where that stands in the call; {} for what is filled in."""
+    found: set[str] = set()
+    for path in (*EDITOR.rglob("*.py"), *HEADSET.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            name = getattr(getattr(node, "func", None), "attr", None)
+            name = name or getattr(getattr(node, "func", None), "id", None)
+            if not isinstance(node, ast.Call) or name not in DEED_PLACES:
+                continue
+            places = DEED_PLACES[name]
+            parts = [part for place, part in enumerate(node.args) if place in places]
+            parts += [each.value for each in node.keywords if each.arg == "what"]
+            found |= {text for part in parts for text in filled_texts(part)}
+    return found - {""}
+
+
+def filled_texts(node: ast.expr) -> Iterator[str]:
+    """Strings and f-strings of an expression, these with {} for their values."""
+    if isinstance(node, ast.IfExp):
+        yield from filled_texts(node.body)
+        yield from filled_texts(node.orelse)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        pieces = [each.value if isinstance(each, ast.Constant) else "{}" for each in node.values]
+        yield "".join(map(str, pieces))
 
 
 UNSAID = ("button", "checkbox", "color_edit3", "menu_item", "radio_button", "text",

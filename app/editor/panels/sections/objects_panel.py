@@ -19,6 +19,7 @@ from shapeshift.app.editor.state.editor_state import HANDLES, EditorState
 from shapeshift.app.editor.state.files.saving import Saving
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.object_edits import ObjectEdits
+from shapeshift.app.editor.texts.deeds import said_deed
 from shapeshift.app.editor.texts.table import said
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneItem
@@ -79,7 +80,10 @@ def _history(objects: ObjectEdits, saving: Saving, ui_scale: float) -> None:
         if imgui.button(item_label(word), Vec(width, 0)):
             act()
         imgui.end_disabled()
-        tip(what or ("Nothing to undo." if word == "Undo" else "Nothing to redo."), ui_scale)
+        if what:
+            tip(said_deed(what), ui_scale)
+        else:
+            tip("Nothing to undo." if word == "Undo" else "Nothing to redo.", ui_scale)
         imgui.same_line()
     if imgui.button(item_label("Save" if saving.in_place else "Save\u2026"), Vec(-1, 0)):
         saving.save()

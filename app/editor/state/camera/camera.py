@@ -82,6 +82,8 @@ class EditorCamera:
         self.about_pointer = False  # a drag turns about what it began on
         self.near_m = 0.0  # before which nothing is drawn; 0: by the scene's size
         self.speed = 1.0  # times that of flight
+        self._eye_view: tuple[tuple, View] | None = None  # the last one, and what it is of
+        self._parallel_view: tuple[View, View] | None = None  # that view by parallel rays
         self.reset()
         self._lag[:] = 0
 
@@ -115,8 +117,11 @@ class EditorCamera:
         view = self.eye_view(size, free)
         if not self.parallel:
             return view
-        distance = float(np.exp((self._goal - self._lag)[LOG_DISTANCE]))
-        return orthographic(view, distance, self.radius, self.near_m)
+        if self._parallel_view is None or self._parallel_view[0] is not view:
+            distance = float(np.exp((self._goal - self._lag)[LOG_DISTANCE]))
+            of = orthographic(view, distance, self.radius, self.near_m)
+            self._parallel_view = (view, of)
+        return self._parallel_view[1]
 
     @property
     def parallel(self) -> bool:
@@ -128,8 +133,15 @@ class EditorCamera:
 
         The field of view fits `free` (left, top, right, bottom in pixels), the part of the picture
         that nothing covers, with the line of sight in its middle; around it more can be seen.
+        The same View until one of these changes, since a frame asks for it several times.
         """
         shown = self._goal - self._lag
+        key = (shown.tobytes(), self.radius, self.fov_y, self.near_m, size, free)
+        if self._eye_view is None or self._eye_view[0] != key:
+            self._eye_view = (key, self.view_of(shown, size, free or (0, 0, *size)))
+        return self._eye_view[1]
+
+    def view_of(self, shown: np.ndarray, size: tuple[int, int], free: Box) -> View:
         right, up, forward = axes_of(shown[YAW], shown[PITCH], shown[ROLL])
         world_from_eye = np.eye(4)
         world_from_eye[:3, :3] = np.stack([right, up, -forward], axis=1)
@@ -138,7 +150,7 @@ class EditorCamera:
         near = self.near_m or NEAR_RADII * self.radius
         far = max(FAR_RADII * self.radius + distance, 2 * near)
         pose = Pose.from_matrix(world_from_eye)
-        return View(pose, _tangents(self.fov_y, size, free or (0, 0, *size)), near, far, size)
+        return View(pose, _tangents(self.fov_y, size, free), near, far, size)
 
     def turn(self, yaw: float, pitch: float) -> None:
         """Orbits around the anchor, or looks about when flying, by radians."""

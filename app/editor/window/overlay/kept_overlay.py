@@ -17,10 +17,13 @@ from shapeshift.app.editor.window.overlay.triangles import (
     read_lists,
     tiles_of,
 )
+from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.resolve import MakeBytes
 from shapeshift.renderer.gl.window.layered import Layered
 from shapeshift.renderer.gl.window.window_bytes import PixelBox, WindowBytes
 
+MOST_UNREAD = 64  # boxes: more are read as the whole layer
 OVER = (  # colours as ImGui has them; alpha as what they hide, so that the layer is premultiplied
     moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA,
 )  # fmt: skip
@@ -35,6 +38,8 @@ class KeptOverlay(ModernGLRenderer):
         super().__init__(wnd=None, ctx=ctx, display_size=logical_size)
         self._gpu = Gpu(ctx)
         self._layer, self._layered = WindowBytes(self._gpu), Layered(self._gpu)
+        self._bytes: np.ndarray | None = None  # the layer once more, as WindowOverlay has it
+        self._unread: list[PixelBox] = []  # where it differs from that
         self._tiles: np.ndarray | None = None  # that the overlay covers
         self._covered: list[PixelBox] = []  # these, as few boxes
 
@@ -56,6 +61,14 @@ class KeptOverlay(ModernGLRenderer):
         """The window has the picture, and nothing over it yet."""
         self._layered.keep(window)
 
+    def keep_bytes(self, pixels: np.ndarray) -> None:
+        """The same of a picture that the window does not have yet."""
+        self._layered.keep_bytes(pixels)
+
+    def show_bytes(self, pixels: np.ndarray, window: moderngl.Framebuffer) -> None:
+        """Puts a picture that is made as bytes into the window."""
+        self._layered.show_bytes(pixels, window)
+
     def show_picture(self, window: moderngl.Framebuffer) -> bool:
         """Puts the picture that was kept into the window; False where there is none."""
         return self._layered.show_picture(window)
@@ -74,6 +87,22 @@ class KeptOverlay(ModernGLRenderer):
             self._layered.lay_over_window(window, self._texture, self._covered)
         return len(boxes) > 0
 
+    def lay_over_bytes(
+        self, data: imgui.ImDrawData, window: moderngl.Framebuffer, make: MakeBytes
+    ) -> None:
+        """The overlay of now over a picture that is made as bytes and that no window has yet: both
+        are laid together before GL has them, and all that it does is to copy.
+        """
+        self._update_layer(data, window.viewport[2:])
+        if self._bytes is None:
+            width, height = self._layer.size
+            self._bytes = np.empty((height, width, 4), np.uint8)
+        for left, top, right, low in self._unread:
+            self._bytes[top:low, left:right] = self._layer.read_box((left, top, right, low))
+        self._unread = []
+        boxes = np.array(self._covered, np.int32).reshape(-1, 4)
+        self._layered.show_bytes(make(overlay=WindowOverlay(self._bytes, boxes)), window)
+
     @property
     def _texture(self) -> moderngl.Texture:
         (texture,) = self._layer.framebuffer.color_attachments
@@ -83,7 +112,7 @@ class KeptOverlay(ModernGLRenderer):
         """Boxes of the layer that were drawn anew."""
         if self._layer.size != size:
             self._layer.lay_out(size)
-            self._anew = True
+            self._anew, self._bytes = True, None
         lists = read_lists(data, self._lists)
         if self._anew:
             boxes = [(0, 0, *size)]
@@ -91,6 +120,8 @@ class KeptOverlay(ModernGLRenderer):
             boxes = boxes_of(tiles_of(changed_boxes(self._lists, lists), size), size)
         if boxes:
             self.draw_boxes(lists, boxes)
+            whole = self._anew or len(self._unread) + len(boxes) > MOST_UNREAD
+            self._unread = [(0, 0, *size)] if whole else [*self._unread, *boxes]
             tiles = np.logical_or.reduce([each.tiles(size) for each in lists])
             if self._tiles is None or not np.array_equal(tiles, self._tiles):
                 self._tiles, self._covered = tiles, boxes_of(tiles, size) if lists else []

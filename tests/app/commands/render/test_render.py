@@ -158,7 +158,7 @@ def test_pictures_that_exist_are_found_before_the_scene_is_opened(
 def test_a_file_in_place_of_the_folder_is_one_sentence(scene, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert render(scene, "--out", tmp_path / "file", *TINY) == 2
-    assert "cannot make the folder" in capsys.readouterr().err
+    assert "file is a file; name a folder" in capsys.readouterr().err
 
 
 def test_no_gl_is_said_and_the_tiles_draw(scene, tmp_path, capsys, monkeypatch):
@@ -229,6 +229,8 @@ REFUSED = {
     ("--sky", "ffffff", "blue", "000000"): "--sky has the colour 'blue'",
     ("--sky", "ffffff", "0000ff", "000000", "--background", "0", "0", "0"): "leave one of the two",
     ("--size", "16384x16384"): "134,217,728 pixels",
+    ("--fov-y", "nan"): "--fov-y is nan, expected degrees between 0 and 180",
+    ("--fov-y", "500"): "--fov-y is 500",
     ("--camera", "sideways"): "sideways does not exist; wanted is a list of cameras",
 }
 

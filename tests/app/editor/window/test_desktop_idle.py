@@ -3,6 +3,7 @@
 import glfw
 import pytest
 
+from shapeshift.app.editor.state.camera.camera import EditorCamera
 from shapeshift.app.editor.window.viewer import SLEEP_S
 from shapeshift.app.editor.window.window import HIDDEN_S, KeyDown
 from tests.support.desktop.desktop_stand import run_frames
@@ -138,3 +139,22 @@ def test_a_minimised_window_that_may_not_close_comes_back_to_ask(viewer, display
     set_state(viewer, display, NORMAL)
     assert back == [viewer.window.handle]  # once: an open window stays as it is
     run_frames(viewer, 1)
+
+
+def test_a_frame_computes_its_view_once(viewer, monkeypatch):
+    """It asks for it five times and more: for the picture, regions, the camera's section..."""
+    computed = []
+    of = EditorCamera.view_of
+    monkeypatch.setattr(
+        EditorCamera, "view_of", lambda self, *what: (computed.append(what), of(self, *what))[1]
+    )
+    for _ in range(3):
+        viewer.viewpoint.camera.turn(0.1, 0.0)
+        computed.clear()
+        run_frames(viewer, 1)
+        assert len(computed) == 1
+    viewer.viewpoint.camera.step(9.0)
+    run_frames(viewer, 2)
+    computed.clear()
+    run_frames(viewer, 3)
+    assert not computed, "nothing has moved"

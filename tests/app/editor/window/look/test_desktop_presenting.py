@@ -44,7 +44,7 @@ def test_bytes_fill_a_window_and_any_part_of_it(window, resolve):
         pixels = noise(across, along)
         assert resolve.takes_bytes(screen, (across, along))
         assert not resolve.takes_bytes(screen, (across + 1, along))
-        resolve.copy(pixels, screen)
+        resolve.copy(lambda pixels=pixels, **_: pixels, screen)
         top = height - below - along
         want[top : top + along, left : left + across] = pixels[..., 2::-1]
         screen.viewport = (0, 0, width, height)
@@ -62,5 +62,5 @@ def test_a_window_is_filled_without_those_functions_too(window, monkeypatch):
         assert not resolve.is_window(screen) and resolve.takes_bytes(screen, (width, height))
         pixels = noise(width, height)
         from_below = np.ascontiguousarray(pixels[::-1, :, [2, 1, 0, 3]])  # red first
-        resolve.copy(from_below, screen)
+        resolve.copy(lambda from_below=from_below, **_: from_below, screen)
         np.testing.assert_array_equal(shown_in(window), pixels[..., 2::-1])

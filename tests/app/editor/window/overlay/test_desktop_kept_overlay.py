@@ -7,7 +7,12 @@ from imgui_bundle import imgui
 from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from shapeshift.app.editor.window.window import KeyDown
+from shapeshift.rasterizer.resolve import WindowOverlay
+from shapeshift.rasterizer.resolve import resolve as resolve_bytes
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.resolve import Resolve
 from tests.support.desktop.desktop_stand import run_frames
+from tests.support.renderer.rasterizer_scenes import device
 
 STRIPES = [(0.1, 0.9, 0.4), (0.95, 0.2, 0.1), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.3, 0.4, 0.8)]
 
@@ -158,3 +163,107 @@ def test_what_is_drawn_over_the_picture_goes_when_it_is_drawn_no_more(viewer, ke
     assert (rows.min(), rows.max()) == (low - 40, low - 1) and changed.sum() == 80 * 40
     np.testing.assert_array_equal(viewer.window.picture(), before)
     assert viewer.renderer.presents == presents
+
+
+def takes_bytes(viewer, monkeypatch, taken: list) -> np.ndarray:
+    """The picture under the overlay comes as bytes, as tiles make them; whoever takes it is noted.
+
+    Returns it, (H, W, 4) premultiplied.
+    """
+    window = viewer.window
+    width, height = window.size
+    rng = np.random.default_rng(7)
+    image = rng.uniform(0, 1, (height, width, 4)).astype(np.float32)
+    image[..., 3] = 1
+    resolve = Resolve(Gpu(window.ctx))
+
+    def present(framebuffer, i: int = 0) -> None:
+        def taker(make, target) -> bool:
+            waits = viewer.renderer.taker is not None and viewer.renderer.taker(make, target)
+            taken.append(waits)
+            return waits
+
+        def make(as_window: bool = False, overlay: WindowOverlay | None = None) -> np.ndarray:
+            return resolve_bytes(device(), image, (0, 0, 0), as_window=as_window, overlay=overlay)
+
+        resolve.copy(make, framebuffer, taker)
+
+    monkeypatch.setattr(viewer.renderer, "present", present)
+    viewer.shown.forget()
+    return image
+
+
+def test_a_picture_of_bytes_has_the_overlay_before_gl_has_either(viewer, kept, monkeypatch):
+    """Drawn anew in every frame, it is what the kept layer makes of the same picture, to the bit,
+    while the overlay changes in parts.
+    """
+    taken: list[bool] = []
+    image = takes_bytes(viewer, monkeypatch, taken)
+    window, rng = viewer.window, np.random.default_rng(5)
+    by_gl = viewer.renderer.taker
+    for step in range(16):
+        window.on_cursor(window.handle, *(rng.uniform((10, 20), (300, 620)).tolist()))
+        if step % 7 == 3:
+            window.on_scroll(window.handle, 0.0, float(rng.choice([-3.0, 3.0])))
+        if step % 5 == 4:
+            viewer.state.say(f"step {step}")
+        if step == 9:
+            viewer.shell.keys_open = True
+        if step % 3:  # between them frames in which only the overlay changes
+            viewer.shown.forget()
+            taken.clear()
+        run_frames(viewer, 1)
+        assert taken[-1]
+        at_once = window.picture().copy()
+        viewer.renderer.taker = None  # GL has the picture first, then lays the layer over it
+        viewer.renderer.present(window.screen())
+        window.presented.lay_over(imgui.get_draw_data())
+        viewer.renderer.taker = by_gl
+        np.testing.assert_array_equal(window.picture(), at_once, f"step {step}")
+    viewer.shell.keys_open = False
+    run_frames(viewer, 2)
+    bare = (window.picture() == (255 * image[..., :3] + 0.5).astype(np.uint8)).all(axis=2)
+    assert 0.3 < bare.mean() < 0.9, "both must be there, picture and overlay"
+
+
+def test_who_draws_over_a_picture_of_bytes_finds_it_in_the_window(viewer, kept, monkeypatch):
+    taken: list[bool] = []
+    takes_bytes(viewer, monkeypatch, taken)
+    run_frames(viewer, 1)
+    before = viewer.window.picture().copy()
+    box = (500, 300, 80, 40)  # of GL: from below
+    seen = []
+
+    def over(request) -> None:
+        seen.append(viewer.window.picture().copy())
+        viewer.window.screen().clear(1.0, 0.0, 1.0, viewport=box)
+
+    viewer.hooks.over.append(over)
+    viewer.shown.forget()
+    run_frames(viewer, 1)
+    picture = viewer.window.picture().copy()
+    run_frames(viewer, 2)  # not drawn anew, and then not even presented
+    np.testing.assert_array_equal(viewer.window.picture(), picture)
+    viewer.hooks.over.remove(over)
+    assert taken[:2] == [True, True]
+    low = viewer.window.size[1] - box[1]
+    hidden = viewer.window.picture()[low - 40 : low, 500:580]
+    assert (hidden == (255, 0, 255)).all()
+    outside = (viewer.window.picture() == before).all(axis=2)
+    outside[low - 40 : low, 500:580] = True
+    assert outside.all()
+    np.testing.assert_array_equal(seen[0][low - 40 : low, 500:580], before[low - 40 : low, 500:580])
+    viewer.shown.forget()
+    run_frames(viewer, 1)
+    np.testing.assert_array_equal(viewer.window.picture(), before)
+
+
+def test_half_of_a_window_is_copied_at_once(viewer, kept):
+    """A part of it is not all that the overlay lies over."""
+    screen, (width, height) = viewer.window.screen(), viewer.window.size
+    black = np.zeros((height, width, 4), np.uint8)
+    screen.viewport = (0, 0, width // 2, height)
+    assert not viewer.window.presented.take_picture(lambda **_: black[:, : width // 2], screen)
+    screen.viewport = (0, 0, width, height)
+    assert viewer.window.presented.take_picture(lambda **_: black, screen)
+    assert (viewer.window.picture() == 0).all()
