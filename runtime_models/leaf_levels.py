@@ -56,7 +56,10 @@ class LeafSource(Protocol):
     coarse_leaf: np.ndarray  # (N,) leaf of each splat of the model itself: the coarsest levels
     coefficients: int  # M of every LeafSplats
     budget: int  # splats that the scene may draw; 0: as many as suit the machine
-    problem: str  # one sentence: what could not be read; "" = nothing
+
+    @property
+    def problem(self) -> str:
+        """One sentence: what could not be read; "" = nothing."""
 
     def share_memory(self, taken: int) -> None:
         """So many bytes of what the scene may keep in memory are not decoded parts."""

@@ -10,7 +10,7 @@ from shapeshift.runtime_models.model import BadFile
 
 MOST_WAITING = 16  # parts: those of later frames are asked for then
 THREAD = "leaves"  # its name
-PACE_S = 0.1  # longest wait for the next frame, between pictures of a part
+PACE_S = 1.0  # longest wait for the next frame, between pictures of a part
 PIXELS = 1 << 18  # of pictures that a frame of a moving eye bears: 3 to 5 ms of a core
 PATIENCE_S = 5.0  # longest wait at the end for a part that is being read
 

@@ -40,7 +40,7 @@ from shapeshift.runtime_models.splats.lod.parents import NodeTree, with_parents
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
-CHANGED = 0.025  # of the budget: what a frame in motion may upload, in splats
+CHANGED = 0.02  # of the budget: what a frame in motion may upload, in splats
 EACH = 8  # frames, one in so many looks ahead
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
 LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
@@ -326,7 +326,7 @@ class Stream:
         downs = due[level[due] > now[due]]
         downs = np.setdiff1d(downs, new)
         downs = downs[np.argsort(worth[downs], kind="stable")]
-        room = int(CHANGED * self.budget / (2 if self.weights.looked else 1))
+        room = int(CHANGED * self.budget / (4 if self.weights.looked else 1))
         freed = np.cumsum(there[downs] - counts[downs])
         total = int(there.sum())
         needed = total + int(base[new].sum()) - self._left

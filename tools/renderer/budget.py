@@ -78,7 +78,8 @@ def main() -> None:
 
 
 def write_rows(given: argparse.Namespace, rows: list[dict]) -> None:
-    views = " ".join([f"--up={given.up}", *(f"--view={text}" for text in given.view)])
+    views = [f"--view={text}" for text in given.view]
+    views = " ".join([f"--up={given.up}", *views] if given.up else views)
     with given.out.open("w", newline="") as file:
         file.write(f"# python tools/renderer/budget.py {given.folder.name} {views}\n")
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")

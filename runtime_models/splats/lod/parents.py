@@ -82,11 +82,14 @@ def with_parents(model: SplatLayers) -> tuple[SplatLayers, NodeTree]:
     number = np.bincount(of_splat, minlength=len(parent))
     levels, error = levels_of(source.levels, parent, height, number)
     leaves = ParentedLeaves(source, levels, of_splat.astype(np.int32))
-    every = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("means", "scales", "wxyz", "opacity", "sh", "layer")
-    }
-    alone = replace(model, **every, labels=None, extra={}, leaves=leaves)
+    names = ("means", "scales", "wxyz", "opacity", "sh", "layer")
+    means, scales, wxyz, opacity, sh, stop = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in names
+    )
+    alone = replace(
+        model, means=means, scales=scales, wxyz=wxyz, opacity=opacity, sh=sh, layer=stop,
+        labels=None, extra={}, leaves=leaves,
+    )  # fmt: skip
     return alone, NodeTree(parent, height, error)
 
 

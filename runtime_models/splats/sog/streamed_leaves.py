@@ -19,7 +19,7 @@ from shapeshift.runtime_models.splats.layers.read_layers import check_mode, wide
 from shapeshift.runtime_models.splats.operations.activate import activate
 from shapeshift.runtime_models.splats.operations.recentre import origin_of, recentred
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
-from shapeshift.runtime_models.splats.plain_splats import COLMAP_UP, RawSplats, Reading
+from shapeshift.runtime_models.splats.plain_splats import ARRAYS, COLMAP_UP, RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_streamed import (
     TREE,
     Streamed,
@@ -80,7 +80,7 @@ class StreamedLeaves:
         coarsest = self.levels.coarsest
         parts, findings = [], []
         for run in self._runs(leaves, coarsest):
-            found, splats = self._converted(*run)
+            found, splats = self._judged(self._raw(*run), *run[1:])
             findings += found
             parts.append(splats)
         self.coefficients = max(part.sh.shape[1] for part in parts)
@@ -141,8 +141,18 @@ class StreamedLeaves:
         self._chunk(part, pace)
 
     def read(self, leaves: np.ndarray, levels: np.ndarray) -> Iterator[LeafSplats]:
-        for run in self._runs(leaves, levels):
-            yield self._converted(*run)[1]
+        # A few leaves each of many files are judged together: a call takes 0.2 ms.
+        waiting: list[tuple[RawSplats, np.ndarray, np.ndarray]] = []
+        for file, some, at in self._runs(leaves, levels):
+            raw = self._raw(file, some, at)
+            raw.sh = self._harmonics(raw)
+            size = sum(len(each.means) for each, _, _ in waiting) + len(raw.means)
+            if waiting and (size > AT_ONCE or coding_of(raw) != coding_of(waiting[0][0])):
+                yield self._judged(*joined(waiting))[1]
+                waiting.clear()
+            waiting.append((raw, some, at))
+        if waiting:
+            yield self._judged(*joined(waiting))[1]
 
     def _runs(
         self, leaves: np.ndarray, levels: np.ndarray
@@ -170,10 +180,11 @@ class StreamedLeaves:
             self.problem = f"{self._folder.resolve().name}: {where} cannot be read: {error}"
             raise BadFile(self.problem) from None
 
-    def _converted(
-        self, file: int, leaves: np.ndarray, levels: np.ndarray
-    ) -> tuple[list[Finding], LeafSplats]:
-        """Splats of some leaves of one file, in our axes and units, as `judge` makes them."""
+    def _raw(self, file: int, leaves: np.ndarray, levels: np.ndarray) -> RawSplats:
+        """Splats of some leaves of one file, as filed; `extra` has the number of each one's leaf.
+
+        Raises BadFile.
+        """
         chunk = self._chunk(file)
         counts, first = self.levels.counts[leaves, levels], self._first[leaves, levels]
         beyond = first + counts > chunk.count
@@ -189,6 +200,12 @@ class StreamedLeaves:
         raw = chunk.rows(np.repeat(first, counts) + within)
         self._antialiased, self._format = raw.antialiased, raw.format
         raw.extra = {"leaf": np.repeat(np.arange(len(leaves)), counts)}
+        return raw
+
+    def _judged(
+        self, raw: RawSplats, leaves: np.ndarray, levels: np.ndarray
+    ) -> tuple[list[Finding], LeafSplats]:
+        """The same in our axes and units, as `judge` makes them."""
         odd, filed = activate(raw, self._ours)
         findings = [*raw.findings, *repair_rows(raw, odd, filed)]
         kept = np.bincount(raw.extra["leaf"], minlength=len(leaves))
@@ -201,6 +218,27 @@ class StreamedLeaves:
         """(n, M, 3) of the coarsest level's M; before that is known as many as the file has."""
         known = len(self.coarse_leaf) > 0
         return widened(raw.sh, self.coefficients) if known else raw.sh
+
+
+def coding_of(raw: RawSplats) -> tuple:
+    """What splats have in common that are judged together."""
+    return raw.log_scales, raw.logits, raw.antialiased, raw.sh.shape[1]
+
+
+def joined(
+    parts: list[tuple[RawSplats, np.ndarray, np.ndarray]],
+) -> tuple[RawSplats, np.ndarray, np.ndarray]:
+    """Splats, leaves and levels of several files of one coding as if of one."""
+    if len(parts) == 1:
+        return parts[0]
+    raws, leaves, levels = zip(*parts, strict=True)
+    first = np.cumsum([0, *map(len, leaves)])
+    leaf = [raw.extra["leaf"] + start for raw, start in zip(raws, first[:-1], strict=True)]
+    arrays = [np.concatenate([getattr(raw, name) for raw in raws]) for name in ARRAYS]
+    extra = {"leaf": np.concatenate(leaf)}
+    return (
+        raws[0].with_arrays(arrays, extra=extra), np.concatenate(leaves), np.concatenate(levels)
+    )  # fmt: skip
 
 
 def open_leaves(path: Path, reading: Reading) -> SplatLayers:
