@@ -154,7 +154,7 @@ class Scene(InspectedScene):
         """The scene live in a notebook: the page for browsers in a frame, with slider, stops and
         camera, without a server or an extension; a picture of it stays where frames are not shown.
 
-        height: of the frame, pixels.  The notebook grows by the page's size, for the demo 1.1 MB.
+        height: of the frame, pixels.  The notebook grows by the page's size, for the demo 1.2 MB.
         Raises UsageError, BadFile for what a page cannot show.
 
             ss.load("workshop.shift").show()
