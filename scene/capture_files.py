@@ -2,7 +2,9 @@
 
 import os
 import re
+import unicodedata
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import NamedTuple
 
@@ -21,7 +23,8 @@ def find_file(folder: Path, name: str, endings: Sequence[str] = ENDINGS) -> Name
 
     Names may be written as on Windows.  What was copied from another machine, whose names begin at
     its own root or go up, is looked for below `folder` by the ends of its name, the longest first;
-    photos of images/ also in images_2, images_4 and images_8.
+    photos of images/ also in images_2, images_4 and images_8.  Last, capital letters and the two
+    ways to write an umlaut are taken for each other, as Windows and macOS do.
     """
     if found := with_ending(folder, name, endings):
         return NamedFile(found)
@@ -36,7 +39,36 @@ def find_file(folder: Path, name: str, endings: Sequence[str] = ENDINGS) -> Name
             place = "/".join([f"{end[0]}_{first}" if first else end[0], *end[1:]])
             if (first == "" or len(end) > 1) and (found := with_ending(folder, place, endings)):
                 return NamedFile(found, elsewhere=True)
+    if found := alike_named(folder, [part for part in parts if part != "."], endings):
+        return NamedFile(found, elsewhere=True)
     return NamedFile(folder / name)
+
+
+def alike_named(folder: Path, parts: Sequence[str], endings: Sequence[str]) -> Path | None:
+    """A file below `folder` whose name is the same but for capitals and composed letters."""
+    if ".." in parts or not folder.is_dir():
+        return None
+    for part in parts[:-1]:
+        name = entries_of(folder, folder.stat().st_mtime_ns).get(folded(part))
+        if name is None or not (folder / name).is_dir():
+            return None
+        folder = folder / name
+    names = entries_of(folder, folder.stat().st_mtime_ns)
+    for ending in endings:
+        name = names.get(folded(parts[-1] + ending))
+        if name is not None and (folder / name).is_file():
+            return folder / name
+    return None
+
+
+def folded(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+@lru_cache(maxsize=64)
+def entries_of(folder: Path, changed_ns: int) -> dict[str, str]:
+    """Names in a folder by how they are compared; changed_ns: when it was, to be read anew then."""
+    return {folded(name): name for name in sorted(os.listdir(folder))}
 
 
 def parts_of(name: str) -> list[str]:

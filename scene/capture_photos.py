@@ -10,10 +10,18 @@ from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
-from shapeshift.scene.captures.lenses.panorama import is_panorama
+from shapeshift.scene.captures.lenses.panorama import (
+    face_lens,
+    face_pose,
+    faces_of,
+    is_panorama,
+)
 from shapeshift.scene.captures.photo import open_image
-from shapeshift.scene.captures.undistort import is_straight, pinhole_of
+from shapeshift.scene.captures.undistort import is_straight, lost, pinhole_of
 from shapeshift.scene.pose import View
+
+SHOWN = 0.02  # of a face of a panorama: those with less are left out
+LOOKED_AT_PX = 32  # a side of a face, to tell
 
 
 def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
@@ -26,6 +34,26 @@ def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
             f"{claimed[0]}x{claimed[1]}; resize the images or scale the intrinsics with them"
         )
     return size
+
+
+def posed_photos(
+    path: Path, modality: str, world_from_camera: np.ndarray, lens: ColmapCamera, where: str
+) -> list[Photo]:
+    """One photo; of a panorama the straight ones that it is cut into.  As posed_photo."""
+    if not is_panorama(lens):
+        return [posed_photo(path, modality, world_from_camera, lens, where)]
+    photos = []
+    for face in faces_of(lens):
+        pose = face_pose(world_from_camera, face)
+        photo = posed_photo(path, modality, pose, face_lens(lens, face), where)
+        assert photo.lens is not None, "faces are no photos of their own"
+        by = max(photo.view.size) / LOOKED_AT_PX
+        small = (LOOKED_AT_PX, max(round(photo.view.size[1] / by), 1))
+        if lost(photo.lens, small, by).mean() <= 1 - SHOWN:
+            photos.append(photo)
+    if not photos:
+        raise BadFile(f"{where} shows nothing of a panorama; check its 'fl_x', 'cx' and 'cy'")
+    return photos
 
 
 def posed_photo(
@@ -61,7 +89,8 @@ def of_size(lens: ColmapCamera, size: tuple[int, int], path: Path) -> ColmapCame
     scales = (across, down) if len(lens.focals) == 2 else ((across + down) / 2,)
     scales = (*scales, across, down)
     params = [value * scale for value, scale in zip(lens.params, scales, strict=False)]
-    return replace(lens, size=size, params=(*params, *lens.params[len(scales) :]))
+    crop = None if lens.crop is None else lens.crop * across
+    return replace(lens, size=size, params=(*params, *lens.params[len(scales) :]), crop=crop)
 
 
 def doubts_of(
@@ -102,7 +131,7 @@ def doubts_of(
     faces = [photo for photo in photos if is_panorama(photo.lens)]
     if faces:
         count = len({photo.path for photo in faces})
-        said.append(f"{count} panoramas are read as {len(faces) // count} straight photos each.")
+        said.append(f"{count} panoramas are read as {len(faces) / count:g} straight photos each.")
     bent = [p for p in photos if p.lens is not None and not is_panorama(p.lens)]
     if bent:
         models = ", ".join(sorted({photo.lens.model for photo in bent if photo.lens is not None}))

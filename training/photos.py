@@ -13,7 +13,7 @@ from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.lens_resampling import LEAST_PHOTOS
 from shapeshift.scene.captures.normal_photo import load_normals
-from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.photo import has_alpha_channel, load_photo
 from shapeshift.scene.pose import View
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
@@ -30,7 +30,7 @@ class LoadedPhoto:
     weight: np.ndarray | None  # (H, W) float32, what counts; None = everything
     name: str  # of the file
     depth: np.ndarray | None = None  # (H, W) float32 metres along the view, 0 = not known
-    masked: bool = False  # whether it came with a mask or an alpha channel
+    masked: bool = False  # whether a mask or an alpha channel says what lies outside of it
     normals: np.ndarray | None = None  # (H, W, 4) int8, as load_normals gives them
 
     @property
@@ -103,16 +103,22 @@ def memory_for_photos() -> int:
 def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> LoadedPhoto:
     """Load one photo, made smaller by `factor`; `masks` is that of TrainSettings.
 
+    Masks that mean "valid" leave it unmasked: they say of no pixel that it is empty.
     one_of_many: as in load_photo.
     """
     rgb, mask, lost = load_photo(photo, factor, one_of_many)
     alpha, weight = np.full(rgb.shape[:2], 255, np.uint8), None
-    if mask is not None and (photo.mask is None or masks == "object"):
+    masks = meaning(photo, masks)
+    masked = mask is not None and (photo.mask is None or masks == "object")
+    if mask is not None and masked:
         alpha = mask
     elif mask is not None and masks == "valid":
         weight = mask.astype(np.float32) / 255
         if not weight.any():
-            raise BadFile(f"{photo.mask} is black all over: nothing of its photo would count.")
+            raise BadFile(
+                f"{photo.mask} is black all over: nothing of its photo would count; leave the "
+                "photo out, or its mask."
+            )
     if lost is not None and lost.any():  # neither object nor background: nothing is known there
         alpha = np.where(lost, np.uint8(255), alpha)
         weight = np.where(lost, np.float32(0), np.float32(1) if weight is None else weight)
@@ -124,8 +130,20 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
     for values in (depth, normals):
         if values is not None:
             values[~seen] = 0
-    view, masked = photo.view.divided(factor), mask is not None
+    view = photo.view.divided(factor)
     return LoadedPhoto(view, photo.modality, rgba, weight, photo.name, depth, masked, normals)
+
+
+def meaning(photo: Photo, masks: str) -> str:
+    """What the photo's mask is taken for, by the setting `masks` of TrainSettings."""
+    return photo.mask_means if masks == "auto" else masks
+
+
+def is_masked(photo: Photo, masks: str) -> bool:
+    """Whether its mask or its alpha channel says what lies outside, by headers alone."""
+    if photo.mask is None:
+        return has_alpha_channel(photo)
+    return meaning(photo, masks) == "object"
 
 
 @dataclass(frozen=True)
@@ -147,7 +165,7 @@ class PhotoReader:
 
     def way(self, photo: Photo) -> tuple[int, str, bool]:
         """What is done to a photo's file, for who keeps what comes out."""
-        return self.factor, self.masks, (photo.split, photo.lens) in self.many
+        return self.factor, meaning(photo, self.masks), (photo.split, photo.lens) in self.many
 
     def read(self, photo: Photo) -> LoadedPhoto:
         return read(photo, *self.way(photo))

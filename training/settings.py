@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Poses = Literal["stated", "refine"]
-Masks = Literal["object", "valid", "ignore"]
+Masks = Literal["auto", "object", "valid", "ignore"]
 Background = Literal["auto", "random", "black", "white", "gray"]
 
 
@@ -95,9 +95,10 @@ class TrainSettings:
     there is."""
     downscale: int | None = None
     """Divide the photos' sides by this number.  Default: such that neither exceeds 640 pixels."""
-    masks: Masks = "object"
+    masks: Masks = "auto"
     """What a mask means: object, nothing is outside it; valid, what is outside is unknown; ignore,
-    masks are not used."""
+    masks are not used.  auto: what the capture says, else what the masks' shapes do (valid where
+    they are white along the photos' edges, or all the same)."""
     background: Background = "auto"
     """Colour behind everything.  auto: the capture's own, else random where photos have masks."""
     poses: Poses = "stated"

@@ -16,7 +16,7 @@ def validate_views(photos: list[LoadedPhoto], masks: str) -> tuple[list[LoadedPh
     for name in dict.fromkeys(photo.modality for photo in photos):
         mine = [photo for photo in kept if photo.modality == name]
         bare = [photo for photo in mine if not photo.masked]
-        if masks == "object" and 0 < len(bare) < len(mine):
+        if masks in ("auto", "object") and 0 < len(bare) < len(mine):
             out = 2 * len(bare) < len(mine)
             if out:
                 kept = [p for p in kept if p.modality != name or p.masked]

@@ -46,7 +46,7 @@ def held_out_error(
     low, high = thermal.stop.value_range
     errors = []
     for photo in tracked(photos, "comparing with held-out photos"):
-        loaded = read(photo, factor, "object")
+        loaded = read(photo, factor, "auto")
         (view,) = moved([loaded.view], (np.array(capture.origin) - document.origin).tolist())
         values = draw_values(renderer, thermal, view)
         colors = loaded.rgba[..., :3] / 255.0

@@ -29,9 +29,10 @@ class Options(ReadingOptions):
     downscale: int | None = None
     """Divide the photos' sides by this number.  Default: as in the training, if the scene knows it,
     else such that neither exceeds 640 pixels."""
-    masks: Literal["object", "valid", "ignore"] = "object"
+    masks: Literal["auto", "object", "valid", "ignore"] = "auto"
     """What a mask means: object, nothing is outside it; valid, what is outside is unknown; ignore,
-    masks are not used."""
+    masks are not used.  auto: as in the training, if the scene knows it, else what the capture or
+    the masks' shapes say, as `train` does."""
     background: Literal["auto", "black", "white", "gray"] = "auto"
     """Colour behind everything.  auto: the capture's own, else black."""
     vgg: Annotated[Path | None, EXPERT] = None
@@ -63,9 +64,10 @@ def run(options: Options) -> int:
     model = open_model(options.scene, options)
     capture = with_extrinsics(capture, rig_of(model.provenance))
     downscale = options.downscale or trained_downscale(model.provenance)
+    masks = trained_masks(model.provenance, options.masks)
     with working("comparing with the photos"):
         scores = evaluate_model(
-            open_device(), model, capture, downscale, options.masks, options.background,
+            open_device(), model, capture, downscale, masks, options.background,
             distance,
         )  # fmt: skip
     result = report(options.scene, scores, started)
@@ -92,6 +94,14 @@ def trained_downscale(provenance: dict) -> int | None:
     """
     factor = provenance.get("downscale")
     return factor if type(factor) is int and 1 <= factor <= 64 else None
+
+
+def trained_masks(provenance: dict, asked: str) -> str:
+    """What masks are taken for: as asked; for auto as a scene was trained, as far as that is
+    known."""
+    settings = provenance.get("settings")
+    trained = settings.get("masks") if isinstance(settings, dict) else None
+    return trained if asked == "auto" and trained in ("object", "valid", "ignore") else asked
 
 
 def only(capture: "Capture", name: str) -> "Capture":

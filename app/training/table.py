@@ -235,7 +235,7 @@ def rows_of(
         part, made = one_modality(capture, stop.name), runs[stop.name]
         score = evaluate_model(
             device, whole or read_model(made.file, reading), part, factor,
-            options.asked.get("masks", "object"), options.asked.get("background", "auto"), distance,
+            options.asked.get("masks", "auto"), options.asked.get("background", "auto"), distance,
         )[stop.name]  # fmt: skip
         rows.append(kind(
             method, stop.name, round(score.psnr_db, 3), round(score.median_db, 3),

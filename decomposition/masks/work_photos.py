@@ -16,6 +16,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
+from shapeshift.scene.captures.lenses.brown import brown_tangents, is_brown
 from shapeshift.scene.captures.lenses.panorama import is_panorama
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.undistort import pinhole_of
@@ -56,11 +57,13 @@ class WorkPhoto:
 
 def straight_points(lens: ColmapCamera, points: np.ndarray) -> np.ndarray:
     """(n, 2) pixels of the straight camera, of points in a bent photo's pixels."""
+    straight = pinhole_of(lens)
+    if is_brown(lens):
+        return brown_tangents(lens, points) * straight.focal + straight.centre
     import pycolmap
 
     width, height = lens.size
     camera = pycolmap.Camera(model=lens.model, width=width, height=height, params=lens.params)
-    straight = pinhole_of(lens)
     return np.asarray(camera.cam_from_img(points)) * straight.focal + straight.centre
 
 

@@ -70,8 +70,11 @@ def read_name(value: object) -> str:
     return " ".join(words).encode("utf-8", "replace").decode()
 
 
-def pose_matrix(value: object, where: str) -> np.ndarray:
-    """(4, 4) float64 rigid, from 4 x 4, 3 x 4, 16 or 12 numbers; its rotation made exact."""
+def pose_matrix(value: object, where: str, may_mirror: bool = False) -> np.ndarray:
+    """(4, 4) float64 rigid, from 4 x 4, 3 x 4, 16 or 12 numbers; its rotation made exact.
+
+    may_mirror: as in `rigid`.
+    """
     try:
         flat = np.array(value, np.float64).ravel()
     except (TypeError, ValueError, OverflowError):
@@ -81,7 +84,7 @@ def pose_matrix(value: object, where: str) -> np.ndarray:
     matrix = flat.reshape(-1, 4)
     if len(matrix) == 4 and not np.array_equal(matrix[3], (0, 0, 0, 1)):
         raise BadFile(f"{where} is no rotation and position, [R t; 0 0 0 1].")
-    return rigid(matrix, where)
+    return rigid(matrix, where, may_mirror)
 
 
 def ours_from_world(reading: CameraReading, up: str = DATA_UP) -> np.ndarray:

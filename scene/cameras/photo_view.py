@@ -8,6 +8,7 @@ from shapeshift.scene.pose import View
 
 PARALLEL = 1e-3  # smallest over largest curvature: axes that are nearer to parallel meet nowhere
 PART = 0.75  # of the scene's radius: photos that show so much to each side show the scene
+ONE_PLACE = 1e-9  # metres that cameras at one place are apart, by rounding
 AHEAD = 0.5  # of the cameras: as many have the subject before them
 
 
@@ -41,6 +42,16 @@ def photo_view(views: Sequence[View], centre: np.ndarray, radius: float) -> dict
         "target": (eye + max(away[best], 1e-6) * ahead[best]).tolist(),
         "fov_y": float(np.arctan(up) - np.arctan(down)),
     }
+
+
+def subject_distance(views: Sequence[View]) -> float:
+    """Metres (median) to where the cameras look together; 0 where nothing says."""
+    eyes = np.array([view.world_from_eye.position for view in views], np.float64)
+    ahead = np.array([-view.world_from_eye.matrix()[:3, 2] for view in views])
+    radius = float(np.linalg.norm(eyes - eyes.mean(axis=0), axis=1).max())
+    if not radius > ONE_PLACE:
+        return 0.0
+    return float(np.median(depth_of_subject(eyes, ahead, radius)))
 
 
 def depth_of_subject(eyes: np.ndarray, ahead: np.ndarray, radius: float) -> np.ndarray:

@@ -53,7 +53,8 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
     data, entries = gather(tuple(files))
     where, notes = files[0].name, Notes()
     frames = [f"{where}, frame {i}" for i in range(len(entries))]
-    cameras = [pose_of(entry, at) for entry, at in zip(entries, frames, strict=True)]
+    # A left-handed world is turned round as that of the capture; --up is of a PLY in it.
+    cameras = [pose_of(e, at, not reading.up) for e, at in zip(entries, frames, strict=True)]
     if reading.up:
         turn = ours_from_world(reading)
     else:
@@ -73,12 +74,12 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
     )
 
 
-def pose_of(entry: Mapping, where: str) -> np.ndarray:
+def pose_of(entry: Mapping, where: str, may_mirror: bool) -> np.ndarray:
     """(4, 4) camera to world with OpenCV axes, the file's world."""
     key = next((k for k in POSES if k in entry), None)
     if key is None:
         raise BadFile(f"{where} has no pose; give it a 'transform_matrix'.")
-    matrix = pose_matrix(entry[key], f"{where}: '{key}'")
+    matrix = pose_matrix(entry[key], f"{where}: '{key}'", may_mirror)
     return matrix if opencv_axes(entry) else opencv_from_eye(matrix)
 
 

@@ -9,6 +9,8 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
 from shapeshift.scene.pose import View
 
+LEFT_HANDED = "left_handed"  # in the notes: the file's world is, and its x was turned round
+MASKS = ("object", "valid")  # what masks mean: nothing is outside; what is outside is unknown
 ORIGIN = "origin"  # in the notes: metres, our axes, that were taken off all places
 
 
@@ -25,6 +27,8 @@ class Photo:
     normal_axes: str = "opengl"  # that they are in; or opencv
     counts: tuple[float, float] | None = None  # numbers of a grey photo that stand for 0 and 1
     lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
+    mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
+    float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
 
     @property
     def file_size(self) -> tuple[int, int]:

@@ -12,8 +12,8 @@ from shapeshift.runtime_models.files.json_fields import Fields, rows_of, shown
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_names import guess_kind
-from shapeshift.scene.cameras.photo_view import depth_of_subject
-from shapeshift.scene.captures.capture import ORIGIN, Capture, Photo
+from shapeshift.scene.cameras.photo_view import subject_distance
+from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
 from shapeshift.scene.captures.dated_stops import (
     NO_PLACE,
     date_in_entry,
@@ -27,7 +27,6 @@ ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file ma
 LARGEST_NUMBER = 1e30  # of a value range: what float32 products hold
 FARTHEST = 1e12  # metres from zero: beyond that no photo was taken
 FINE = 1e-5  # of the cameras' extent, or of a metre: finer steps than float32's are never needed
-ONE_PLACE = 1e-9  # metres that cameras at one place are apart, by rounding
 TOO_NEAR = 4  # near planes: a subject nearer than that has some of it cut off ...
 NEAR_SHARE = 0.1  # ... and a near plane at this share of how far away it is
 TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, from the first
@@ -42,7 +41,7 @@ PLAIN_BORDER = 0.5  # share of a photo's border that must have exactly one colou
 class CaptureWorld:
     """The one turn from a capture's own world to ours, for its cameras and for its points."""
 
-    ours_from_file: np.ndarray  # (4, 4) a rotation
+    ours_from_file: np.ndarray  # (4, 4) a rotation; of a left-handed world its x turned round first
     up: tuple[float, float, float]  # what points up in the file's world
     # Metres, our axes: the capture's zero, where the file's own is so far that float32 would lose
     # what lies there (survey coordinates); zeros nearly always.
@@ -54,10 +53,14 @@ class CaptureWorld:
     ) -> "CaptureWorld":
         """`up` if the file gives one, else as the photos (N, 4, 4; OpenCV axes) tell."""
         up = up_of_cameras(world_from_cameras, otherwise) if up is None else up
-        turn = upright_rotation(up, where)
+        turn = turn_of_world(up, is_left_handed(world_from_cameras, where), where)
         origin = near_origin(world_from_cameras[:, :3, 3] @ turn[:3, :3].T)
         # + 0.0: never -0.0
         return CaptureWorld(turn, three(np.asarray(up, np.float64) + 0.0), origin)
+
+    @property
+    def left_handed(self) -> bool:
+        return bool(np.linalg.det(self.ours_from_file[:3, :3]) < 0)
 
     def turned(self, matrix: np.ndarray) -> np.ndarray:
         out = self.ours_from_file @ matrix
@@ -79,6 +82,12 @@ class CaptureWorld:
         """The finished capture; `guessed` = nobody said what the modalities are."""
         stops, photos, more = with_own_ranges(stops, photos)
         notes = {"up_in_file": self.up} | (notes or {})
+        if self.left_handed:
+            notes[LEFT_HANDED] = True
+            more += (
+                "Its poses mirror the world, as those of left-handed axes do; its x axis is turned "
+                "round, so that left and right are as in the photos.",
+            )
         if background is None:
             background = plain_background(photos)
             notes["background"] = "found in the photos" if background else "none stated, none found"
@@ -121,22 +130,18 @@ def with_near_planes(photos: list[Photo]) -> tuple[Photo, ...]:
     unit in which it is.
     """
     views = [photo.view for photo in photos]
-    eyes = np.array([view.world_from_eye.position for view in views], np.float64)
-    ahead = np.array([-view.world_from_eye.matrix()[:3, 2] for view in views])
-    radius = float(np.linalg.norm(eyes - eyes.mean(axis=0), axis=1).max())
-    if not radius > ONE_PLACE:  # nothing says how far away the subject is
-        return tuple(photos)
-    away = float(np.median(depth_of_subject(eyes, ahead, radius)))
+    away = subject_distance(views)
     if not 0 < away < TOO_NEAR * min(view.near for view in views):
         return tuple(photos)
     near = NEAR_SHARE * away
     return tuple(replace(photo, view=replace(photo.view, near=near)) for photo in photos)
 
 
-def rigid(matrix: object, where: str) -> np.ndarray:
+def rigid(matrix: object, where: str, may_mirror: bool = False) -> np.ndarray:
     """(4, 4) float64 world_from_camera, its rotation made exactly orthonormal; or BadFile.
 
     A scale of the matrix is left out: it moves neither the camera nor what it sees.
+    may_mirror: as in a left-handed world, which CaptureWorld then turns round.
     """
     try:
         m = np.asarray(matrix, np.float64)
@@ -160,7 +165,7 @@ def rigid(matrix: object, where: str) -> np.ndarray:
             f"{where}: the pose is no rotation (R^T R differs from 1 by {error:.3g}); "
             "give camera-to-world matrices without shear, and of one scale in all directions"
         )
-    if not np.linalg.det(rotation) > 0:
+    if not (may_mirror or np.linalg.det(rotation) > 0):
         raise BadFile(f"{where}: the pose mirrors the world; flip one axis of its matrix")
     out = np.eye(4)
     u, _, vt = np.linalg.svd(rotation)
@@ -178,6 +183,26 @@ def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarra
         return np.asarray(otherwise, np.float64)
     axis = int(np.argmax(np.abs(mean)))
     return np.sign(mean[axis]) * np.eye(3)[axis]
+
+
+def is_left_handed(world_from_cameras: np.ndarray, where: str) -> bool:
+    """Whether all poses (N, 4, 4) mirror.  Raises BadFile where some do and others do not."""
+    mirrored = np.linalg.det(np.asarray(world_from_cameras)[:, :3, :3]) < 0
+    if mirrored.any() and not mirrored.all():
+        raise BadFile(
+            f"{where}: {mirrored.sum()} of {len(mirrored)} poses mirror the world and the others "
+            "do not; flip one axis of their matrices, or drop them"
+        )
+    return bool(mirrored.any())
+
+
+def turn_of_world(up: object, left_handed: bool, where: str) -> np.ndarray:
+    """(4, 4) from a file's world to ours, in which `up` (of the file's) is +Y."""
+    if not left_handed:
+        return upright_rotation(up, where)
+    upright_rotation(up, where)  # checks it
+    x, y, z = np.asarray(up, np.float64)
+    return upright_rotation((-x, y, z), where) @ np.diag([-1.0, 1.0, 1.0, 1.0])
 
 
 def upright_rotation(up: object, where: str) -> np.ndarray:

@@ -1,5 +1,6 @@
 """COLMAP's cameras and images, text or binary; every count is held against the bytes there are."""
 
+import math
 import mmap
 import struct
 from collections.abc import Iterator
@@ -31,7 +32,10 @@ LENSES = {
     13: ("DIVISION", 2, 5), 14: ("SIMPLE_FISHEYE", 1, 3), 15: ("FISHEYE", 2, 4),
     16: ("EUCM", 2, 6),
 }  # fmt: skip
-PANORAMA = "EQUIRECTANGULAR"  # no lens of COLMAP's; captures/lenses/panorama.py
+# Not COLMAP's, with two focal lengths and a principal point first: captures/lenses.  COLMAP's own
+# EQUIRECTANGULAR, whose parameters are its width and height, becomes such a PANORAMA.
+PANORAMA, BROWN, BROWN_FISHEYE = "EQUIRECTANGULAR", "BROWN_CONRADY", "BROWN_CONRADY_FISHEYE"
+SPHERE = 17, 2  # COLMAP's number for it, and how many parameters it has
 LENS_NUMBERS = {name: number for number, (name, _, _) in LENSES.items()}
 CAMERA, IMAGE = struct.Struct("<IiQQ"), struct.Struct("<I7dI")
 COUNT = struct.Struct("<Q")
@@ -46,6 +50,7 @@ class ColmapCamera:
     model: str
     size: tuple[int, int]
     params: tuple[float, ...]
+    crop: float | None = None  # pixels from its centre beyond which the photo shows nothing
 
     @property
     def focals(self) -> tuple[float, ...]:
@@ -69,6 +74,13 @@ class ColmapCamera:
             or self.model == PANORAMA
             or any(self.params[_focals(self.model) + 2 :])
         )
+
+    @staticmethod
+    def panorama(size: tuple[int, int]) -> "ColmapCamera":
+        """All directions about the camera: pixels a radian, and the middle, which lies ahead."""
+        width, height = size
+        each = (width / (2 * math.pi), height / math.pi, width / 2, height / 2)
+        return ColmapCamera(PANORAMA, size, each)
 
 
 @dataclass(frozen=True)
@@ -122,22 +134,28 @@ def mapped(path: Path) -> Iterator[bytes | mmap.mmap]:
 
 
 def cameras_of_bytes(data: bytes | mmap.mmap, path: Path) -> dict[int, ColmapCamera]:
-    count, at = count_of(data, CAMERA.size + 3 * 8, path), COUNT.size
+    count, at = count_of(data, CAMERA.size + 2 * 8, path), COUNT.size
     lenses = {}
     for _ in range(count):
         if at + CAMERA.size > len(data):
             raise short_of(path, count, "cameras")
         number, model, width, height = CAMERA.unpack_from(data, at)
         at += CAMERA.size
-        if model not in LENSES:
+        if model not in LENSES and model != SPHERE[0]:
             raise BadFile(f"{path}: camera {number} is of model {model}, which is not known here.")
-        params = LENSES[model][2]
+        params = SPHERE[1] if model == SPHERE[0] else LENSES[model][2]
         if at + 8 * params > len(data):
             raise short_of(path, count, "cameras")
         values = struct.unpack_from(f"<{params}d", data, at)
         at += 8 * params
-        lenses[number] = ColmapCamera(LENSES[model][0], (width, height), values)
+        name = PANORAMA if model == SPHERE[0] else LENSES[model][0]
+        lenses[number] = lens_from(name, (width, height), values)
     return lenses
+
+
+def lens_from(model: str, size: tuple[int, int], params: tuple[float, ...]) -> ColmapCamera:
+    """The lens of a row of either table."""
+    return ColmapCamera.panorama(size) if model == PANORAMA else ColmapCamera(model, size, params)
 
 
 def images_of_bytes(data: bytes | mmap.mmap, path: Path) -> list[Posed]:
@@ -178,14 +196,13 @@ def cameras_of_text(path: Path) -> dict[int, ColmapCamera]:
             continue
         values = numbers_of(words[:1] + words[2:], f"{path}, line {line}")
         model = words[1] if len(words) > 1 else ""
-        if model not in LENS_NUMBERS:
+        if model not in LENS_NUMBERS and model != PANORAMA:
             raise BadFile(f"{path}, line {line}: {model[:40]!r} is no camera model known here.")
-        params = LENSES[LENS_NUMBERS[model]][2]
+        params = SPHERE[1] if model == PANORAMA else LENSES[LENS_NUMBERS[model]][2]
         if len(values) != 3 + params:
             raise BadFile(f"{path}, line {line}: {model} has {params} numbers after its size.")
-        lenses[int(values[0])] = ColmapCamera(
-            model, (int(values[1]), int(values[2])), tuple(values[3:])
-        )
+        size = (int(values[1]), int(values[2]))
+        lenses[int(values[0])] = lens_from(model, size, tuple(values[3:]))
     return lenses
 
 
@@ -225,7 +242,7 @@ def numbers_of(words: list[str], where: str) -> list[float]:
 
 
 def _focals(model: str) -> int:
-    return 2 if model == PANORAMA else LENSES[LENS_NUMBERS[model]][1]
+    return LENSES[LENS_NUMBERS[model]][1] if model in LENS_NUMBERS else 2
 
 
 def short_of(path: Path, count: int, what: str) -> BadFile:

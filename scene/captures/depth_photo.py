@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,21 +13,26 @@ from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.photo_view import subject_distance
+from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.photo import (
     BROKEN,
+    FLOATS,
     GREY_16,
     MOST_PIXELS,
     charge_pixels,
     open_image,
     quiet,
+    refuse_other_view,
 )
 from shapeshift.scene.captures.undistort import pixels_of, straight_pixels
 
 NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's
-UNITS = ("depth_unit", "integer_depth_scale")  # ours; instant-ngp's
+FLOAT_UNIT = "depth_unit_scale_factor"  # nerfstudio's, of floats as well
+UNITS = ("depth_unit", "integer_depth_scale", FLOAT_UNIT)  # ours; instant-ngp's
 MILLIMETRES = 0.001  # metres a step where nothing is said
-ASPECT = 0.02  # by how much a depth photo may be wider or narrower than its photo
+IN_MILLIMETRES = "Its depth photos of floats are in millimetres, by how far away their subject is."
 LOOKED_AT, FEW_POINTS = 3, 30  # photos, points: to tell whether a unit can be right
 OTHER_UNIT = 8  # times: more than this the points of a scene do not lie behind what is seen
 DEPTH = 12  # bytes of memory a number of a .npy
@@ -34,35 +40,26 @@ FARTHEST = 1e6  # metres: beyond that nothing was measured
 METRES = f"a length above 0 and up to {FARTHEST:g} metres"
 
 
-def depth_of(
-    entry: Mapping, folder: Path, size: tuple[int, int], where: str
-) -> tuple[Path | None, float]:
-    """The depth photo of a frame, if it names one that is there, and metres a step of it."""
+def with_depth(photo: Photo, entry: Mapping, folder: Path, where: str) -> Photo:
+    """The photo with its frame's depth photo, if that names one that is there, and its units."""
     fields = Fields(entry, where)
     key = next(filter(fields.has, UNITS), None)
-    unit = fields.number(key, wanted=METRES, high=FARTHEST) if key else MILLIMETRES
-    if key and not unit > 0:
-        raise fields.error(key, METRES)
+    for stated in filter(fields.has, UNITS):
+        if not fields.number(stated, wanted=METRES, high=FARTHEST) > 0:
+            raise fields.error(stated, METRES)
+    unit = fields.number(key) if key else MILLIMETRES
+    of_floats = fields.number(FLOAT_UNIT) if fields.has(FLOAT_UNIT) else 1.0
     path = named_beside(fields, NAMES, folder)
     if path is not None:
-        refuse_other_view(depth_size(path), size, f"{where}: the depth photo")
-    return path, unit
+        refuse_other_view(depth_size(path), photo.file_size, f"{where}: the depth photo")
+    return replace(photo, depth=path, depth_unit=unit, float_depth_unit=of_floats)
 
 
 def named_beside(fields: Fields, names: Sequence[str], folder: Path) -> Path | None:
     """The file that a frame names, by the first of some names that it has, if it is there."""
     name = next((text for key in names if (text := fields.text(key, ""))), "")
-    path = folder / name
+    path = find_file(folder, name, ("",)).path
     return path if name and os.path.isfile(path) else None  # Path.is_file does not take any text
-
-
-def refuse_other_view(own: tuple[int, int], size: tuple[int, int], what: str) -> None:
-    """Raises BadFile where something beside a photo has not its shape; sizes: width, height."""
-    if not abs(own[0] * size[1] / (own[1] * size[0]) - 1) <= ASPECT:
-        raise BadFile(
-            f"{what} has {own[0]}x{own[1]} pixels, the photo {size[0]}x{size[1]}; both must show "
-            "the same field of view"
-        )
 
 
 def depth_size(path: Path) -> tuple[int, int]:
@@ -71,10 +68,10 @@ def depth_size(path: Path) -> tuple[int, int]:
         height, width = _array(path).shape
         return width, height
     with open_image(path) as image:
-        if image.mode not in GREY_16:
+        if image.mode not in (*GREY_16, FLOATS):
             raise BadFile(
-                f"{path_end(path)}: a depth photo is greyscale of 16 bits, or a .npy; this one is "
-                f"{image.mode}"
+                f"{path_end(path)}: a depth photo is greyscale of 16 bits or of floats, or a .npy; "
+                f"this one is {image.mode}"
             )
         return image.size
 
@@ -87,13 +84,11 @@ def load_depth(photo: Photo, factor: int | None = None) -> np.ndarray:
     path = photo.depth
     assert path is not None, "asked of photos that have one"
     if path.suffix.lower() == ".npy":
-        values = _array(path)
-        values = np.array(values, np.float32) * (
-            photo.depth_unit if values.dtype.kind != "f" else 1
-        )
+        found = _array(path)
+        values, floats = np.array(found, np.float32), found.dtype.kind == "f"
     else:
-        values = _integers(path, math.prod(photo.file_size))
-        values *= np.float32(photo.depth_unit)
+        values, floats = _pixels(path, math.prod(photo.file_size))
+    values *= np.float32(photo.float_depth_unit if floats else photo.depth_unit)
     known = (values > 0) & (values <= FARTHEST)  # NaN is not
     values[~known] = 0
     return values if factor is None else at_pixels(values, photo, factor)
@@ -131,6 +126,41 @@ def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
         for new, old in zip(size[::-1], depth.shape, strict=True)
     )
     return depth[np.ix_(rows, columns)]
+
+
+def in_millimetres(capture: Capture, entries: Sequence[Mapping]) -> Capture:
+    """The capture, with its depth of floats taken for millimetres where nobody states a unit and
+    points, or else where the cameras look, lie a thousandth as deep: as nerfstudio has them.
+    """
+    deep = [photo for photo in capture.photos if photo.depth is not None and holds_floats(photo)]
+    if not deep or any(entry.get(FLOAT_UNIT) is not None for entry in entries):
+        return capture
+    some = deep[:: -(-len(deep) // LOOKED_AT)]
+    ratios = np.zeros(0)
+    if capture.points is not None:
+        ratios = np.concatenate([_over_points(photo, capture.points) for photo in some])
+    if (
+        len(ratios) < FEW_POINTS
+        and (away := subject_distance([photo.view for photo in capture.photos])) > 0
+    ):
+        ratios = np.concatenate([values[values > 0] for values in map(load_depth, some)]) / away
+    if len(ratios) < FEW_POINTS:
+        return capture
+    if not 1000 / OTHER_UNIT < float(np.median(ratios)) < 1000 * OTHER_UNIT:
+        return capture
+    photos = tuple(
+        replace(photo, float_depth_unit=MILLIMETRES) if photo.depth is not None else photo
+        for photo in capture.photos
+    )
+    return replace(capture, photos=photos, doubts=(*capture.doubts, IN_MILLIMETRES))
+
+
+def holds_floats(photo: Photo) -> bool:
+    assert photo.depth is not None, "asked of photos that have one"
+    if photo.depth.suffix.lower() == ".npy":
+        return _array(photo.depth).dtype.kind == "f"
+    with open_image(photo.depth) as image:
+        return image.mode == FLOATS
 
 
 def refuse_other_units(capture: Capture, where: str) -> None:
@@ -173,8 +203,9 @@ def _over_points(photo: Photo, points: np.ndarray) -> np.ndarray:
     return (seen / z[inside])[seen > 0]
 
 
-def _integers(path: Path, most: int) -> np.ndarray:
-    """(H, W) float32 steps of a 16-bit image; 65535 stands for all that is too far.
+def _pixels(path: Path, most: int) -> tuple[np.ndarray, bool]:
+    """(H, W) float32 of an image, and whether it holds floats; of 16 bits 65535 stands for all
+    that is too far, and becomes 0.
 
     most: pixels of the photo that it goes with.
     """
@@ -185,9 +216,10 @@ def _integers(path: Path, most: int) -> np.ndarray:
                 image.load()
         except BROKEN as error:
             raise BadFile(f"{path_end(path)}: cut off ({error}); copy it again") from None
-        steps = np.array(image, np.float32)
-    steps[steps >= 65535] = 0
-    return steps
+        values, floats = np.array(image, np.float32), image.mode == FLOATS
+    if not floats:
+        values[values >= 65535] = 0
+    return values, floats
 
 
 def mapped_numbers(path: Path) -> np.ndarray:
@@ -202,6 +234,8 @@ def _array(path: Path) -> np.ndarray:
     """A view of the (H, W) numbers of a .npy file: nothing is read yet."""
     values = mapped_numbers(path)
     where = path_end(path)
+    if values.ndim == 3 and 1 in (values.shape[0], values.shape[2]):  # with an axis of channels
+        values = values[0] if values.shape[0] == 1 else values[..., 0]
     if values.ndim != 2 or values.dtype.kind not in "fui" or not 0 < values.size <= MOST_PIXELS:
         raise BadFile(
             f"{where}: a depth photo is (H, W) numbers, this is {values.shape!s:.40} of "

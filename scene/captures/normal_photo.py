@@ -16,7 +16,6 @@ from shapeshift.scene.captures.depth_photo import (
     at_pixels,
     mapped_numbers,
     named_beside,
-    refuse_other_view,
 )
 from shapeshift.scene.captures.photo import (
     BROKEN,
@@ -24,6 +23,7 @@ from shapeshift.scene.captures.photo import (
     charge_pixels,
     open_image,
     quiet,
+    refuse_other_view,
 )
 
 NAMES = ("normal_path", "normal_file_path")

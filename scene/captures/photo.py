@@ -29,6 +29,8 @@ MOST_PIXELS = 1 << 27
 # may have as many as the photo that it is for.  What is small may pack as it likes, 4K is.
 FREE_PIXELS, PIXELS_A_BYTE = 1 << 23, 32
 PIXEL = 28  # bytes of memory: decoded, converted, as floats
+ASPECT = 0.02  # by how much what lies beside a photo may be wider or narrower than it
+HEIC = {".heic", ".heif"}
 ROWS = 256  # that become floats at a time
 BROKEN = (OSError, SyntaxError, ValueError, EOFError, RuntimeError)  # of Pillow, in broken files
 FLOATS = "F"  # how PIL names floating-point greyscale
@@ -48,7 +50,16 @@ def open_image(path: Path) -> Image.Image:
         ) from None
     except BadFile:  # of a grid, in its own words
         raise
-    except (UnidentifiedImageError, Image.DecompressionBombError, *BROKEN) as error:
+    except UnidentifiedImageError as error:
+        if path.stat().st_size == 0:
+            raise BadFile(f"{path}: the image file is empty; copy it again") from None
+        if path.suffix.lower() in HEIC:
+            raise BadFile(
+                f"{path}: HEIC photos are not read; save them as JPEG or PNG (a phone does so by "
+                "its setting 'most compatible')"
+            ) from None
+        raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
+    except (Image.DecompressionBombError, *BROKEN) as error:
         raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
 
 
@@ -82,13 +93,7 @@ def load_photo(photo: Photo, factor: int = 1, one_of_many: bool = False) -> Pixe
     mask_image, has_alpha = None, image.mode == "RGBA"
     if photo.mask is not None:
         image = over_black(image)
-        mask_image, mask_size = decoded(photo.mask, None, factor, math.prod(file_size))
-        mask_image = over_black(mask_image).convert("L")
-        if mask_size != file_size:
-            raise BadFile(
-                f"{photo.mask}: the mask has {mask_size[0]}x{mask_size[1]} pixels, its photo "
-                f"{file_size[0]}x{file_size[1]}; make them the same size"
-            )
+        mask_image = load_mask(photo.mask, file_size, factor)
     image = smaller(image, file_size, photo.lens, factor, one_of_many)
     mask: np.ndarray | None = None
     if mask_image is not None:
@@ -99,6 +104,30 @@ def load_photo(photo: Photo, factor: int = 1, one_of_many: bool = False) -> Pixe
     if photo.lens is not None:
         gone = lost(photo.lens, image.size, factor)
     return Pixels(np.asarray(image.convert("RGB")), mask, gone)
+
+
+def load_mask(path: Path, file_size: tuple[int, int], factor: int = 1) -> Image.Image:
+    """A mask of mode L, white where its photo counts, of the pixels that `decoded` gives.  BadFile.
+
+    file_size: of the photo.  Masks of 0 and 1, as programs write truth values, are stretched.
+    """
+    mask, own_size = decoded(path, None, factor, math.prod(file_size))
+    mask = over_black(mask).convert("L")
+    if mask.getextrema()[1] == 1:
+        mask = mask.point(lambda value: 255 * value)
+    if own_size == file_size:
+        return mask
+    refuse_other_view(own_size, file_size, f"{path}: the mask")
+    return mask.resize(file_size, Image.Resampling.BOX)
+
+
+def refuse_other_view(own: tuple[int, int], size: tuple[int, int], what: str) -> None:
+    """Raises BadFile where something beside a photo has not its shape; sizes: width, height."""
+    if not abs(own[0] * size[1] / (own[1] * size[0]) - 1) <= ASPECT:
+        raise BadFile(
+            f"{what} has {own[0]}x{own[1]} pixels, the photo {size[0]}x{size[1]}; both must show "
+            "the same field of view"
+        )
 
 
 def has_alpha_channel(photo: Photo) -> bool:

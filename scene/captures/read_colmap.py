@@ -14,7 +14,8 @@ from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
 from shapeshift.scene.capture_files import SMALLER, find_file
-from shapeshift.scene.capture_photos import doubts_of, image_size, posed_photo, refuse_all_missing
+from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
+from shapeshift.scene.capture_photos import doubts_of, posed_photos, refuse_all_missing
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
@@ -51,22 +52,25 @@ def read_colmap(folder: Path) -> Capture:
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
-    photos, rescaled = [], []
+    means = stated_meaning(Fields(said, f"{folder}/capture.json"))
+    photos: list[Photo] = []
+    rescaled: list[str] = []
     for image, path, world_from_camera in compress(zip(posed, paths, cameras, strict=True), there):
         lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
-        photo = posed_photo(path, modality_of[image.name], matrix, lens, where)
+        made = posed_photos(path, modality_of[image.name], matrix, lens, where)
         mask = find_mask(base, image.name)
         if mask is not None:
-            image_size(mask, photo.file_size)
-        photos.append(replace(photo, mask=mask))
-        rescaled += [str(path)] if photo.file_size != lens.size else []
+            refuse_other_mask(mask, made[0].file_size)
+        photos += [replace(photo, mask=mask, mask_means=means) for photo in made]
+        rescaled += [str(path)] if made[0].file_size != lens.size else []
     points, colors, more = points_of(model / f"points3D{ending}")
     counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
     photos = with_counts(listed_split(photos, folder, root), counts)
     background = background_from(said, f"{folder}/capture.json")
     guessed = not said.get("modalities")
-    doubts = doubts_of(len(posed), missing, photos, rescaled) + more
+    photos, unsure = meant_by_masks(photos)
+    doubts = doubts_of(len(posed), missing, photos, rescaled) + unsure + more
     return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
 
 

@@ -4,7 +4,7 @@ import os
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
@@ -12,7 +12,12 @@ from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_files import find_file
-from shapeshift.scene.capture_photos import doubts_of, image_size, posed_photo, refuse_all_missing
+from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
+from shapeshift.scene.capture_photos import (
+    doubts_of,
+    posed_photos,
+    refuse_all_missing,
+)
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
@@ -28,9 +33,9 @@ from shapeshift.scene.captures.capture_rules import (
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
-from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
+from shapeshift.scene.captures.depth_photo import in_millimetres, refuse_other_units, with_depth
 from shapeshift.scene.captures.lenses.frame_lens import lens_of
-from shapeshift.scene.captures.lenses.panorama import FACES, face_lens, face_pose, is_panorama
+from shapeshift.scene.captures.lenses.panorama import is_panorama, stereo_sentences
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
 from shapeshift.scene.captures.read_points import read_points
@@ -90,15 +95,19 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
+    lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
     photos, rescaled, no_depth, no_normals = [], [], [], []
-    for shot in shots:
-        lens = lens_of(shot.entry, shot.path, shot.where)
+    for shot, lens in zip(shots, lenses, strict=True):
         photos += (made := photos_of(shot, lens, world, folder))
         rescaled += [str(shot.path)] if made[0].file_size != lens.size else []
-        no_depth += [str(shot.path)] if made[0].depth is None and shot.names_depth else []
-        no_normals += [str(shot.path)] if made[0].normals is None and shot.names_normals else []
+        if not is_panorama(lens):
+            no_depth += [str(shot.path)] if made[0].depth is None and shot.names_depth else []
+            no_normals += [str(shot.path)] if made[0].normals is None and shot.names_normals else []
     doubts = doubts_of(len(named), missing, photos, rescaled, no_depth, no_normals)
+    doubts += stereo_sentences(lenses)
     doubts += doubts_of_entries(shots, entries)
+    photos, unsure = meant_by_masks(photos)
+    doubts += unsure
     photos = with_counts(photos, counts_from(data.get("modalities"), where))
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
@@ -116,6 +125,7 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         dict(notes.data) if notes else None,
         doubts + more,
     )
+    capture = in_millimetres(capture, entries)
     refuse_other_units(capture, where)
     refuse_other_axes(capture, where)
     return capture
@@ -191,10 +201,16 @@ def listed(frames: list[dict], data: dict, where: str) -> list[dict]:
             splits |= dict.fromkeys(Fields(data, where).texts(key), split)
     if not splits:
         return frames
-    used = [frame for frame in frames if frame.get("file_path") in splits]
+    splits = {plain_name(name): split for name, split in splits.items()}
+    used = [frame for frame in frames if plain_name(frame.get("file_path")) in splits]
     if not used:
         raise BadFile(f"{where}: its lists of training and test photos name none of its frames")
-    return [frame | {"split": splits[frame["file_path"]]} for frame in used]
+    return [frame | {"split": splits[plain_name(frame["file_path"])]} for frame in used]
+
+
+def plain_name(name: object) -> str:
+    """A file's name without ./ and with forward slashes, to be compared."""
+    return PurePosixPath(name.replace("\\", "/")).as_posix() if isinstance(name, str) else ""
 
 
 def read_capture_json(file: Path) -> dict:
@@ -246,7 +262,7 @@ def shots_of(
     key = next((k for k in POSES if k in entry), None)
     if key is None:
         raise BadFile(f"{where} has no pose; run COLMAP first, or give it a 'transform_matrix'")
-    matrix = rigid(entry[key], where)
+    matrix = rigid(entry[key], where, may_mirror=True)
     if not opencv_axes(entry):
         matrix = matrix @ OPENCV_FROM_EYE
     names = [s.name for s in stops]
@@ -280,25 +296,18 @@ def photos_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path)
     split = fields.text("split", "train")
     if split not in SPLITS:
         raise BadFile(f"{where} has split {shown(split)}; use train or test")
-    matrix, lenses = shot.world_from_camera, [lens]
-    poses = [world.turned(matrix)]
-    if is_panorama(lens):
-        lenses = [face_lens(lens, face) for face in FACES]
-        poses = [world.turned(face_pose(matrix, face)) for face in FACES]
-    photos = [
-        posed_photo(shot.path, shot.modality, pose, of, where)
-        for pose, of in zip(poses, lenses, strict=True)
-    ]
+    pose = world.turned(shot.world_from_camera)
+    photos = posed_photos(shot.path, shot.modality, pose, lens, where)
     mask, name = None, fields.text("mask_path", "") or fields.text("mask", "")
     if name:
         mask = find_file(folder, name, ("",)).path
         if not os.path.isfile(mask):
             raise BadFile(f"{where}: the mask {path_end(mask)} is missing; put it there")
-        image_size(mask, photos[0].file_size)
-    photos = [replace(photo, mask=mask, split=SPLITS[split]) for photo in photos]
+        refuse_other_mask(mask, photos[0].file_size)
+    means = stated_meaning(fields)
+    photos = [replace(p, mask=mask, mask_means=means, split=SPLITS[split]) for p in photos]
     if is_panorama(lens):  # whose depth is measured along rays, not along a view
         return photos
-    size = photos[0].file_size
-    depth, unit = depth_of(entry, shot.folder, size, where)
-    normals, axes = normals_of(entry, shot.folder, size, where)
-    return [replace(photos[0], depth=depth, depth_unit=unit, normals=normals, normal_axes=axes)]
+    photo = with_depth(photos[0], entry, shot.folder, where)
+    normals, axes = normals_of(entry, shot.folder, photo.file_size, where)
+    return [replace(photo, normals=normals, normal_axes=axes)]

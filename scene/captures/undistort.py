@@ -1,7 +1,7 @@
 """Photos of a bent lens as a pinhole camera would have taken them, and what of them is lost.
 
-The distortion models are COLMAP's (pycolmap): a ColmapCamera maps tangents x/z, y/z of its axes
-(OpenCV: x right, y down) to pixels of the photo.
+The distortion models are COLMAP's (pycolmap) and nerfstudio's: a ColmapCamera maps tangents x/z,
+y/z of its axes (OpenCV: x right, y down) to pixels of the photo.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,13 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
-from shapeshift.scene.captures.lenses.panorama import is_panorama, panorama_pixels
+from shapeshift.scene.captures.lenses.brown import brown_pixels, is_brown
+from shapeshift.scene.captures.lenses.panorama import (
+    face_size,
+    is_panorama,
+    is_whole,
+    panorama_pixels,
+)
 
 STRAIGHT = 0.5  # pixels that distortion may shift a corner by before it matters
 WIDEST = 1.75  # tangent of the half angle up to which a pinhole shows anything: 120 degrees
@@ -52,6 +58,8 @@ def pixels_of(lens: ColmapCamera, tangents: np.ndarray) -> np.ndarray:
     """(N, 2) pixels of the photo that lie at tangents (N, 2); NaN or far away where none does."""
     if is_panorama(lens):
         return panorama_pixels(lens, tangents)
+    if is_brown(lens):
+        return brown_pixels(lens, tangents)
     import pycolmap
 
     width, height = lens.size
@@ -96,9 +104,11 @@ def pinhole_of(lens: ColmapCamera) -> Pinhole:
     """The straight camera.  Raises BadFile where the lens leaves too little of the photo, or would
     make too much of it.
     """
-    if is_panorama(lens):  # a face of the cube, as fine as the panorama is in its middle
-        half = max(round(lens.focal[0]), 1)
-        return Pinhole((half, half), (half, half), (2 * half, 2 * half))
+    if is_panorama(lens):
+        focal, half = max(round(lens.focal[0]), 1), face_size(lens)
+        size = (2 * half[0], 2 * half[1])
+        refuse_grown(lens, size)
+        return Pinhole((focal, focal), half, size)
     limit, (fx, fy), (width, height) = min(fold(lens), WIDEST), lens.focal, lens.size
     along = np.linspace(0, limit, SAMPLES)
     none = np.zeros_like(along)
@@ -119,12 +129,18 @@ def pinhole_of(lens: ColmapCamera) -> Pinhole:
             f"its lens ({lens.model}) folds the photo over itself within {limit:.2f} of the focal "
             "length; check the distortion's numbers and their camera model"
         )
+    refuse_grown(lens, size)
+    return Pinhole((fx, fy), (left * fx, up * fy), size)
+
+
+def refuse_grown(lens: ColmapCamera, size: tuple[int, int]) -> None:
+    """Raises BadFile where a straight camera has far more pixels than its photo."""
+    width, height = lens.size
     if not size[0] * size[1] <= MOST_GROWN * width * height:
         raise BadFile(
             f"its lens ({lens.model}) would make {size[0]}x{size[1]} pixels of the photo's "
             f"{width}x{height}; check the distortion's numbers and their camera model"
         )
-    return Pinhole((fx, fy), (left * fx, up * fy), size)
 
 
 def straight_pixels(lens: ColmapCamera, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -182,7 +198,7 @@ def undistorted(
 @lru_cache(maxsize=8)
 def lost(lens: ColmapCamera, size: tuple[int, int], by: float) -> np.ndarray:
     """(H, W) bool which pixels of the straight camera, each `by` of its own, see past the photo."""
-    if is_panorama(lens):
+    if is_panorama(lens) and is_whole(lens):
         return np.zeros(size[::-1], bool)
     x, y = ((np.arange(side) + 0.5) * by for side in size)
     edge, out = max(by / 2, 0.5), np.ones(size[::-1], bool)
@@ -190,4 +206,7 @@ def lost(lens: ColmapCamera, size: tuple[int, int], by: float) -> np.ndarray:
         at = straight_pixels(lens, x, y[start : start + ROWS])
         inside = (at >= edge) & (at <= np.array(lens.size) - edge)
         out[start : start + ROWS] = ~inside.all(axis=2)
+        if lens.crop is not None:
+            off = np.hypot(*np.moveaxis(at - lens.centre, 2, 0))
+            out[start : start + ROWS] |= ~(off <= lens.crop)
     return out

@@ -67,9 +67,12 @@ def frame(photo: Photo, folder: Path) -> dict:
     out |= intrinsics(photo)
     if photo.mask is not None:
         out["mask_path"] = photo.mask.relative_to(folder).as_posix()
+        out["mask_means"] = photo.mask_means
     if photo.depth is not None:
         out["depth_path"] = photo.depth.relative_to(folder).as_posix()
         out["depth_unit"] = photo.depth_unit
+        if photo.float_depth_unit != 1:
+            out["depth_unit_scale_factor"] = photo.float_depth_unit
     if photo.normals is not None:
         out["normal_path"] = photo.normals.relative_to(folder).as_posix()
         out["normal_convention"] = photo.normal_axes

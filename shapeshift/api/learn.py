@@ -26,7 +26,7 @@ OF_BLOCKS = ("coarse_iterations", "block_photos", "cluster", "certificates", "gp
 NO_OUT = "resume goes on from the checkpoint beside out; give out, too."
 SAVE_EVERY_S = 60.0  # between checkpoints
 Kind = Literal["cpu", "gpu"]
-Masks = Literal["object", "valid", "ignore"]
+Masks = Literal["auto", "object", "valid", "ignore"]
 Background = Literal["auto", "black", "white", "gray"]
 
 
@@ -299,7 +299,7 @@ def evaluate(
     *,
     modality: str | None = None,
     downscale: int | None = None,
-    masks: Masks = "object",
+    masks: Masks = "auto",
     background: Background = "auto",
     vgg: PathText | None = None,
     device: Kind | None = None,
@@ -309,13 +309,13 @@ def evaluate(
 
     modality: only that one.  downscale: divide the photos' sides by this; None is what the scene
     was trained with, else such that neither exceeds 640 pixels.  masks: what a mask means; object:
-    nothing is outside it.  vgg: an ONNX file of VGG16's first layers, for a distance of features.
-    Raises BadFile, UsageError, NoDevice.
+    nothing is outside it; auto: as it was trained, else as the capture says.  vgg: an ONNX file of
+    VGG16's first layers, for a distance of features.  Raises BadFile, UsageError, NoDevice.
 
         scores = ss.evaluate("scene.shift", "capture")
         scores["modalities"]["RGB"]["psnr_db"]
     """
-    from shapeshift.app.training.evaluate import only, trained_downscale
+    from shapeshift.app.training.evaluate import only, trained_downscale, trained_masks
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
@@ -332,7 +332,8 @@ def evaluate(
     photos = photos if modality is None else only(photos, modality)
     photos = with_extrinsics(photos, rig_of(model.provenance))
     factor = downscale or trained_downscale(model.provenance)
-    scores = evaluate_model(open_device(device), model, photos, factor, masks, background, distance)
+    meant = trained_masks(model.provenance, masks)
+    scores = evaluate_model(open_device(device), model, photos, factor, meant, background, distance)
     result = report(scene.path, scores, started)
     return result if distance is None else result | {"vgg_file": distance.name}
 

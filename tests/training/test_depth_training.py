@@ -187,6 +187,25 @@ def test_eval_tells_how_far_off_depth_is(device, balls, tmp_path, capsys):
     assert f"{100 * told:.2f}" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("zero", [(0.0, 0.0, 0.0), (500_000.0, 0.0, -5_600_000.0)])
+def test_eval_knows_where_the_zeros_of_scene_and_capture_lie(device, balls, zero):
+    """A scene that was re-centred elsewhere than its capture has the same figures: places are
+    float32 all the same, so pictures differ by rounding alone."""
+    capture = replace(balls, notes=balls.notes | {"origin": zero})
+    wall = wall_of(balls)
+    want = evaluate_model(device, wall, balls)["RGB"]
+    for away in ((0, 0, 0), (1.0, -0.5, 2.0), (-1000.0, 0.0, 1000.0)):
+        moved = replace(
+            wall,
+            means=(wall.means - np.float32(away)).astype(np.float32),
+            origin=tuple(np.add(zero, away).tolist()),
+        )
+        found = evaluate_model(device, moved, capture)["RGB"]
+        # A kilometre off, float32 places to 0.03 mm: a hundredth of a pixel of these photos.
+        assert found.psnr_db == pytest.approx(want.psnr_db, abs=0.02 if max(away) > 9 else 1e-3)
+        assert found.depth_error == pytest.approx(want.depth_error, rel=0.02)
+
+
 def wall_of(capture: Capture) -> SplatLayers:
     """A round, opaque splat of 1 cm at each of the surface's points, in all stops."""
     count = len(capture.points)

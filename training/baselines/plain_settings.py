@@ -51,7 +51,7 @@ class PlainSettings:
     depth_share: float = 0.3
     normal_share: float = 0.1
     downscale: int | None = None
-    masks: Masks = "object"
+    masks: Masks = "auto"
     background: Background = "auto"
 
     def __post_init__(self) -> None:

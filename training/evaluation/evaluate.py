@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from shapeshift.rasterizer.raster import RasterFrame, rasterize
 from shapeshift.rasterizer.surface import rasterize_depth, surface
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import BadFile, Model, Stop
+from shapeshift.scene.cameras.camera_list import moved
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View
 from shapeshift.training.drawing import Color, camera_of
@@ -128,12 +129,13 @@ def evaluate_model(
     model: Model,
     capture: Capture,
     downscale: int | None = None,
-    masks: str = "object",
+    masks: str = "auto",
     background: str = "auto",
     distance: Callable[..., float] | None = None,
 ) -> dict[str, ModalityScore]:
     """Of every modality, over its held-out photos.  Raises BadFile where there are none.
 
+    Model and capture may be about zeros of their own (survey coordinates): cameras are moved.
     distance: what ModalityScore.vgg is the mean of, a function of (picture, photo, weight).
     """
     factor = downscale or choose_downscale(capture.photos)
@@ -149,12 +151,14 @@ def evaluate_model(
             smaller = math.ceil(max(photo.view.size) / LOOKED_AT_PX)
             shown.append(read(photo, max(factor, smaller), masks))
     behind = choose_background(background, known, shown) or BLACK
+    apart = np.subtract(capture.origin, getattr(model, "origin", BLACK))  # metres
     renderer, scores = ModelRenderer(device, model), {}
     for stop in capture.stops:
         alive = renderer.set_control(stop_for(model, stop).x)
         names, found = [], []
         for photo in capture.of(stop.name, "test"):
             loaded = read(photo, factor, masks)  # one at a time is in memory
+            loaded = replace(loaded, view=moved([loaded.view], apart.tolist())[0])
             names.append(name_in(capture, loaded))
             found.append(photo_scores(renderer, loaded, behind, distance))
         if found:

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.capture import Capture
-from shapeshift.scene.captures.capture_rules import upright_rotation
+from shapeshift.scene.captures.capture import LEFT_HANDED, Capture
+from shapeshift.scene.captures.capture_rules import turn_of_world
 from shapeshift.scene.captures.read_las import read_las
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.training.photos import LoadedPhoto, sampled
@@ -29,7 +29,8 @@ def cloud_points(path: Path, capture: Capture, rng: np.random.Generator) -> tupl
     if not (len(points) and np.isfinite(points).all()):
         raise BadFile(f"{path}: holds no points, or some that are no numbers; export it again.")
     up = capture.notes.get("up_in_file", (0.0, 1.0, 0.0))
-    turned = subsampled(points, rng) @ upright_rotation(up, str(path))[:3, :3].T
+    turn = turn_of_world(up, bool(capture.notes.get(LEFT_HANDED)), str(path))
+    turned = subsampled(points, rng) @ turn[:3, :3].T
     return turned - np.array(capture.origin), count
 
 

@@ -133,7 +133,8 @@ class PhotoFiles:
             if path is not None:
                 state = os.stat(path)
                 about.append(f"{path.absolute()} {state.st_mtime_ns} {state.st_size}")
-        of_files = photo.counts, photo.depth_unit, photo.lens, photo.normal_axes
+        units = photo.depth_unit, photo.float_depth_unit
+        of_files = photo.counts, units, photo.lens, photo.normal_axes
         about += [repr(self.reader.way(photo)), repr(of_files)]
         return hashlib.blake2b("\n".join(about).encode(), digest_size=16).digest()
 

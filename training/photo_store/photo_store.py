@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.photo import has_alpha_channel
 from shapeshift.training.photo_store.photo_files import PhotoFiles
-from shapeshift.training.photos import LoadedPhoto, PhotoReader
+from shapeshift.training.photos import LoadedPhoto, PhotoReader, is_masked
 
 AHEAD = 8  # photos that are read before their steps
 
@@ -122,7 +121,7 @@ class StoredPhoto(LoadedPhoto):
         photo = store.photos[number]
         about: dict[str, Any] = {
             "view": photo.view.divided(store.reader.factor), "modality": photo.modality,
-            "name": str(photo.path), "masked": photo.mask is not None or has_alpha_channel(photo),
+            "name": photo.name, "masked": is_masked(photo, store.reader.masks),
             "store": store, "number": number,
         }  # fmt: skip
         self.__dict__.update(about)

@@ -1,7 +1,8 @@
 """Captures like those that strangers bring: other places, other arrangements, other faults.
 
 A kind is a place of random solids, a way to walk around it, and what went wrong on the day.  It is
-written as nerfstudio writes: transforms.json with +Z up, photos and poses, nothing else.
+written as nerfstudio writes: transforms.json with +Z up, photos and poses; some have masks, either
+of the object or of people who walk by, and the file does not say which.
 """
 
 import json
@@ -51,6 +52,7 @@ class Kind:
     missing: float = 0.0  # share of the photos that are named and not there
     phone: bool = False  # JPEGs that say in EXIF that they lie on their side, as poses know them
     views_usually: int = 48
+    masks: str = ""  # "object": white where it is; "passers": black where somebody stands
 
 
 def paint(rng: np.random.Generator, cells_per_m: float) -> Pattern:
@@ -209,6 +211,8 @@ KINDS = {
     "table_white": Kind(a_table, around((0, 0.1, 0), 1.5, 12, 60), WHITE, views_usually=42),
     "phone": Kind(a_room, from_inside, exposure=0.15, lens=PHONE_LENS, missing=0.15, phone=True,
                   views_usually=64),
+    "cut_out": Kind(an_object, around((0, 0.22, 0), 1.3, -25, 65), backdrop=True, masks="object"),
+    "passers": Kind(a_room, from_inside, masks="passers"),
 }  # fmt: skip
 
 
@@ -245,6 +249,30 @@ def through_lens(view: View, lens: tuple[float, float], look_along):
         return look_along(o, unit(np.stack([x, y, -np.ones_like(x)], 1) @ world_from_eye.T))
 
     return bent
+
+
+def passer(view: View, rng: np.random.Generator) -> list[Solid]:
+    """Somebody who stands before the camera, to its left or right: as tall as it stands high."""
+    eye, ahead = np.asarray(view.world_from_eye.position), -view.world_from_eye.matrix()[:3, 2]
+    aside = rng.choice([-1, 1]) * rng.uniform(0.15, 0.5)  # radians
+    turn = np.arctan2(ahead[0], ahead[2]) + aside
+    away = rng.uniform(0.9, 1.3)
+    x, z, tall = eye[0] + away * np.sin(turn), eye[2] + away * np.cos(turn), eye[1]
+    clothes = Material(paint(rng, 6))
+    return [
+        bar((x, 0, z), (x, 0.8 * tall, z), 0.16, clothes),
+        ball((x, 0.92 * tall, z), 0.13 * tall, Material((0.8, 0.6, 0.5))),
+    ]
+
+
+def mask_of(view: View, here: Place, first: int) -> np.ndarray:
+    """(H, W) float32 the share of each pixel in which a solid from the `first` on is seen."""
+
+    def after(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        index = look(here, o, d).index
+        return np.zeros((len(o), 3)), np.where(index >= first, index, -1)
+
+    return photograph(view, after)[1]
 
 
 def still_wall(view: View, wall: Pattern) -> Pattern:
@@ -290,9 +318,12 @@ def make_stranger(
     where, +Y up.  The same seed gives the same capture.
     """  # fmt: skip
     kind, rng = KINDS[name], np.random.default_rng([seed, list(KINDS).index(name)])
-    here, wall = Place.of(kind.place(rng)), paint(rng, 8)
+    solids = kind.place(rng)
+    here, wall = Place.of(solids), paint(rng, 8)
     views = kind.views(kind.views_usually if count is None else count, size)
     make_folders(folder, "images")
+    if kind.masks:
+        make_folders(folder, "masks")
     frames, wrong = [], set(rng.permutation(len(views))[: round(kind.wrong * len(views))].tolist())
     lost: set[int] = set()
     if kind.missing:  # else nothing is drawn, so that older kinds stay as they are
@@ -300,7 +331,8 @@ def make_stranger(
     for i, view in enumerate(views):
         file = f"images/frame_{i:05}.{'jpg' if kind.phone else 'png'}"
         behind = still_wall(view, wall) if kind.backdrop else wall
-        seen = radiance(kind, here, behind)
+        there = here if kind.masks != "passers" else Place.of(solids + passer(view, rng))
+        seen = radiance(kind, there, behind)
         if any(kind.lens):
             seen = through_lens(view, kind.lens, seen)
         gain = 1 + kind.exposure * rng.uniform(-1, 1)
@@ -311,6 +343,13 @@ def make_stranger(
             eye = np.asarray(view.world_from_eye.position)
             stated = wrong_pose(view, rng, float(np.sqrt(dot(eye[None], eye[None])[0])))
         frames.append(frame_of(file, stated, Z_UP))
+        if kind.masks:
+            mask = frames[-1]["mask_path"] = f"masks/frame_{i:05}.png"
+            people = kind.masks == "passers"
+            share = mask_of(view, there, len(solids) if people else 0)
+            white = share == 0 if people else share >= 0.5  # of people no edge is left
+            with whole_file(folder / mask) as to:
+                Image.fromarray(np.uint8(255) * white.astype(np.uint8)).save(to, "PNG")
     bends = dict(zip(("k1", "k2"), kind.lens, strict=True)) if any(kind.lens) else {}
     data = {"camera_model": "OPENCV"} | bends | {"frames": frames}
     write_whole(folder / "transforms.json", json.dumps(data, indent=1).encode())

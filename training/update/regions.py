@@ -126,7 +126,8 @@ def moved_capture(capture: Capture, a_from_b: Similarity) -> Capture:
             photo.view, world_from_eye=Pose.from_matrix(world),
             near=photo.view.near * scale, far=photo.view.far * scale,
         )  # fmt: skip
-        photos.append(replace(photo, view=view, depth_unit=photo.depth_unit * scale))
+        units = photo.depth_unit * scale, photo.float_depth_unit * scale
+        photos.append(replace(photo, view=view, depth_unit=units[0], float_depth_unit=units[1]))
     points = None if capture.points is None else a_from_b.apply(capture.points.astype(np.float64))
     return replace(
         capture,

@@ -76,7 +76,7 @@ def decibels_of(options: Options, model: "AnchorModel") -> dict[str, float]:
     capture = open_capture(options.capture, options.memory)
     capture = with_extrinsics(capture, rig_of(model.provenance))
     factor, device = trained_downscale(model.provenance), open_device(options.device)
-    masks = options.asked.get("masks", "object")
+    masks = options.asked.get("masks", "auto")
     found = {}
     for stop in capture.stops:
         if capture.of(stop.name, "test"):

@@ -9,6 +9,7 @@ from shapeshift.scene.captures.read_transforms import capture_of
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 from shapeshift.scene.captures.scans.read_arkitscenes import arkitscenes_frames, find_arkitscenes
 from shapeshift.scene.captures.scans.read_nerfies import find_nerfies, nerfies_frames
+from shapeshift.scene.captures.scans.read_nuscenes import find_nuscenes, nuscenes_frames
 from shapeshift.scene.captures.scans.read_polycam import find_polycam, polycam_frames
 from shapeshift.scene.captures.scans.read_posed_folders import (
     find_posed_splits,
@@ -19,6 +20,7 @@ from shapeshift.scene.captures.scans.read_posed_folders import (
 from shapeshift.scene.captures.scans.read_record3d import find_record3d, record3d_frames
 from shapeshift.scene.captures.scans.read_scannetpp import find_scannetpp, scannetpp_frames
 from shapeshift.scene.captures.scans.read_sdfstudio import find_sdfstudio, sdfstudio_frames
+from shapeshift.scene.captures.scans.read_sitcoms3d import find_sitcoms3d, sitcoms3d_frames
 
 READERS = (
     (find_polycam, polycam_frames),
@@ -29,6 +31,8 @@ READERS = (
     (find_scannetpp, scannetpp_frames),
     (find_sdfstudio, sdfstudio_frames),
     (find_posed_splits, posed_split_frames),
+    (find_nuscenes, nuscenes_frames),
+    (find_sitcoms3d, sitcoms3d_frames),
 )
 
 

@@ -40,7 +40,7 @@ def sheared_pose(frames, more):
 def mirrored_pose(frames, more):
     for row in frames[0]["transform_matrix"]:
         row[0] = -row[0]
-    return "mirrors"
+    return "1 of 4 poses mirror the world and the others do not"
 
 
 def ragged_pose(frames, more):
@@ -94,19 +94,35 @@ def folded_lens(frames, more):
     return "folds the photo over itself"
 
 
-def bent_k4(frames, more):
-    more["k4"] = 0.4
-    return "only fisheye lenses"
+def thin_prism(frames, more):
+    more["camera_model"] = "thin_prism_fisheye"
+    return "not read from JSON; give the COLMAP model"
 
 
-def stereo_panorama(frames, more):
-    more["camera_model"] = "OMNIDIRECTIONALSTEREO_L"
-    return "which no pinhole"
+def orthophoto(frames, more):
+    more["camera_model"] = "ORTHOPHOTO"
+    return "rays are side by side; .* photos that the orthophoto was made of"
 
 
 def part_of_a_panorama(frames, more):
     more["camera_model"] = "EQUIRECTANGULAR"
+    del more["fl_x"]
     return "twice as wide as high"
+
+
+def part_of_a_stereo_panorama(frames, more):
+    more["camera_model"] = "OMNIDIRECTIONALSTEREO_L"
+    return "twice as wide as high"
+
+
+def more_than_all_directions(frames, more):
+    more["camera_model"], more["fl_x"] = "EQUIRECTANGULAR", 7.0
+    return "more than 360 by 180 degrees"
+
+
+def elsewhere_of_a_panorama(frames, more):
+    more["camera_model"], more["cx"] = "EQUIRECTANGULAR", 1e6
+    return "shows nothing of a panorama"
 
 
 def few_distortion_params(frames, more):
@@ -202,7 +218,8 @@ def missing_points(frames, more):
 @pytest.mark.parametrize("change", [spoil(c) for c in (
     no_poses, nan_pose, singular_pose, sheared_pose, mirrored_pose, ragged_pose, small_pose,
     wrong_size, missing_images, nameless_frame, empty, no_focal, negative_focal, nan_focal,
-    folded_lens, bent_k4, stereo_panorama, part_of_a_panorama, few_distortion_params,
+    folded_lens, thin_prism, orthophoto, part_of_a_panorama, part_of_a_stereo_panorama,
+    more_than_all_directions, elsewhere_of_a_panorama, few_distortion_params,
     degrees_over_180, half_a_pixel, odd_list, list_of_others, empty_modality,
     unknown_modality, only_tests, odd_split, stop_outside, twin_stops, odd_kind, upside_range,
     newer_version, no_up, odd_background, missing_points,

@@ -1,20 +1,17 @@
-"""Files of nerfstudio, instant-ngp and Aria as others write them: names, lenses, panoramas."""
+"""Files of nerfstudio, instant-ngp and Aria as others write them: names, lenses, axes."""
 
 import shutil
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from shapeshift.scene.captures.lenses.panorama import FACES
-from shapeshift.scene.captures.photo import load_photo
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.cameras.read_transforms_cameras import read_transforms_cameras
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.undistort import pixels_of
-from shapeshift.scene.pose import look_at
-from shapeshift.training.photos import load_photos
-from shapeshift.training.synthetic import balls
-from shapeshift.training.synthetic.solids import unit
-from tests.support.scene.captures import save_image, simple, write_transforms
+from shapeshift.training.first_anchors.point_sources import cloud_points
+from tests.support.scene.captures import CLOUD, simple, write_transforms
 
 
 @pytest.mark.parametrize(
@@ -128,46 +125,34 @@ def test_frames_of_different_times_are_said_to_be_one_still_scene(tmp_path):
     assert any("one still scene" in said for said in read_capture(tmp_path).doubts)
 
 
-def panorama_of(eye: np.ndarray, turn: np.ndarray, width: int) -> np.ndarray:
-    """(W/2, W, 3) uint8 of the balls, by nerfstudio's formula: the middle looks along -Z."""
-    rows, columns = (g.ravel() + 0.5 for g in np.mgrid[: width // 2, :width])
-    theta, phi = -np.pi * (2 * columns / width - 1), np.pi * rows / (width / 2)
-    d = np.stack([-np.sin(theta) * np.sin(phi), np.cos(phi), -np.cos(theta) * np.sin(phi)], 1)
-    color, _ = balls.radiance(balls.place(), "RGB")(np.broadcast_to(eye, d.shape), unit(d @ turn.T))
-    return np.rint(255 * color.reshape(width // 2, width, 3)).astype(np.uint8)
+LEFT = np.diag([-1.0, 1.0, 1.0])
 
 
-def test_faces_of_a_panorama_are_what_pinholes_see_there(tmp_path):
-    """Against the tracer's own photos from the same eye, in all six directions."""
-    pose = look_at(np.array([0.1, 0.7, 1.4]), np.array([0.3, 0.3, -1.0]))
-    matrix = pose.matrix()
-    Image.fromarray(panorama_of(matrix[:3, 3], matrix[:3, :3], 512)).save(tmp_path / "all.png")
-    frames = [{"file_path": "all.png", "transform_matrix": matrix.tolist()}]
-    write_transforms(tmp_path, frames, camera_model="EQUIRECTANGULAR", up=[0, 1, 0])
-    capture = read_capture(tmp_path)
-    assert len(capture.photos) == len({p.name for p in capture.photos}) == len(FACES)
-    assert any("1 panoramas are read as 6" in said for said in capture.doubts)
-    looks = {tuple(np.rint(p.view.world_from_eye.matrix()[:3, 2] * 1e3)) for p in capture.photos}
-    assert len(looks) == 6
-    for photo in capture.photos:
-        truth, _ = balls.photograph(photo.view, balls.radiance(balls.place(), "RGB"))
-        drawn = load_photo(photo).rgb / 255
-        error = np.abs(drawn - truth)
-        # Edges of checks fall between the samples of two pictures; a face that is turned or
-        # mirrored, or a seam, is wrong over a tenth of its pixels and more.
-        assert (error.max(axis=2) > 0.15).mean() < 0.06
-        assert np.median(error) < 0.01
-
-
-def test_panoramas_are_held_out_as_a_whole_and_have_a_target_each(tmp_path):
-    frames = []
-    for i in range(9):
-        save_image(tmp_path / f"{i}.png", (64, 32), seed=i)
-        pose = look_at(np.array([np.cos(i), 0.5, np.sin(i)]), np.zeros(3)).matrix()
-        frames.append({"file_path": f"{i}.png", "transform_matrix": pose.tolist()})
-    write_transforms(tmp_path, frames, camera_model="EQUIRECTANGULAR")
-    capture = read_capture(tmp_path)
-    assert {p.path.stem for p in capture.photos if p.split == "test"} == {"0", "8"}
-    loaded = load_photos(capture, "train", 1, "object")
-    assert len({photo.name for photo in loaded}) == len(loaded) == 7 * 6
-    assert all(photo.weight is None for photo in loaded), "a cube's faces know every pixel"
+def test_a_left_handed_world_is_turned_round(tmp_path):
+    """The same photos, with poses and points as a left-handed program writes them: up to a turn
+    of the whole, cameras and points are those of the right-handed one, not its mirror image."""
+    frames, more = simple(tmp_path)
+    np.savez(tmp_path / "points3d.npz", xyz=CLOUD)
+    write_transforms(tmp_path, frames, **more, up=[0.1, 0.2, 1.0])
+    before = read_capture(tmp_path)
+    (tmp_path / "left").mkdir()
+    shutil.copytree(tmp_path / "images", tmp_path / "left/images")
+    for frame in frames:
+        matrix = np.array(frame["transform_matrix"])
+        matrix[:3] = LEFT @ matrix[:3]
+        frame["transform_matrix"] = matrix.tolist()
+    np.savez(tmp_path / "left/points3d.npz", xyz=CLOUD @ LEFT)
+    write_transforms(tmp_path / "left", frames, **more, up=[-0.1, 0.2, 1.0])
+    after = read_capture(tmp_path / "left")
+    assert "left-handed" in after.doubts[-1] and not before.doubts
+    np.testing.assert_allclose(after.points, before.points, atol=1e-6)
+    for one, other in zip(before.photos, after.photos, strict=True):
+        assert np.allclose(one.view.eye_from_world(), other.view.eye_from_world(), atol=1e-9)
+    rng = np.random.default_rng(0)
+    cloud, _ = cloud_points(tmp_path / "left/points3d.npz", after, rng)
+    np.testing.assert_allclose(cloud, before.points, atol=1e-6)
+    cameras = read_transforms_cameras([tmp_path / "left/transforms.json"], CameraReading())
+    for view, photo in zip(cameras.views, before.photos, strict=True):
+        assert np.allclose(view.eye_from_world(), photo.view.eye_from_world(), atol=1e-9)
+    with pytest.raises(BadFile, match="mirrors"):
+        read_transforms_cameras([tmp_path / "left/transforms.json"], CameraReading(up="+Z"))

@@ -42,7 +42,7 @@ def test_alpha_is_the_mask_and_a_mask_file_goes_before_it(tmp_path):
     np.testing.assert_array_equal(mask, np.asarray(Image.open(file)))
     over_black = rgba[..., :3] * (rgba[..., 3:] / 255)
     assert np.abs(rgb - over_black).max() <= 1
-    with pytest.raises(BadFile, match="mask has 5x5"):
+    with pytest.raises(BadFile, match="mask has 5x5 pixels, the photo 16x12"):
         load_photo(photo_at(path, save_image(tmp_path / "s.png", (5, 5), mode="L")))
 
 

@@ -169,7 +169,58 @@ def posed_splits(folder, drawn):
             save_text(split / name / f"{i:04}.txt", " ".join(map(repr, values.ravel().tolist())))
 
 
-WRITERS = (polycam, record3d, scannet, arkitscenes, scannetpp, sdfstudio, nerfies, posed_splits)
+def wxyz_of(matrix: np.ndarray) -> list[float]:
+    return np.roll(Rotation.from_matrix(matrix[:3, :3]).as_quat(), 1).tolist()
+
+
+def nuscenes(folder, drawn, scenes=("scene-0061",)):
+    """Of each scene the same photos; a lidar and a sweep between key frames are there, too."""
+    rig = np.eye(4)
+    rig[:3, :3] = Rotation.from_rotvec([0.2, -1.4, 0.6]).as_matrix()
+    rig[:3, 3] = 1.7, 0.1, 1.5
+    k = k_matrix(VIEWS[0], 3).tolist()
+    rigs = [{"token": "r0", "sensor_token": "s0", "translation": rig[:3, 3].tolist(),
+             "rotation": wxyz_of(rig), "camera_intrinsic": k},
+            {"token": "r1", "sensor_token": "s1", "translation": [0, 0, 2],
+             "rotation": [1, 0, 0, 0], "camera_intrinsic": []}]  # fmt: skip
+    sensors = [{"token": "s0", "channel": "CAM_FRONT", "modality": "camera"},
+               {"token": "s1", "channel": "LIDAR_TOP", "modality": "lidar"}]  # fmt: skip
+    samples, data, poses = [], [], []
+    for name in scenes:
+        for i, (view, (photo, _)) in enumerate(zip(VIEWS, drawn, strict=True)):
+            file = f"samples/CAM_FRONT/{name}__CAM_FRONT__{i}.png"
+            save(folder / file, photo)
+            vehicle = Z_UP @ view.world_from_eye.matrix() @ FLIP @ np.linalg.inv(rig)
+            token = f"{name} {i}"
+            samples.append({"token": token, "timestamp": i, "scene_token": f"of {name}"})
+            poses.append({"token": token, "translation": vehicle[:3, 3].tolist(),
+                          "rotation": wxyz_of(vehicle), "timestamp": i})  # fmt: skip
+            row = {"token": token, "sample_token": token, "ego_pose_token": token,
+                   "calibrated_sensor_token": "r0", "filename": file, "fileformat": "png",
+                   "width": SIDE, "height": SIDE, "timestamp": i, "is_key_frame": True}  # fmt: skip
+            data += [row, row | {"filename": f"sweeps/{i}.png", "is_key_frame": False},
+                     row | {"calibrated_sensor_token": "r1", "filename": f"{i}.bin"}]  # fmt: skip
+    named = [{"token": f"of {name}", "name": name} for name in scenes]
+    tables = {"scene": named, "sample": samples, "sample_data": data, "sensor": sensors,
+              "calibrated_sensor": rigs, "ego_pose": poses}  # fmt: skip
+    for name, rows in tables.items():
+        save_text(folder / f"v1.0-mini/{name}.json", json.dumps(rows))
+
+
+def sitcoms3d(folder, drawn):
+    frames = []
+    for i, (view, (photo, _)) in enumerate(zip(VIEWS, drawn, strict=True)):
+        save(folder / f"images_4/TBBT_{i}.png", photo)
+        k = k_matrix(view, 3) * 4
+        k[2, 2] = 1
+        frames.append({"image_name": f"TBBT_{i}.png", "intrinsics": k.tolist(),
+                       "camtoworld": view.world_from_eye.matrix().tolist()})  # fmt: skip
+    said = {"frames": frames, "bbox": [[-1, -1, -1], [1, 1, 1]]}
+    save_text(folder / "cameras.json", json.dumps(said))
+
+
+WRITERS = (polycam, record3d, scannet, arkitscenes, scannetpp, sdfstudio, nerfies, posed_splits,
+           nuscenes, sitcoms3d)  # fmt: skip
 
 
 @pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
@@ -212,6 +263,44 @@ def test_what_is_left_out_is_said(tmp_path, drawn):
     third.mkdir()
     nerfies(third, drawn)
     assert any("one still scene" in said for said in read_capture(third).doubts)
+
+
+def test_a_scene_of_nuscenes_is_named(tmp_path, drawn):
+    nuscenes(tmp_path, drawn, ("scene-0061", "scene-0103"))
+    with pytest.raises(BadFile, match=r"2 scenes .*scene-0061.*scene-0103.*name one"):
+        read_capture(tmp_path)
+    with pytest.raises(BadFile, match=r"no scene .scene-7. among its 2"):
+        read_capture(tmp_path / "scene-7")
+    capture = read_capture(tmp_path / "scene-0103")
+    assert len(capture.photos) == COUNT
+    assert all(photo.path.name.startswith("scene-0103") for photo in capture.photos)
+    assert any("will be smears" in said for said in capture.doubts)
+    for photo in capture.photos:
+        save(tmp_path / f"masks/CAM_FRONT/{photo.path.stem}.png", np.eye(SIDE, dtype=np.uint8))
+    capture = read_capture(tmp_path / "scene-0103")
+    assert {photo.mask_means for photo in capture.photos} == {"valid"} and not capture.doubts
+
+
+@pytest.mark.parametrize("key, value, said", [
+    ("rotation", [1, 1, 0, 0], "no quaternion"), ("rotation", [1, 0], "list of 4"),
+    ("translation", ["x", 0, 0], "translation"), ("token", "gone", "in no row of that table"),
+])  # fmt: skip
+def test_broken_tables_of_nuscenes(tmp_path, drawn, key, value, said):
+    nuscenes(tmp_path, drawn)
+    path = tmp_path / "v1.0-mini/ego_pose.json"
+    rows = json.loads(path.read_text())
+    rows[2][key] = value
+    path.write_text(json.dumps(rows))
+    with pytest.raises(BadFile, match=said) as caught:
+        read_capture(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_nerfstudios_minimal_form_is_refused_unopened(tmp_path):
+    np.savez(tmp_path / "train.npz", cameras=np.array({"fx": 1}, dtype=object))
+    for path in (tmp_path, tmp_path / "train.npz"):
+        with pytest.raises(BadFile, match=r"pickled Python objects.*write transforms.json"):
+            read_capture(path)
 
 
 def cut_pose(folder):

@@ -25,6 +25,7 @@ from shapeshift.scene.captures.undistort import (
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.photos import load_photos
 from tests.support.scene.captures import simple, write_transforms
+from tests.support.scene.lenses import FISH, KEYS, brown, eighth_power, fisheye
 
 SIZE = (200, 150)
 F, CENTRE = 160.0, (103.0, 72.0)
@@ -86,33 +87,14 @@ def test_as_pycolmap_undistorts_it(tmp_path, bend):
     assert away.mean() < 2 and np.percentile(away, 99) < 8
 
 
-def brown(xyz: np.ndarray, params: tuple) -> np.ndarray:
-    """(N, 2) pixels of points: the formula of OpenCV's documentation, radial and tangential."""
-    fx, fy, cx, cy, k1, k2, p1, p2, k3 = params
-    x, y = xyz[:, 0] / xyz[:, 2], xyz[:, 1] / xyz[:, 2]
-    r2 = x * x + y * y
-    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return np.stack([fx * u + cx, fy * v + cy], axis=1)
-
-
-def fisheye(xyz: np.ndarray, params: tuple) -> np.ndarray:
-    fx, fy, cx, cy, *k = params
-    r = np.hypot(xyz[:, 0], xyz[:, 1])
-    theta = np.arctan2(r, xyz[:, 2])
-    bent = theta * (1 + sum(c * theta ** (2 * i + 2) for i, c in enumerate(k)))
-    return xyz[:, :2] / r[:, None] * bent[:, None] * (fx, fy) + (cx, cy)
-
-
-KEYS = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-FISH = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4")
 FORMULAS = [
     (brown, KEYS, (620, 615, 410, 290, -0.28, 0.09, 0.002, -0.001, -0.01), {}),
     (brown, KEYS, (620, 615, 410, 290, 0.12, 0.03, 0, 0, 0), {"camera_model": "OPENCV"}),
     (fisheye, FISH, (330, 330, 395, 305, 0.04, -0.01, 0.002, 0),
      {"camera_model": "OPENCV_FISHEYE"}),
     (fisheye, FISH, (330, 330, 395, 305, 0.04, -0.01, 0.002, 0), {"is_fisheye": True}),
+    (eighth_power, (*KEYS, "k4"), (620, 615, 410, 290, -0.28, 0.09, 0.002, -0.001, -0.01, 0.03),
+     {"camera_model": "opencv"}),
 ]  # fmt: skip
 
 
