@@ -32,7 +32,7 @@ from shapeshift.training.losses.min_scale import MinScale
 from shapeshift.training.photo_store.open_photos import PhotoRoom, TrainingPhotos, open_photos
 from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale
 from shapeshift.training.run import SETTLE, Run
-from shapeshift.training.schedule import LIGHT_FROM, WARM_UP_STEPS, Budget, LrWarmup, Schedule
+from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
 from shapeshift.training.settings import Rates, TrainSettings, parameter_rates
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.supervision.backgrounds import (
@@ -274,8 +274,8 @@ class Trainer(Run):
         if shapes is None:
             self.probe_pose(photo, background, fraction)
         grads = self.photo_gradients(photo, background, shapes)
-        if fraction < LIGHT_FROM or not self.exposures.alike(photo.modality):
-            grads.pop("light", None)  # rests
+        if self.exposures.light_rests(photo.modality, fraction):
+            grads.pop("light", None)
         if self.lr_warmup.changes(self.iteration):
             self.adam.set_rates(self.all_rates())
         self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)

@@ -19,6 +19,7 @@ import numpy as np
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.networks import KERNELS
 from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.schedule import LIGHT_FROM
 
 # Photos are looked at from this share of the run on, before which the model shows too little, or
 # after so many visits of each if that is earlier: in long runs colours that depend on the view
@@ -58,6 +59,7 @@ class Exposures:
         self.begin = FROM  # share of the run from which on photos are looked at
         self.begin_step = VISITS * len(names)  # or this step, if it comes first
         self.nothing = device.zeros(1)
+        self.light_stands = False  # the run goes on from a scene whose light was learned before
 
     def update(self, photo: LoadedPhoto, image, rgba) -> None:
         """Learn from what is drawn (3, H, W) of a photo, and its bytes; both on the device."""
@@ -128,6 +130,14 @@ class Exposures:
         if self.one_exposure or len(self.rows[modality]) < FEWEST:
             return True
         return self.known(modality) is not None and self.spread(modality) <= NOISE
+
+    def light_rests(self, modality: str, fraction: float) -> bool:
+        """Whether light by direction learns nothing from a photo of a modality, at this share of
+        the run.  Where it stands already, it rests only once exposures are known to differ.
+        """
+        if self.light_stands:
+            return self.known(modality) is not None and not self.alike(modality)
+        return fraction < LIGHT_FROM or not self.alike(modality)
 
     def gain(self, photo: LoadedPhoto) -> Gain:
         """What the photo's colours are times the model's; NONE where all photos are alike."""

@@ -60,6 +60,7 @@ class UpdateTrainer(Trainer):
         self.outside = base.model.with_anchors(~inside)
         self.inside = base.model.with_anchors(inside)
         super().__init__(device, capture, settings, resume, loaded, report)
+        self.exposures.light_stands = base.model.light is not None
 
     @property
     def fixed(self) -> int:

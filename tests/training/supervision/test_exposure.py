@@ -13,6 +13,7 @@ from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.schedule import LIGHT_FROM
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.exposure import (
     BY_PLACE,
@@ -192,6 +193,8 @@ def test_a_model_that_does_not_show_the_photos_says_nothing_of_them(device, like
     exposures.correlation[4:] = like  # the median of ten, four of which are at the bound
     assert (exposures.gain(photos[0]) != NONE) == counts == bool(exposures.warnings())
     assert not exposures.alike("RGB"), "they differ, or nobody knows"
+    exposures.light_stands = True
+    assert exposures.light_rests("RGB", 1.0) == counts
 
 
 def test_photos_of_one_exposure_are_not_looked_at(device):
@@ -202,6 +205,13 @@ def test_photos_of_one_exposure_are_not_looked_at(device):
     many = {"RGB": [photo_of(photos["RGB"][0].rgba, name=str(i)) for i in range(FEWEST)]}
     assert Exposures(device, many, one_exposure=True).alike("RGB")
     assert not Exposures(device, many).alike("RGB"), "not looked at yet"
+    fresh = Exposures(device, many, one_exposure=True)
+    assert fresh.light_rests("RGB", np.nextafter(LIGHT_FROM, 0)), "too early"
+    assert not fresh.light_rests("RGB", LIGHT_FROM)
+    goes_on = Exposures(device, many)
+    assert goes_on.light_rests("RGB", 1.0), "nobody knows"
+    goes_on.light_stands = True  # learned before
+    assert not goes_on.light_rests("RGB", 0.0)
     assert Exposures(device, {"RGB": many["RGB"][1:]}).alike("RGB"), "too few to tell"
 
 
