@@ -58,7 +58,9 @@ def main() -> None:
     if options.leg:
         cases.append(("leg", read_model(options.leg), 0.5))
     with options.out.open("w", newline="") as file:
-        file.write(f"# python3 tools/runtime_models/{Path(__file__).name} --out export.csv --leg LEG\n")
+        file.write(
+            f"# python3 tools/runtime_models/{Path(__file__).name} --out export.csv --leg LEG\n"
+        )
         file.write(f"# {VIEWS} views of {SIZE[0]}x{SIZE[1]}, tiles\n")
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         rows.writeheader()

@@ -307,6 +307,11 @@ def save_photo(path: Path, image: np.ndarray) -> None:
         photo.save(file, "JPEG", quality=92, exif=exif)
 
 
+def save_mask(path: Path, white: np.ndarray) -> None:
+    with whole_file(path) as file:
+        Image.fromarray(np.uint8(255) * white.astype(np.uint8)).save(file, "PNG")
+
+
 def make_stranger(
     folder: Path,
     name: str,
@@ -348,8 +353,7 @@ def make_stranger(
             people = kind.masks == "passers"
             share = mask_of(view, there, len(solids) if people else 0)
             white = share == 0 if people else share >= 0.5  # of people no edge is left
-            with whole_file(folder / mask) as to:
-                Image.fromarray(np.uint8(255) * white.astype(np.uint8)).save(to, "PNG")
+            save_mask(folder / mask, white)
     bends = dict(zip(("k1", "k2"), kind.lens, strict=True)) if any(kind.lens) else {}
     data = {"camera_model": "OPENCV"} | bends | {"frames": frames}
     write_whole(folder / "transforms.json", json.dumps(data, indent=1).encode())

@@ -44,9 +44,9 @@ def read_trained(path: Path) -> object:
 
 
 def read_depth(path: Path) -> object:
-    from shapeshift.scene.captures.depth_photo import _integers
+    from shapeshift.scene.captures.depth_photo import _pixels
 
-    return _integers(path, 0)
+    return _pixels(path, 0)
 
 
 def readers() -> dict:

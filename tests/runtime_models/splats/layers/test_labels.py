@@ -103,7 +103,7 @@ def test_the_object_view_counts_labels_and_colours_them():
     found, ranks = label_ranks(replace(plain, labels=labels))
     assert found == [0, 9, 5] and ranks.tolist() == [2] * 10 + [0] * 30 + [1] * 20
     objects = (SceneObject("a", replace(plain, labels=labels)), SceneObject("b", plain))
-    told = object_counts(Scene(objects))
+    told = object_counts(Scene(objects), [60, 60])
     assert told == {"a, label 0": 30, "a, label 9": 20, "a, label 5": 10, "b": 60}
     many = label_ranks(replace(plain, labels=np.arange(60, dtype=np.int32)))
     assert len(many[0]) == MOST_LABELS and many[1].max() == MOST_LABELS - 1
