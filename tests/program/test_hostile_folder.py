@@ -118,7 +118,7 @@ HEAVY = [
      "--final-iterations", "2", "--seeds", "2"),
     ("table", "capture", "--out", "heavy/table", "--iterations", "2",
      "--methods", "joint", "splats", "spz"),
-    ("demo", "--out", "heavy/demo", "--views", "2", "--test-views", "1", "--size", "16x12",
+    ("demo", "--out", "heavy/demo", "--views", "2", "--test-views", "1", "--size", "16x16",
      "--processes", "2", "--iterations", "2"),
     ("headless", "--scene", "a.ply", "--out", "heavy/demo2", *SIZE, "--frames", "2",
      "--sweep", "2"),
