@@ -11,8 +11,6 @@ the worst of these.
 """
 
 import argparse
-import csv
-import shlex
 import sys
 import tempfile
 from dataclasses import replace
@@ -23,7 +21,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[2]), str(HERE.parent), str(HERE)]
 
-from strangers import draw  # noqa: E402
+from strangers import begun_rows, draw  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
@@ -85,12 +83,7 @@ def asked() -> argparse.Namespace:
 def main() -> None:
     options, device = asked(), open_device("cpu")
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as above:
-        file.write(
-            f"# python3 tools/training/first_anchors/masks_meaning.py {shlex.join(sys.argv[1:])}\n"
-        )
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
-        rows.writeheader()
+        rows = begun_rows(file, Path(__file__).name, device, COLUMNS)
         for kind in ("cut_out", "passers"):
             for seed in options.seeds:
                 folder = Path(above) / str(seed) / kind

@@ -16,7 +16,9 @@ import csv
 import shlex
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from PIL import Image
@@ -26,7 +28,7 @@ sys.path[:0] = [str(HERE.parents[2]), str(HERE.parent)]
 
 from bare import processor_s  # noqa: E402
 
-from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.runtime_models.model import BadFile  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
@@ -114,15 +116,21 @@ def asked() -> argparse.Namespace:
     return parser.parse_args()
 
 
+def begun_rows(
+    file: TextIO, program: str, device: Device, columns: Sequence[str]
+) -> csv.DictWriter:
+    """A file's first lines: the command, the machine, the columns."""
+    command = f"tools/training/first_anchors/{program} {shlex.join(sys.argv[1:])}"
+    file.write(f"# python3 {command}\n# {device.name}, {device.platform}\n")
+    rows = csv.DictWriter(file, columns, lineterminator="\n", restval="")
+    rows.writeheader()
+    return rows
+
+
 def main() -> None:
     options, device = asked(), open_device("cpu")
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(
-            f"# python3 tools/training/first_anchors/strangers.py {shlex.join(sys.argv[1:])}\n"
-        )
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
-        rows.writeheader()
+        rows = begun_rows(file, Path(__file__).name, device, COLUMNS)
         for kind in options.kinds:
             for seed in options.seeds:
                 there = Path(folder) / str(seed) / kind
