@@ -22,7 +22,7 @@ from shapeshift.training.density.density_budget import anchor_cap
 from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
 from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color, camera_of
-from shapeshift.training.export import model_of, origin_in
+from shapeshift.training.export import model_of, notes_of
 from shapeshift.training.first_anchors.first_anchors import base_colors, first_anchors
 from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import initial_weights, padded
@@ -378,9 +378,8 @@ class Trainer(Run):
         return out
 
     def model(self) -> AnchorModel:
-        provenance = origin_in(self.capture) | {
+        provenance = notes_of(self.capture) | {
             "trained_by": "shapeshift train",
-            "capture": self.capture.folder.name,
             "settings": self.settings.as_dict(),
             "iterations": self.iteration,
             "voxel_m": self.voxel,
