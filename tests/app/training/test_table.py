@@ -348,7 +348,7 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
         assert len(mine) == 4 * 3 + 3 * 3 and {row["size"] for row in mine} == {"1.0", "0.02"}
     work = tmp_path / "work" / balls.folder.name
     for seed, name in ((0, "0.3 s size 1"), (3, "0.3 s size 1 seed 3")):
-        provenance = read_model(work / name / "joint.shift").models[0].provenance
+        provenance = read_model(work / name / "joint.shift").provenance
         assert provenance["settings"]["seed"] == seed
         assert ("--seed 3" in (work / name / "table.csv").read_text()) == bool(seed)
     assert program.main() == 0
