@@ -9,7 +9,16 @@ import moderngl
 import numpy as np
 import pytest
 
-from shapeshift.renderer.gl.context import KINDS, NoContext, describe, is_software, open_context
+from shapeshift.renderer.gl.context import (
+    EGL_MAJOR,
+    EGL_MINOR,
+    KINDS,
+    NoContext,
+    _egl_current,
+    describe,
+    is_software,
+    open_context,
+)
 from shapeshift.renderer.timing import PassTimer
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -141,3 +150,27 @@ def test_the_drivers_timer_counts_what_the_driver_does(ctx):
         took = timer.collect()
         assert list(took) == ["decode", "splat"] and all(ms >= 0 for ms in took.values())
     assert len(timer._unused) == 2  # queries that wait to be used again: GL counts none
+
+
+@pytest.mark.parametrize("newest", [(4, 6), (4, 5), (4, 3), (3, 3)])
+def test_a_driver_that_gives_just_what_is_asked_for_is_asked_for_its_newest(monkeypatch, newest):
+    """NVIDIA's gives 3.3 to who asks for 3.3, though it could 4.6; Mesa its newest, always."""
+    asked = []
+
+    def create(display, config, share, attributes):
+        words = list(attributes)
+        version = (words[words.index(EGL_MAJOR) + 1], words[words.index(EGL_MINOR) + 1])
+        asked.append(version)
+        return 77 if version <= newest else None
+
+    def choose(display, wanted, config, room, count):
+        count._obj.value = 1
+        return 1
+
+    egl = SimpleNamespace(
+        eglInitialize=lambda *a: 1, eglBindAPI=lambda *a: 1, eglChooseConfig=choose,
+        eglCreateContext=create, eglGetError=lambda: 0x3009, eglGetProcAddress=None,
+        eglMakeCurrent=lambda *a: 1, eglDestroyContext=lambda *a: 1,
+    )  # fmt: skip
+    assert _egl_current(egl, 1)
+    assert asked[-1] == newest and asked == sorted(asked, reverse=True)
