@@ -2,6 +2,7 @@
 
 import ctypes
 import sys
+from collections.abc import Callable
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_int, c_uint, c_void_p
 
 import moderngl
@@ -176,15 +177,14 @@ def _egl_current(egl: ctypes.CDLL, display: int | None) -> _Current:
     config, count = c_void_p(), c_int(0)
     found = egl.eglChooseConfig(display, wanted, byref(config), 1, byref(count))
     need(found and count.value, "eglChooseConfig")
-    # Mesa gives its newest whatever is asked for, NVIDIA's driver just what is asked for.
-    for major, minor in VERSIONS:
+
+    def create(major: int, minor: int) -> int | None:
         version = (c_int * 7)(
             EGL_MAJOR, major, EGL_MINOR, minor, EGL_PROFILE, EGL_CORE_BIT, EGL_NONE
         )  # fmt: skip
-        made = egl.eglCreateContext(display, config, None, version)
-        if made:
-            break
-    need(made, "eglCreateContext")
+        return egl.eglCreateContext(display, config, None, version)
+
+    made = need(create_newest(create), "eglCreateContext")
 
     def destroy() -> None:
         egl.eglMakeCurrent(display, None, None, None)
@@ -195,6 +195,14 @@ def _egl_current(egl: ctypes.CDLL, display: int | None) -> _Current:
         lambda: need(egl.eglMakeCurrent(display, None, None, made), "eglMakeCurrent"),
         destroy,
     )
+
+
+def create_newest(create: Callable[[int, int], int | None]) -> int | None:
+    """What `create` makes of the newest version that it takes; None: of none.
+
+    Mesa gives its newest whatever is asked for, NVIDIA's driver just what is asked for.
+    """
+    return next(filter(None, (create(*version) for version in VERSIONS)), None)
 
 
 def _open_osmesa() -> _Current:
