@@ -1,8 +1,8 @@
 // bin, GPU form: splats -> the lists of intersections; one work-item a splat, sorts in sort_gpu.cl.
 // Depths are sorted, intersections written in that order, then sorted by tile: stable, so each
 // tile's list is near to far, and the same as that of bin.cl.
-// Reads:   record (N, 12) and depth (N,) of project; or of project_arena record, tile_bounds, status
-//          and pairs, whose order several views may share.
+// Reads:   record (N, 12) and depth (N,) of project; or of project_arena record, tile_bounds,
+//          status and pairs, whose order several views may share.
 // Writes:  tile_bounds (N, 2), keys and order, tile_of and intersections, starts (tiles + 1),
 //          first_slot.
 // Units:   pixels and tiles; depths in metres, sorted as the bits of floats above 0.
