@@ -134,8 +134,8 @@ class Trainer(Run):
         first = initial_points(self.capture, photos, rng, settings.points, report, settings.seconds)
         self.warnings += first.doubts
         self.origin, background = first.origin, self.schedule.background
-        start = first_anchors(first, self.anchor_cap, photos, background)
-        self.voxel, count = start.voxel, len(start.anchors)
+        start = first_anchors(first, self.anchor_cap, photos, background, settings.max_by_shape)
+        self.voxel, self.anchor_cap, count = start.voxel, start.most, len(start.anchors)
         features = np.zeros((count, padded(settings.features)), np.float32)
         features[:, : settings.features] = (
             rng.normal(size=(count, settings.features)) * FEATURE_SPREAD
@@ -166,7 +166,7 @@ class Trainer(Run):
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
         self.set_start(notes.get("start_s", 0.0))
         self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
-        self.run_length = notes["run_length"]
+        self.run_length, self.anchor_cap = notes["run_length"], notes["anchor_cap"]
         self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
         values = {n: state[f"{n}.value"] for n in ("weights", *self.layout.per_anchor)}
         self.adam = Adam(self.device, values, self.all_rates())
@@ -186,6 +186,7 @@ class Trainer(Run):
             "rate_scale": self.rate_scale, "run_length": self.run_length,
             "first_loss": self.guard.first_loss, "settings": self.settings.as_dict(),
             "lr_warmup_start": self.lr_warmup.start, "start_s": self.start_s,
+            "anchor_cap": self.anchor_cap,
         }  # fmt: skip
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
         more = self.poses.state() | self.min_scale.state()
