@@ -32,6 +32,7 @@ from shapeshift.renderer.streaming.pages import (
 )
 from shapeshift.renderer.streaming.seen import CoarseLook
 from shapeshift.renderer.streaming.sight import LeafSight, sight_of
+from shapeshift.renderer.streaming.swap import NONE, patient, swapped
 from shapeshift.renderer.streaming.upload import Uploader
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
 from shapeshift.runtime_models.leaf_levels import LeafSource
@@ -42,6 +43,7 @@ from shapeshift.scene.scene import Scene
 
 CHANGED = 0.02  # of the budget: what a frame in motion may upload, in splats
 EACH = 8  # frames, one in so many looks ahead
+SPARE = 0.125  # more pages for fades where there are parents: nodes of 48 splats leave none free
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
 LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
 
@@ -89,12 +91,13 @@ class Stream:
         )  # fmt: skip
         finest = np.concatenate([source.levels.finest_counts for source in self._sources])
         self._finest = np.where(self._is_leaf, finest, 0)
-        self._pages = pages_for(self._finest, self._left)
+        self._pages = pages_for(self._finest, self._left)  # at rest
+        pages = self._pages + (int(SPARE * self._pages) if self._tree else 0)
         coefficients = max(source.coefficients for source in self._sources)
-        stored = min(self._pages, pages_of_all(self._sources))
-        drawing.allocate_pages(list(models), self._pages, coefficients, stored)
+        stored = min(pages, pages_of_all(self._sources))
+        drawing.allocate_pages(list(models), pages, coefficients, stored)
         self.follows_eye = coefficients > 1  # then its colours are decoded a frame
-        self.table = PageTable(self._pages, int(self.first[-1]))
+        self.table = PageTable(pages, int(self.first[-1]))
         self._fades = Fades(drawing, self.table)
         self._uploader = Uploader(drawing, self.table, self.objects, nodes, self.first)
         self.weights = Weights(int(self.first[-1]), self._look())
@@ -227,11 +230,17 @@ class Stream:
         """Brings the arena nearer to the wanted levels; the leaves with other levels, and all that
         have other pages.
         """
-        table, fades, level = self.table, self._fades, wanted
+        table, fades = self.table, self._fades
+        over = [fades.end(np.flatnonzero(fades.leaves))] if self.converges else []
+        level = wanted = patient(self._tree, wanted, table.level, fades.leaves)
         gone = np.flatnonzero((wanted == NOT_DRAWN) & (table.level != NOT_DRAWN))
-        over = [fades.end(np.flatnonzero(fades.leaves) if self.converges else gone)]
+        out, into = NONE, NONE
+        if not self.converges and self._drawing.weighs_pages:
+            out, into = swapped(self._tree, wanted, table.level)
+        table.retire(out)
+        over.append(fades.end(np.setdiff1d(gone, out)))
         over.append(fades.advance())
-        pages = [table.free(gone)]
+        pages = [table.free(np.setdiff1d(gone, out))]
         due = np.flatnonzero(wanted != table.level)
         if not self.converges:
             at_hand = self._at_hand()
@@ -245,18 +254,21 @@ class Stream:
             level = np.where(fades.leaves, now, level)  # one change after the other
             due, level = self._first_of(np.flatnonzero(level != now), level, worth)
         fading = self._fading(due, level)
+        if fading is None:
+            pages.append(table.release(out))
+            fading = out = into = NONE
         table.retire(fading)
         pages.append(table.free(np.setdiff1d(due, fading)))
         self._drawing.clear_pages(np.concatenate(pages))
-        self._upload(due, level[due], fading)
+        self._upload(due, level[due], np.concatenate([fading, out, np.intersect1d(due, into)]))
         changed = np.concatenate([gone, due])
         return changed, np.concatenate([changed, *over])
 
-    def _fading(self, due: np.ndarray, level: np.ndarray) -> np.ndarray:
-        """Which of the leaves due (n,) keep old pages for some frames: where all find room."""
+    def _fading(self, due: np.ndarray, level: np.ndarray) -> np.ndarray | None:
+        """Which of the leaves due (n,) keep old pages for some frames; None: there is no room."""
         needed = pages_needed(self._counts(level)[due]).sum()
         if self.converges or not self._drawing.weighs_pages or not needed <= self.table.room:
-            return due[:0]
+            return None
         return due[self.table.level[due] != NOT_DRAWN]
 
     def _upload(self, leaves: np.ndarray, levels: np.ndarray, fading: np.ndarray) -> None:
