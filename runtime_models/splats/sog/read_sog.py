@@ -114,12 +114,15 @@ class Sog:
         found = found if isinstance(found, list) else [found]
         if key == "codebook" and len(found) == 256 and found[0] is None:
             found = [extrapolated(found), *found[1:]]
-        numeric = all(type(number) in (int, float) for number in found)
-        if not least <= len(found) <= most or not numeric:
+        if not least <= len(found) <= most or not set(map(type, found)) <= {int, float}:
             raise self.bad(f"{part} needs {least} to {most} numbers as its {key}")
-        if not all(abs(number) < LARGEST_NUMBER for number in found):  # False for NaN
+        try:
+            numbers = np.array(found, np.float64)
+        except OverflowError:  # a whole number beyond 1e308
+            numbers = np.array([np.inf])
+        if not (np.abs(numbers) < LARGEST_NUMBER).all():  # False for NaN
             raise self.bad(f"the {key} of {part} is not finite")
-        self.known[part, key] = np.array(found, np.float32)
+        self.known[part, key] = numbers.astype(np.float32)
         self.known[part, key].flags.writeable = False
         return self.known[part, key]
 

@@ -1,6 +1,8 @@
 """The files of a SOG: out of its folder or its zip, never more of them than its splats need."""
 
 import io
+import os
+import stat
 import zipfile
 from pathlib import Path
 from typing import IO
@@ -73,7 +75,7 @@ class SogFiles:
         if self.folder is not None:
             file = file_inside(self.folder, name, self.name)
             with file.open("rb") as stream:
-                return self._bounded(stream, name, limit, file.stat().st_size)
+                return self._bounded(stream, name, limit, os.fstat(stream.fileno()).st_size)
         check_name(name, self.name)
         with opened_zip(self.path, self.name, self.memory) as archive:
             entry = find_entry(archive, name)
@@ -127,11 +129,29 @@ def file_inside(folder: Path, name: str, said_by: str) -> Path:
     """The file of that name in the folder or below.  Raises BadFile: outside, or none there."""
     check_name(name, said_by)
     file = folder / name
+    if is_file_without_links(folder, name):  # a tenth of the time that all of it takes
+        return file
     if not file.resolve().is_relative_to(folder.resolve()):  # a link that leads outside
         raise BadFile(f"{said_by} names the file {name[:60]!r}, which is none of its own.")
     if not file.is_file():
         raise BadFile(f"{said_by} lacks {name[:60]!r}; copy the whole folder.")
     return file
+
+
+def is_file_without_links(folder: Path, name: str) -> bool:
+    """Whether there is a file of that name, and no link on the way to it from the folder."""
+    place, mode = str(folder), 0
+    try:
+        for part in name.split("/"):
+            place = os.path.join(place, part)
+            found = os.lstat(place)
+            mode = found.st_mode
+            # A junction of Windows is a directory with a tag.
+            if stat.S_ISLNK(mode) or getattr(found, "st_reparse_tag", 0):
+                return False
+    except OSError:
+        return False
+    return stat.S_ISREG(mode)
 
 
 def find_entry(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo | None:
