@@ -126,12 +126,10 @@ class Sog:
         self.known[part, key].flags.writeable = False
         return self.known[part, key]
 
-    def pixels(self, part: str, number: int = 0, channels: int = 4) -> np.ndarray:
-        """(N, 4) uint8: of each splat the pixel of one of a part's pictures; (N, 3) where three
-        channels are wanted and no more are in the file.
-        """
+    def pixels(self, part: str, number: int = 0) -> np.ndarray:
+        """(N, 4) uint8: of each splat the pixel of one of a part's pictures."""
         most = 4 * self.count + ROOM
-        picture = self.files.image(self.names(part)[number], self.count, most, channels)
+        picture = self.files.image(self.names(part)[number], self.count, most)
         return picture.reshape(-1, picture.shape[2])[: self.count]
 
     def palette(self) -> np.ndarray:
