@@ -6,7 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, clusters_of, find_unseen
+from shapeshift.rasterizer.clusters.clusters import (
+    CLUSTER,
+    Chosen,
+    Clusters,
+    clusters_of,
+    find_unseen,
+)
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
 from shapeshift.rasterizer.project import (
@@ -63,7 +69,7 @@ def project_arena(
     device: Device, mean_opacity, covariance, color, object_index, world_from_object,
     cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
     into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (), second_color=None,
-    clusters: Clusters | None = None, pages: PageMap | None = None,
+    clusters: Clusters | Chosen | None = None, pages: PageMap | None = None,
 ) -> list[Projected]:  # fmt: skip
     """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
 
@@ -78,7 +84,8 @@ def project_arena(
     antialiased: one an object, or none where no object is: opacity falls as the low pass grows the
     ellipse, by sqrt(det / det with it) (Mip-Splatting's 2D filter, gsplat's "antialiased").
     clusters: boxes of the same arena, by which it leaves out what no view sees: not with
-    keep_outside, and `into` must be the latest result that was made in its arrays.
+    keep_outside, and `into` must be the latest result that was made in its arrays.  Chosen ones are
+    projected into these, and what they hold of others stays; orders and counts are theirs alone.
     pages: the rows that are drawn, in pages of mean_opacity and covariance; color, second_color and
     object_index are theirs, N is their number.
     """
@@ -103,12 +110,16 @@ def project_arena(
         variant["ANTIALIASED"] = 1
     packed = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     frame = device.constants(np.concatenate(packed))
-    unseen = None
-    if clusters is not None:
-        said = into[0].unseen  # of rows that say "culled" already
-        unseen = device.empty(clusters_of(count), np.int32) if said is None else said
-        find_unseen(device, clusters, views, poses[0].size, frame, unseen, said is not None)
-    projected = [replace(p, low_pass=limits.low_pass, unseen=unseen) for p in into]
+    unseen = said = into[0].unseen  # of rows that say "culled" already
+    if isinstance(clusters, Clusters):
+        unseen = said = device.empty(clusters_of(count), np.int32) if said is None else said
+        asked = (views, orders, poses[0].size, frame, unseen, into[0].unseen is not None)
+        find_unseen(device, clusters, *asked)
+    elif clusters is not None:
+        unseen = clusters.unseen
+    else:
+        unseen = said = None
+    projected = [replace(p, low_pass=limits.low_pass, unseen=said) for p in into]
     buffers = [_buffers(p) for p in projected]
     scratch = projected[0].in_tiles
     device.launch(
@@ -129,7 +140,8 @@ def clusters_unseen(
     packed = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     unseen = device.empty(clusters.bounds.shape[0], np.int32)
     frame = device.constants(np.concatenate(packed))
-    find_unseen(device, clusters, len(cameras), poses[0].size, frame, unseen, False)
+    clusters = replace(clusters, occluders=None)
+    find_unseen(device, clusters, len(cameras), 0, poses[0].size, frame, unseen, False)
     found: np.ndarray = device.view(unseen) != 0
     return found
 

@@ -257,8 +257,9 @@ class Renderer:
     def _stats_of(self, sorts: int, color_sets: int) -> FrameStats:
         """The counters of the frame that was just drawn; they begin anew."""
         drawn = (culled := self.drawing.counts()).pop("drawn")
-        runs, self._geometry_runs, self._color_runs = (self._geometry_runs, self._color_runs), 0, 0
-        stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
+        told = (drawn, culled, self.drawing.hidden, self._geometry_runs, self._color_runs)
+        stats = FrameStats(self._timer.collect(), self._scene.splat_count, *told)
+        self._geometry_runs = self._color_runs = 0
         stats.sorts, stats.order_age, stats.color_sets = sorts, self.drawing.order_age, color_sets
         stats.debug = self._debug[0][1] if self._debug else stats.debug
         stats.streaming = self.streaming.stats
