@@ -91,6 +91,7 @@ class Arena:
         self._sorted = gpu.reserve(4)  # of counts, while others are counted
         self.command = gpu.upload(np.array([0, 1, 0, 0, 0], np.uint32))
         fit = min(STAGED_SPLATS, gpu.max_block // (4 * STAGED_FLOATS))
+        self.dispatch = gpu.upload(np.array([0, 1, 1], np.uint32))
         self.staged = min(max(counts, default=0), fit)
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
@@ -260,7 +261,7 @@ class Arena:
         for buffer in (
             self.mean_opacity, self.covariance, *self.colors, self.records,
             self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
-            self.command, self.staging, self._sorted,
+            self.command, self.dispatch, self.staging, self._sorted,
         ):  # fmt: skip
             buffer.release()
         for buffer in self._heats.values():

@@ -80,6 +80,15 @@ class Gpu:
         program.run(groups)
         self.ctx.memory_barrier()
 
+    def run_indirect(
+        self, program: moderngl.ComputeShader, groups: moderngl.Buffer, **uniforms: Any
+    ) -> None:
+        """The same with as many groups as a buffer (3,) of the GPU says."""
+        for name, value in uniforms.items():
+            program[name].value = value
+        program.run_indirect(groups)
+        self.ctx.memory_barrier()
+
     @contextmanager
     def drawing_into(self, framebuffer: moderngl.Framebuffer) -> Iterator[None]:
         """Binds a framebuffer for the body; then again what was bound, so that a window stays the
