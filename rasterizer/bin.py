@@ -65,21 +65,25 @@ def bin_tiles(
     Only with an order, and not for backward passes.
     """
     grid = grid_of(size)
+    form = form or device.kind
     if order is not None:
-        return _bin_chunks(device, projected, grid, order, hidden)
+        bin_ordered = {"cpu": _bin_chunks, "gpu": _bin_ordered_groups}[form]
+        return bin_ordered(device, projected, grid, order, hidden)
     if hidden is not None:
         raise ValueError("tiles are hidden from lists of a given order alone.")
-    bin_form = {"cpu": _bin_chunks, "gpu": _bin_groups}[form or device.kind]
-    return bin_form(device, projected, grid)
+    return {"cpu": _bin_chunks, "gpu": _bin_groups}[form](device, projected, grid)
 
 
-def sort_order(device: Device, scratch: TileScratch) -> "Array":
+def sort_order(device: Device, scratch: TileScratch, form: str | None = None) -> "Array":
     """(n,) int32: the splats that project_arena entered, by their keys, stable.
 
-    Once a projection: the first pass of the sort turns scratch.table into positions.
+    Once a projection: the first pass of the CPU form's sort turns scratch.table into positions.
+    form: as bin_tiles takes it.
     """
     status = device.view(scratch.status)
     visible = int(status[:, 0].sum(dtype=np.int64))
+    if (form or device.kind) == "gpu":
+        return _sort_groups(device, scratch, visible)
     kernels = device.program(KERNELS / "bin.cl")
     return _sort(
         device, kernels, scratch, visible, int(status[:, 2].min()), int(status[:, 3].max())
@@ -111,13 +115,52 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
     tile_of, intersections = device.empty(total, np.uint32), device.empty(total, np.int32)
     device.launch(
         kernels["write_intersections"], shown, 64,
-        shown, grid[0], order, projected.record, tile_bounds, offsets, slots, tile_of,
+        shown, grid[0], tiles, None, order, projected.record, tile_bounds, offsets, slots, tile_of,
         intersections, first_slot,
     )  # fmt: skip
     tile_of, intersections = sort_pairs(device, tile_of, intersections, (tiles - 1).bit_length())
     starts = device.empty(tiles + 1, np.int32)
     device.launch(kernels["find_starts"], total + 1, 64, total, tiles, tile_of, starts)
     return Tiles(grid, starts, intersections, tile_bounds, order[:shown], slot_count, first_slot)
+
+
+def _sort_groups(device: Device, scratch: TileScratch, visible: int) -> "Array":
+    """The GPU form of sort_order: a radix sort of all places, the empty ones last."""
+    kernels, count = device.program(KERNELS / "bin_gpu.cl"), scratch.pairs.shape[0]
+    keys, splats = device.empty(count, np.uint32), device.empty(count, np.int32)
+    device.launch(
+        kernels["unpack_pairs"], count, 64,
+        count, scratch.chunk, scratch.status, scratch.pairs, keys, splats,
+    )  # fmt: skip
+    return sort_pairs(device, keys, splats, 32)[1][:visible]
+
+
+def _bin_ordered_groups(
+    device: Device, projected: Projected, grid: tuple[int, int], order: "Array",
+    hidden: np.ndarray | None = None,
+) -> Tiles:  # fmt: skip
+    """The GPU form for an order that is there: one radix sort, by tiles."""
+    kernels, scratch = device.program(KERNELS / "bin_gpu.cl"), projected.scratch
+    if scratch is None or scratch.grid != grid:
+        raise ValueError("an order is of splats that project_arena has put on this grid.")
+    shown, tiles = order.shape[0], grid[0] * grid[1]
+    offsets = device.empty(shown + 1, np.int32)
+    at = (projected.record, scratch.tile_bounds)
+    device.launch(kernels["count_ordered"], shown + 1, 64, shown, order, *at, offsets)
+    prefix_sums(device, offsets)
+    total = int(device.view(offsets)[-1])
+    tile_of, intersections = device.empty(total, np.uint32), device.empty(total, np.int32)
+    covered = None if hidden is None else device.constants(hidden.astype(np.uint8).reshape(-1))
+    device.launch(
+        kernels["write_intersections"], shown, 64,
+        shown, grid[0], tiles, covered, order, *at, offsets, None, tile_of, intersections, None,
+    )  # fmt: skip
+    last = tiles - 1 if hidden is None else tiles
+    tile_of, intersections = sort_pairs(device, tile_of, intersections, last.bit_length())
+    starts = device.empty(tiles + 1, np.int32)
+    device.launch(kernels["find_starts"], total + 1, 64, total, tiles, tile_of, starts)
+    slots = int(device.view(scratch.status)[:, 1].sum(dtype=np.int64))
+    return Tiles(grid, starts, intersections, scratch.tile_bounds, order, slots)
 
 
 def _bin_chunks(

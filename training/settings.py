@@ -85,7 +85,11 @@ class TrainSettings:
     max_anchors: int = 12000
     """Most anchors; as far as there are points, a run starts with that many.  A capture of one
     modality with 16 or more training photos has 30000 of 2 splats with light by direction instead,
-    where none of --max-anchors, --splats-per-anchor, --anchor-attributes and --max-mb is given."""
+    layers with shapes of their own have 12000 a shape, where none of --max-anchors,
+    --splats-per-anchor, --anchor-attributes and --max-mb is given."""
+    max_by_shape: bool = False
+    """Whether max_anchors is of each shape that the modalities' hulls are, beside triangulated
+    points."""
     max_mb: float | None = None
     """Most megabytes of the package on disk, from the start on.  Default: no limit."""
     points: str = "auto"
@@ -187,10 +191,11 @@ SIZES = (*ONE_MODALITY, "max_mb")  # who gives one of these means all of them
 def suited(settings: TrainSettings, asked: Iterable[str], capture: Capture) -> TrainSettings:
     """New settings of a run as they suit a capture.  asked: fields that somebody gave."""
     photos = sum(photo.split == "train" for photo in capture.photos)
-    many = len(capture.stops) == 1 and photos >= MANY_PHOTOS
-    if not many or not set(asked).isdisjoint(SIZES):
+    if not set(asked).isdisjoint(SIZES):
         return settings
-    return replace(settings, **ONE_MODALITY)
+    if len(capture.stops) > 1:
+        return replace(settings, max_by_shape=True)
+    return replace(settings, **ONE_MODALITY) if photos >= MANY_PHOTOS else settings
 
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed

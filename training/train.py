@@ -22,7 +22,7 @@ from shapeshift.training.density.density_budget import anchor_cap
 from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
 from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color, camera_of
-from shapeshift.training.export import model_of, origin_in
+from shapeshift.training.export import model_of, notes_of
 from shapeshift.training.first_anchors.first_anchors import base_colors, first_anchors
 from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import initial_weights, padded
@@ -134,8 +134,8 @@ class Trainer(Run):
         first = initial_points(self.capture, photos, rng, settings.points, report, settings.seconds)
         self.warnings += first.doubts
         self.origin, background = first.origin, self.schedule.background
-        start = first_anchors(first, self.anchor_cap, photos, background)
-        self.voxel, count = start.voxel, len(start.anchors)
+        start = first_anchors(first, self.anchor_cap, photos, background, settings.max_by_shape)
+        self.voxel, self.anchor_cap, count = start.voxel, start.most, len(start.anchors)
         features = np.zeros((count, padded(settings.features)), np.float32)
         features[:, : settings.features] = (
             rng.normal(size=(count, settings.features)) * FEATURE_SPREAD
@@ -166,7 +166,7 @@ class Trainer(Run):
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
         self.set_start(notes.get("start_s", 0.0))
         self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
-        self.run_length = notes["run_length"]
+        self.run_length, self.anchor_cap = notes["run_length"], notes["anchor_cap"]
         self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
         values = {n: state[f"{n}.value"] for n in ("weights", *self.layout.per_anchor)}
         self.adam = Adam(self.device, values, self.all_rates())
@@ -186,6 +186,7 @@ class Trainer(Run):
             "rate_scale": self.rate_scale, "run_length": self.run_length,
             "first_loss": self.guard.first_loss, "settings": self.settings.as_dict(),
             "lr_warmup_start": self.lr_warmup.start, "start_s": self.start_s,
+            "anchor_cap": self.anchor_cap,
         }  # fmt: skip
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
         more = self.poses.state() | self.min_scale.state()
@@ -378,9 +379,8 @@ class Trainer(Run):
         return out
 
     def model(self) -> AnchorModel:
-        provenance = origin_in(self.capture) | {
+        provenance = notes_of(self.capture) | {
             "trained_by": "shapeshift train",
-            "capture": self.capture.folder.name,
             "settings": self.settings.as_dict(),
             "iterations": self.iteration,
             "voxel_m": self.voxel,

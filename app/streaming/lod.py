@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 LEAST_LEAF = 64  # splats: of smaller ones the tree would take more bytes than they
 MOST_LEAF = 1 << 19  # a leaf lies in one file
-BAKED = 0.2  # of the time
+BAKED = 0.01  # of the time: colours of splats are copied
+FITTED = 0.3  # those of anchors are fitted
 WHERE = {"stops": "at stops", "between": "between them"}
 PACKAGE_LEVELS = ".lod"  # as level_files.py has it, which is loaded when it is asked for
 
@@ -72,10 +73,16 @@ def run(options: Options) -> int:
         )
     check_output(options.out, [options.scene], options.overwrite)
     with progress_after(PATIENCE_S) as progress:
-        splats = bake_scene(options, progress)
+        splats, baked = bake_scene(options, progress)
         for finding in splats.findings:
             say(sentence(finding))
-        sizes = write_folder(splats, options, progress)
+
+        def report(part: float) -> None:
+            progress(
+                f"merging and writing {len(splats.means):,} splats", baked + (1 - baked) * part
+            )
+
+        sizes = write_folder(splats, options, report)
     size = sum(file.stat().st_size for file in options.out.rglob("*") if file.is_file())
     counts = ", ".join(f"{count:,}" for count in sizes.levels)
     say(
@@ -127,8 +134,13 @@ def write_package_levels(options: Options) -> int:
     return 0
 
 
-def bake_scene(options: Options, progress: Callable[[str, float], None]) -> "PlainSplats":
-    """All that is visible as plain splats, where it stands.  Raises BadFile and UsageError."""
+def bake_scene(
+    options: Options, progress: Callable[[str, float], None]
+) -> "tuple[PlainSplats, float]":
+    """All that is visible as plain splats, where it stands, and how much of the time that was.
+
+    Raises BadFile and UsageError.
+    """
     from dataclasses import replace
 
     import numpy as np
@@ -137,6 +149,7 @@ def bake_scene(options: Options, progress: Callable[[str, float], None]) -> "Pla
     from shapeshift.app.commands.exported import ExportLook, Part, bake_part
     from shapeshift.app.document import open_document
     from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.model import SplatLayers
     from shapeshift.runtime_models.shapes import three
     from shapeshift.runtime_models.splats.write_plain import merged
 
@@ -151,23 +164,21 @@ def bake_scene(options: Options, progress: Callable[[str, float], None]) -> "Pla
     elif options.x:
         objects = [obj for obj in document.placed(options.x).scene.objects if obj.visible]
     parts = []
+    share = BAKED if all(isinstance(obj.model, SplatLayers) for obj in objects) else FITTED
     for number, obj in enumerate(objects):
-        progress(f"baking {obj.name}", BAKED * number / len(objects))
+        progress(f"baking {obj.name}", share * number / len(objects))
         parts.append(bake_part(Part(obj), ExportLook(options.sh_degree)))
     splats = merged(parts)
-    return replace(splats, origin=three(np.add(splats.origin, document.origin)))
+    return replace(splats, origin=three(np.add(splats.origin, document.origin))), share
 
 
 def write_folder(
-    splats: "PlainSplats", options: Options, progress: Callable[[str, float], None]
+    splats: "PlainSplats", options: Options, progress: Callable[[float], None]
 ) -> "StreamedSizes":
     """The folder, all or nothing."""
     from shapeshift.runtime_models.files.whole_file import whole_folder
     from shapeshift.runtime_models.splats.sog.write_streamed import write_streamed
 
-    def report(part: float) -> None:
-        progress(f"merging and writing {len(splats.means):,} splats", BAKED + (1 - BAKED) * part)
-
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with whole_folder(options.out) as folder:
-        return write_streamed(splats, folder, options.leaf, "shapeshift lod", report)
+        return write_streamed(splats, folder, options.leaf, "shapeshift lod", progress)

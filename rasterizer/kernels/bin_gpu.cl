@@ -1,7 +1,8 @@
 // bin, GPU form: splats -> the lists of intersections; one work-item a splat, sorts in sort_gpu.cl.
 // Depths are sorted, intersections written in that order, then sorted by tile: stable, so each
 // tile's list is near to far, and the same as that of bin.cl.
-// Reads:   record (N, 12) and depth (N,) of project.
+// Reads:   record (N, 12) and depth (N,) of project; or of project_arena record, tile_bounds,
+//          status and pairs, whose order several views may share.
 // Writes:  tile_bounds (N, 2), keys and order, tile_of and intersections, starts (tiles + 1),
 //          first_slot.
 // Units:   pixels and tiles; depths in metres, sorted as the bits of floats above 0.
@@ -20,6 +21,18 @@ __kernel void find_tile_bounds(int count, int tiles_x, int tiles_y, __global con
   tile_bounds[i] = bounds;
   keys[i] = bounds.x >= MASKED ? as_uint(depth[i]) : ABSENT;  // positive floats sort as their bits
   splats[i] = i;
+}
+
+// Pairs of splat and key that every chunk has packed at its start -> keys and splats of all places,
+// ABSENT in the empty ones.  status: x: how many pairs a chunk has.
+__kernel void unpack_pairs(int count, int chunk, __global const uint4* status,
+                           __global const uint2* pairs, __global uint* keys,
+                           __global int* splats) {
+  const int i = get_global_id(0);
+  if (i >= count) return;
+  const bool here = i % chunk < (int)status[i / chunk].x;
+  keys[i] = here ? pairs[i].y : ABSENT;
+  splats[i] = here ? (int)pairs[i].x : 0;
 }
 
 // The number of list entries of a splat; of a box the rows are walked to count, and again to write.
@@ -51,25 +64,42 @@ __kernel void count_intersections(int count, __global const uint* keys, __global
   if (!here && (k == 0 || keys[k - 1] != ABSENT)) visible[0] = k;
 }
 
+// The same of an order from elsewhere: of splats that this view does not show, none.
+__kernel void count_ordered(int count, __global const int* order, __global const float* record,
+                            __global const uint2* tile_bounds, __global int* intersections_of) {
+  const int k = get_global_id(0);
+  if (k > count) return;
+  const bool here = k < count && tile_bounds[order[k]].x >= MASKED;
+  // entry `count` becomes the total
+  intersections_of[k] =
+      here ? intersections_at(record + (size_t)RECORD * order[k], tile_bounds[order[k]]) : 0;
+}
+
+// Number `tiles` stands for all tiles that are hidden: their entries are sorted behind every list.
+inline uint list_of(int tile, int tiles, __global const uchar* hidden) {
+  return hidden && hidden[tile] ? tiles : tile;
+}
+
 // Prefix sums of the counts said where each splat's entries go (offsets) and its slots (slots).
-__kernel void write_intersections(int count, int tiles_x, __global const int* order,
-                              __global const float* record, __global const uint2* tile_bounds,
-                              __global const int* offsets, __global const int* slots,
-                              __global uint* tile_of, __global int* intersections,
-                              __global int* first_slot) {
+__kernel void write_intersections(int count, int tiles_x, int tiles, __global const uchar* hidden,
+                                  __global const int* order, __global const float* record,
+                                  __global const uint2* tile_bounds, __global const int* offsets,
+                                  __global const int* slots, __global uint* tile_of,
+                                  __global int* intersections, __global int* first_slot) {
   const int k = get_global_id(0);
   if (k >= count) return;
   const int splat = order[k];
   const uint2 bounds = tile_bounds[splat];
   // Number k in depth order: its entries follow those of all nearer splats.
   int to = offsets[k];
-  first_slot[splat] = slots[k];
+  if (first_slot) first_slot[splat] = slots[k];
+  if (!(bounds.x >= MASKED)) return;
   const int tile = BOUNDS_ROW(bounds) * tiles_x + BOUNDS_COLUMN(bounds);
   if (bounds.x & MASKED) {
     // The tile mask: mask & (mask - 1) clears the lowest bit, the ones below it are its number.
     for (uint mask = bounds.y; mask; mask &= mask - 1) {
       const int bit = popcount(~mask & (mask - 1));  // number of the lowest
-      tile_of[to] = tile + (bit >> 3) * tiles_x + (bit & 7);
+      tile_of[to] = list_of(tile + (bit >> 3) * tiles_x + (bit & 7), tiles, hidden);
       intersections[to++] = splat;
     }
     return;
@@ -79,7 +109,7 @@ __kernel void write_intersections(int count, int tiles_x, __global const int* or
   for (int row = 0; row < (int)(bounds.y >> 16); row++) {
     const int2 span = columns_of_row(&ellipse, row);
     for (int column = span.x; column < span.y; column++) {
-      tile_of[to] = tile + row * tiles_x + column;
+      tile_of[to] = list_of(tile + row * tiles_x + column, tiles, hidden);
       intersections[to++] = splat;
     }
   }

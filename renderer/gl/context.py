@@ -2,6 +2,7 @@
 
 import ctypes
 import sys
+from collections.abc import Callable
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_int, c_uint, c_void_p
 
 import moderngl
@@ -22,6 +23,8 @@ EGL_PLATFORM_DEVICE, EGL_PLATFORM_SURFACELESS = 0x313F, 0x31DD
 EGL_OPENGL_API, EGL_NONE = 0x30A2, 0x3038
 EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_SURFACE_TYPE, EGL_PBUFFER_BIT = 0x3040, 8, 0x3033, 1
 EGL_MAJOR, EGL_MINOR, EGL_PROFILE, EGL_CORE_BIT = 0x3098, 0x30FB, 0x30FD, 1
+# Asked for one after the other; 3.3 last, so that a driver that is too old answers and is named.
+VERSIONS = ((4, 6), (4, 5), (4, 3), (3, 3))
 # GL/osmesa.h
 OSMESA_FORMAT, OSMESA_DEPTH_BITS, OSMESA_PROFILE, OSMESA_CORE = 0x22, 0x30, 0x33, 0x34
 OSMESA_MAJOR, OSMESA_MINOR, GL_RGBA, GL_UNSIGNED_BYTE = 0x36, 0x37, 0x1908, 0x1401
@@ -174,9 +177,14 @@ def _egl_current(egl: ctypes.CDLL, display: int | None) -> _Current:
     config, count = c_void_p(), c_int(0)
     found = egl.eglChooseConfig(display, wanted, byref(config), 1, byref(count))
     need(found and count.value, "eglChooseConfig")
-    # 3.3 is asked for so that an old driver answers and can be named; drivers give their newest.
-    version = (c_int * 7)(EGL_MAJOR, 3, EGL_MINOR, 3, EGL_PROFILE, EGL_CORE_BIT, EGL_NONE)
-    made = need(egl.eglCreateContext(display, config, None, version), "eglCreateContext")
+
+    def create(major: int, minor: int) -> int | None:
+        version = (c_int * 7)(
+            EGL_MAJOR, major, EGL_MINOR, minor, EGL_PROFILE, EGL_CORE_BIT, EGL_NONE
+        )  # fmt: skip
+        return egl.eglCreateContext(display, config, None, version)
+
+    made = need(create_newest(create), "eglCreateContext")
 
     def destroy() -> None:
         egl.eglMakeCurrent(display, None, None, None)
@@ -187,6 +195,14 @@ def _egl_current(egl: ctypes.CDLL, display: int | None) -> _Current:
         lambda: need(egl.eglMakeCurrent(display, None, None, made), "eglMakeCurrent"),
         destroy,
     )
+
+
+def create_newest(create: Callable[[int, int], int | None]) -> int | None:
+    """What `create` makes of the newest version that it takes; None: of none.
+
+    Mesa gives its newest whatever is asked for, NVIDIA's driver just what is asked for.
+    """
+    return next(filter(None, (create(*version) for version in VERSIONS)), None)
 
 
 def _open_osmesa() -> _Current:

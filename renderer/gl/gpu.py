@@ -36,9 +36,9 @@ class Gpu:
                 "draw with --drawing tiles."
             )
         self.allocations += 1
-        buffer = self.ctx.buffer(reserve=max(size, 4))
-        buffer.clear()
-        return buffer
+        # Not clear(): it maps the buffer, and of what is written into it afterwards NVIDIA's driver
+        # 580 keeps the first write alone.  Zeros that nobody touched take no memory here.
+        return self.ctx.buffer(bytes(max(size, 4)))
 
     def upload(self, array: np.ndarray, what: str = "buffer") -> moderngl.Buffer:
         """A buffer with the bytes of an array."""

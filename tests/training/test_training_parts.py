@@ -210,6 +210,10 @@ def test_settings_name_the_networks():
         TrainSettings(fixed="shape")
 
 
+def a_view() -> View:
+    return View(look_at(np.ones(3), np.zeros(3)), perspective(0.7, (4, 4)), 0.05, 9.0, (4, 4))
+
+
 @pytest.mark.parametrize(
     ("asked", "stops", "photos", "own"),
     [
@@ -217,7 +221,6 @@ def test_settings_name_the_networks():
         ((), 1, 15, False),
         ((), 1, 500, True),
         (("iterations", "points", "seed", "features", "downscale"), 1, 16, True),
-        ((), 2, 60, False),
         *(((name,), 1, 60, False) for name in (*ONE_MODALITY, "max_mb")),
     ],
 )
@@ -225,7 +228,7 @@ def test_a_scene_that_never_changes_has_more_anchors_with_light(asked, stops, ph
     """Unless there are few training photos, or somebody says how many or of what kind; nothing else
     differs.
     """
-    view = View(look_at(np.ones(3), np.zeros(3)), perspective(0.7, (4, 4)), 0.05, 9.0, (4, 4))
+    view = a_view()
     splits = ["train"] * photos + ["test"] * 20
     taken = tuple(Photo(view, Path(f"{i}.png"), "0", split=s) for i, s in enumerate(splits))
     capture = Capture(Path(), tuple(Stop(str(i), 0.1 * i) for i in range(stops)), taken)
@@ -237,6 +240,19 @@ def test_a_scene_that_never_changes_has_more_anchors_with_light(asked, stops, ph
     assert found == replace(settings, **ONE_MODALITY)
     assert found.max_anchors * found.splats_per_anchor == 60000  # as many splats as without
     assert found.layout(2).per_anchor[-1] == "light"
+
+
+@pytest.mark.parametrize(
+    ("asked", "stops", "counted"),
+    [((), 1, False), ((), 2, True), (("seed", "seconds"), 7, True)]
+    + [((name,), 3, False) for name in (*ONE_MODALITY, "max_mb")],
+)
+def test_anchors_of_several_modalities_are_counted_for_each_shape(asked, stops, counted):
+    """Unless somebody says how many there may be, or of what kind; nothing else differs."""
+    taken = tuple(Photo(a_view(), Path(f"{i}.png"), "0", split="train") for i in range(9))
+    capture = Capture(Path(), tuple(Stop(str(i), 0.1 * i) for i in range(stops)), taken)
+    settings = TrainSettings(seed=7)
+    assert suited(settings, asked, capture) == replace(settings, max_by_shape=counted)
 
 
 def test_rates_decay_further_in_long_runs():

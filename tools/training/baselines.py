@@ -1,18 +1,20 @@
 """One shape-shifting model beside separate models and plain splats: dB against seconds and bytes.
 
     python3 tools/training/baselines.py CAPTURE [CAPTURE ...] --seconds 60 240 900 \
-        --sizes 0.1 0.3 1 --out WORK --csv docs/bench/baselines.csv [--methods joint] [--vgg FILE]
+        --sizes 0.1 0.3 1 --out WORK --csv docs/bench/baselines.csv [--seeds 0 1] \
+        [--methods joint] [--vgg FILE]
 
 CAPTURE is a folder of posed photos, or `balls`, `workshop` or `one_shape`, which are made on the
 spot.  Each budget of `--seconds` is a `launch.py table` of all methods at full size; then, with the
 last budget, the shape-shifting model and plain splats once more at each of `--sizes`: that share of
-the splats to start with and of both caps.  Tables lie in WORK/CAPTURE/...; what is there is not run
-again, so an interrupted run goes on where it was.
+the splats to start with and of both caps; all of it with each of `--seeds`.  Tables lie in
+WORK/CAPTURE/...; what is there is not run again, so an interrupted run goes on where it was.
 """
 
 import argparse
 import sys
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -35,6 +37,7 @@ def main() -> int:
     parser.add_argument("captures", nargs="+")
     parser.add_argument("--seconds", type=float, nargs="+", required=True)
     parser.add_argument("--sizes", type=float, nargs="*", default=[])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
     parser.add_argument("--max-anchors", type=int, default=TrainSettings().max_anchors)
     parser.add_argument("--out", type=Path, required=True)
@@ -46,10 +49,13 @@ def main() -> int:
     rows, head = [], [command_of(asked)]
     for name in asked.captures:
         folder = made(name, asked.out)
-        for seconds, size, methods in plan(asked.seconds, asked.sizes, asked.methods):
-            out = asked.out / folder.name / f"{seconds:g} s size {size:g}"
+        plans = plan(asked.seconds, asked.sizes, asked.methods)
+        for seed, (seconds, size, methods) in product(asked.seeds, plans):
+            named = f"{seconds:g} s size {size:g}" + (f" seed {seed}" if seed else "")
+            out = asked.out / folder.name / named
             out.mkdir(parents=True, exist_ok=True)
             asked_of, of_splats = caps(size, asked)
+            asked_of |= {"seed": seed} if seed else {}
             options = Options(
                 folder, out, asked_of, seconds=seconds, methods=methods, vgg=asked.vgg,
                 splats=of_splats, cluster=asked.cluster, certificates=asked.certificates,
@@ -59,7 +65,7 @@ def main() -> int:
                 return code
             found, machine = read_table(out / "table.csv", asked.vgg is not None)
             head = [*head[:1], machine]
-            about = {"capture": folder.name, "budget_s": seconds, "size": size}
+            about = {"capture": folder.name, "budget_s": seconds, "size": size, "seed": seed}
             rows += [about | asdict(row) for row in found]
             write_rows(asked.csv, head, tuple(rows[0]), rows)
     return 0
@@ -122,6 +128,7 @@ def command_of(asked: argparse.Namespace) -> str:
     words = [f"python3 tools/training/baselines.py {names}"]
     words += [f"--seconds {' '.join(f'{s:g}' for s in asked.seconds)}"]
     words += [f"--sizes {' '.join(f'{s:g}' for s in asked.sizes)}"] if asked.sizes else []
+    words += [f"--seeds {' '.join(map(str, asked.seeds))}"] if asked.seeds != [0] else []
     words += [f"--methods {' '.join(asked.methods)}"] if asked.methods != METHODS else []
     usual = TrainSettings()
     caps_differ = asked.max_anchors != usual.max_anchors

@@ -21,6 +21,8 @@ NEIGHBOURS = 3  # whose distance is an anchor's size, as the first scale of 3DGS
 SURFACE = 9  # nearest points, an anchor's own place among them, that say how a surface lies
 FLATNESS = (0.3, 2.0)  # least and most of an axis, in the geometric mean of the three
 SAME_PLACE = 1.0  # of its neighbours' distance, to a place of another shape
+NEAR_PLACE = 2.0  # the same where shapes are counted: hulls out of other photos differ by cells
+OTHER_SHAPE = 0.25  # of a hull's places: so many apart from all others make it a shape of its own
 SIZES = 30.0  # times, from the median: what is nearer or farther than that is an outlier
 COLOR_PHOTOS = 24  # that the first colours are taken from
 DARKEST, BRIGHTEST = 0.02, 0.98  # of a base colour: beyond, its logit would not move any more
@@ -34,15 +36,19 @@ class FirstAnchors(NamedTuple):
     colors: np.ndarray  # (A, 3) logits
     light: np.ndarray  # (A, 8) logits, none yet: colours are alike from everywhere
     voxel: float  # metres: the median size
+    most: int  # anchors that there may be
 
 
 def first_anchors(
-    first: InitialPoints, most: int, photos: list[LoadedPhoto], background: tuple | None
-) -> FirstAnchors:
-    """At most `most` anchors at the points of a capture.
+    first: InitialPoints, most: int, photos: list[LoadedPhoto], background: tuple | None,
+    by_shape: bool = False,
+) -> FirstAnchors:  # fmt: skip
+    """At most `most` anchors at the points of a capture, by_shape for each shape that it has.
 
     background: of the photos where they are see-through; None: black.
     """
+    if by_shape:
+        most = cap_of_shapes(first, most)
     places = choose_positions(first, most)
     size = neighbour_distance(places)
     voxel = max(float(np.median(size)), 1e-9)  # of places that float32 cannot tell apart: 0
@@ -52,7 +58,7 @@ def first_anchors(
     at, axes = (a.astype(np.float32) for a in (places, frames))
     logits = base_colors(places, photos, background)
     light = np.zeros((len(at), ATTRIBUTE_WIDTH["light"]), np.float32)
-    return FirstAnchors(at, axes, logits, light, voxel)
+    return FirstAnchors(at, axes, logits, light, voxel, most)
 
 
 def base_colors(
@@ -73,26 +79,49 @@ def choose_positions(first: InitialPoints, most: int) -> np.ndarray:
     return np.concatenate([subsample(points, most - len(guesses)), guesses])
 
 
+def cap_of_shapes(first: InitialPoints, most: int) -> int:
+    """`most` anchors for each shape that hulls beside triangulated points are.
+
+    Hulls that lie over each other are one shape; of layers, one within the other, each asks for
+    anchors of its own.
+    """
+    share = int(first.guess_share * most)
+    if len(first.guess_shapes) < 2 or share < 1:
+        return most
+    apart = places_apart(first, share, NEAR_PLACE)
+    return most * sum(len(places) >= OTHER_SHAPE * of for places, of in apart)
+
+
 def choose_guesses(first: InitialPoints, share: int, most: int) -> np.ndarray:
     """(G, 3) of the guesses: `share`, or of several shapes so many of each and `most` in all.
 
     One stop's shape may lie within another's that has more points, and would get few anchors.
-    Where shapes lie over each other, the places of the denser one serve both.
+    """
+    if len(first.guess_shapes) < 2 or share < 1:
+        return subsample(first.guesses, share)
+    apart = places_apart(first, share, SAME_PLACE)
+    return subsample(np.concatenate([places for places, _ in apart]), most)
+
+
+def places_apart(first: InitialPoints, share: int, same: float) -> list[tuple[np.ndarray, int]]:
+    """Of each shape the places (G, 3) that no denser one has, and of how many these are.
+
+    Each has `share` places, those of the densest serve all that lie over it.  same: up to so many
+    times its neighbours' distance a place is another shape's as well.
     """
     from scipy.spatial import cKDTree
 
-    if len(first.guess_shapes) < 2:
-        return subsample(first.guesses, share)
     each = [subsample(shape, share) for shape in first.guess_shapes]
     spaces = [neighbour_distance(places) for places in each]
-    chosen = np.zeros((0, 3))
+    chosen, found = np.zeros((0, 3)), []
     for number in sorted(range(len(each)), key=lambda n: spaces[n].mean()):
         places = each[number]
         if len(chosen):
             distance, _ = cKDTree(chosen).query(places)
-            places = places[distance > SAME_PLACE * spaces[number]]
+            places = places[distance > same * spaces[number]]
         chosen = np.concatenate([chosen, places])
-    return subsample(chosen, most)
+        found.append((places, len(each[number])))
+    return found
 
 
 def subsample(points: np.ndarray, most: int) -> np.ndarray:
@@ -116,7 +145,7 @@ def subsample(points: np.ndarray, most: int) -> np.ndarray:
         order = np.argsort(part[:, np.ptp(part, axis=0).argmax()], kind="stable")
         parts.append((rows[order[middle:]], count - half))
         parts.append((rows[order[:middle]], half))
-    return points[np.sort(found)]
+    return points[np.sort(np.array(found, int))]
 
 
 def neighbour_distance(points: np.ndarray) -> np.ndarray:

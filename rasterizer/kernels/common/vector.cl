@@ -42,16 +42,19 @@ typedef uint8 uintv;
 #define MAXIMUM(a, b) ((a) > (b) ? (a) : (b))
 #define MINIMUM(a, b) ((a) < (b) ? (a) : (b))
 #define HALF_LOG2E 0.72134752044f  // log2(e) / 2: exponents of 2 out of halves of squares
-#ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
+// Fetched ahead where clang compiles for the CPU itself, as PoCL does: there __global is plain
+// memory.  For a GPU it is an address space, which the builtin's plain pointer refuses.
+#if defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__))
 #define PREFETCH(address) __builtin_prefetch(address)
 #define PREFETCH_TO_WRITE(address) __builtin_prefetch(address, 1)
-// Newer than the two above.
-#if __has_builtin(__builtin_nontemporal_store)
-#define STREAM(value, to) __builtin_nontemporal_store(value, to)
-#endif
 #else
 #define PREFETCH(address)
 #define PREFETCH_TO_WRITE(address)
+#endif
+#ifdef __has_builtin
+#if __has_builtin(__builtin_nontemporal_store)
+#define STREAM(value, to) __builtin_nontemporal_store(value, to)
+#endif
 #endif
 // A store past the caches, of what is larger than they are and read much later: the line that is
 // written over is not read first.  `to` is aligned as its type is.

@@ -6,15 +6,10 @@
 // Numbers that are soon read, and rows that are soon written, come into the cache while others are
 // worked on: a store that waits for its row holds up all behind it.
 #define LINE 16  // floats
-#ifdef __has_builtin
 #define FETCH(from, floats) \
-  for (int i = 0; i < (floats); i += LINE) __builtin_prefetch((from) + i);
+  for (int i = 0; i < (floats); i += LINE) PREFETCH((from) + i);
 #define FETCH_TO_WRITE(from, floats) \
-  for (int i = 0; i < (floats); i += LINE) __builtin_prefetch((from) + i, 1);
-#else
-#define FETCH(from, floats)
-#define FETCH_TO_WRITE(from, floats)
-#endif
+  for (int i = 0; i < (floats); i += LINE) PREFETCH_TO_WRITE((from) + i);
 
 // Four columns of the rows of a block's splats, `stride` floats from anchor to anchor; n anchors.
 #if WIDTH == 1

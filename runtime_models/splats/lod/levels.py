@@ -12,6 +12,7 @@ from shapeshift.runtime_models.splats.operations.moment_matching import merge_gr
 
 LEAST = 32  # splats of a leaf on average; coarser levels would only add to the files
 MOST_LEVELS = 10
+PAIRING = 0.7  # of the time that a level takes; the rest is for its moments and errors
 LEAST_WEIGHT = 1e-300  # m^2: of a leaf that shows nothing, whose errors are 0
 
 
@@ -34,9 +35,9 @@ def count_levels(splats: int, leaves: int) -> int:
 
 
 def make_levels(
-    splats: SplatLayers, leaves: Leaves, count: int, progress: Callable[[float], None]
+    splats: SplatLayers, leaves: Leaves, count: int, merged: Callable[[int, float], None]
 ) -> Iterator[Level]:
-    """`count` levels, the finest first.
+    """`count` levels, the finest first.  merged(level, part 0..1): how far each coarser one is.
 
     Merging does not cross leaves, and chooses over all of them at once: a smooth leaf gets coarse
     sooner than one of fine detail.  The error of a leaf is the loss of merge_pairs from level 0 on,
@@ -50,12 +51,16 @@ def make_levels(
     errors = np.zeros(leaves.count)
     yield Level(0, splats, leaf, errors)
     for number in range(1, count):
-        group = pair_groups(splats, len(leaf) // 2, kinds=leaf)
+
+        def paired(part: float, number: int = number) -> None:
+            merged(number, PAIRING * part)
+
+        group = pair_groups(splats, len(leaf) // 2, paired, kinds=leaf)
         splats, into = merge_groups(splats, group)
         rows = np.empty(splats.splat_count, np.int32)
         rows[into] = leaf
         leaf, row_of = rows, into[row_of]
         losses = np.bincount(first_leaf, merging_losses(finest, splats, row_of), leaves.count)
         errors = np.maximum(errors, losses / np.maximum(weight, LEAST_WEIGHT))
-        progress(number / (count - 1))
+        merged(number, 1.0)
         yield Level(number, splats, leaf, errors)

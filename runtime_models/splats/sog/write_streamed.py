@@ -22,8 +22,11 @@ from shapeshift.runtime_models.splats.sog.write_sog import write_sog
 MOST_OF_A_FILE = 1 << 16
 REACH = 3.0  # sigmas of a splat that its leaf's box holds
 DIGITS = 6  # of a bound and an error
-MERGED = 0.1  # of the time that a level takes before its files are written
+# Processor seconds a million splats, of which progress is told.
+CUTTING, MERGING, WRITING = 0.6, 3.5, 0.9
+HARMONICS = 0.27  # more for WRITING, each coefficient
 Box = tuple[np.ndarray, np.ndarray]  # (3,) least and most, metres
+OfLevel = Callable[[int, float], None]
 
 
 @dataclass(frozen=True)
@@ -44,8 +47,10 @@ def write_streamed(
     """lod-meta.json and its files into an existing folder, of at least one splat.
 
     Leaves have at most leaf_splats splats at the finest level; all of them have every level, with
-    an error that readers spend their budget by.  Raises BadFile where the tree gets too large.
+    an error that readers spend their budget by.  progress(part 0..1) is of the time that it takes.
+    Raises BadFile where the tree gets too large.
     """
+    progress(0.0)
     turned = rotate_half_turn(splats)
     flat = SplatLayers(
         turned.means, turned.scales, turned.wxyz, turned.opacity,
@@ -58,9 +63,11 @@ def write_streamed(
     boxes: list[Box] = [(np.full(3, np.inf), np.full(3, -np.inf))] * leaves.count
     names: list[str] = []
     sizes = []
-    for level in make_levels(flat, leaves, count, lambda part: progress(MERGED + part * 0.8)):
+    merged, written = parts_of(count, turned.sh.shape[1], progress)
+    merged(0, 1.0)
+    for level in make_levels(flat, leaves, count, merged):
         sizes.append(level.splats.splat_count)
-        names += write_level(level, folder, nodes, len(names), generator)
+        names += write_level(level, folder, nodes, len(names), generator, written)
         boxes = [around(box, other) for box, other in zip(boxes, boxes_of(level), strict=True)]
     meta = {
         "version": 1,
@@ -81,9 +88,32 @@ def write_streamed(
     return StreamedSizes(leaves.count, tuple(sizes))
 
 
+def parts_of(
+    count: int, coefficients: int, progress: Callable[[float], None]
+) -> tuple[OfLevel, OfLevel]:
+    """(merged, written): (level, part of it 0..1), told as a part of the time of `count` levels.
+
+    Level 0 is cut instead of merged.
+    """
+    writing = WRITING + HARMONICS * (coefficients - 1)
+    pieces = [CUTTING, writing]
+    for level in range(1, count):
+        pieces += [MERGING * 0.5 ** (level - 1), writing * 0.5**level]
+    ends = np.r_[0.0, np.cumsum(pieces)] / sum(pieces)
+
+    def report(piece: int, part: float) -> None:
+        progress(float(ends[piece] + (ends[piece + 1] - ends[piece]) * part))
+
+    return (
+        lambda level, part: report(2 * level, part),
+        lambda level, part: report(2 * level + 1, part),
+    )
+
+
 def write_level(
-    level: Level, folder: Path, nodes: list[dict], first_file: int, generator: str
-) -> list[str]:
+    level: Level, folder: Path, nodes: list[dict], first_file: int, generator: str,
+    written: OfLevel,
+) -> list[str]:  # fmt: skip
     """Writes a level, leaf after leaf, and notes where each run lies; gives the files' names."""
     ends = np.cumsum(np.bincount(level.leaf, minlength=len(nodes)))
     names: list[str] = []
@@ -102,6 +132,7 @@ def write_level(
         write_sog(plain_rows(level.splats, slice(start, stop)), folder / name, generator)
         names.append(f"{name}/meta.json")
         start, leaf = stop, last
+        written(level.number, stop / ends[-1])
     return names
 
 

@@ -323,12 +323,13 @@ def test_a_comparison_that_was_ended_goes_on(balls, tmp_path, monkeypatch):
 
 
 def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
-    """tools/training/baselines.py at its smallest: budgets, sizes, and nothing is run twice."""
+    """tools/training/baselines.py at its smallest: budgets, sizes, seeds, nothing twice."""
     path = Path(__file__).resolve().parents[3] / "tools" / "training" / "baselines.py"
     spec = importlib.util.spec_from_file_location("baselines", path)
     program = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(program)
     words = [str(balls.folder), "--seconds", "0.3", "--sizes", "0.02", "--downscale", "2"]
+    words += ["--seeds", "0", "3"]
     words += ["--out", str(tmp_path / "work"), "--csv", str(tmp_path / "rows.csv")]
     monkeypatch.setattr(
         program, "caps",
@@ -340,8 +341,16 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     assert lines[0].startswith(
         f"# python3 tools/training/baselines.py {balls.folder.name} --seconds"
     )
+    assert " --sizes 0.02 --seeds 0 3 --downscale 2 " in lines[0]
     rows = list(csv.DictReader(lines[2:]))
-    assert len(rows) == 4 * 3 + 3 * 3 and {row["size"] for row in rows} == {"1.0", "0.02"}
+    for seed in ("0", "3"):
+        mine = [row for row in rows if row["seed"] == seed]
+        assert len(mine) == 4 * 3 + 3 * 3 and {row["size"] for row in mine} == {"1.0", "0.02"}
+    work = tmp_path / "work" / balls.folder.name
+    for seed, name in ((0, "0.3 s size 1"), (3, "0.3 s size 1 seed 3")):
+        provenance = read_model(work / name / "joint.shift").provenance
+        assert provenance["settings"]["seed"] == seed
+        assert ("--seed 3" in (work / name / "table.csv").read_text()) == bool(seed)
     assert program.main() == 0
     assert (tmp_path / "rows.csv").read_text().splitlines() == lines
     plan = program.plan([60, 9], [1, 0.1], program.METHODS)

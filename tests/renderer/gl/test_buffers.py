@@ -131,3 +131,18 @@ def test_a_sweep_of_200_steps_allocates_nothing(gpu, mlps, sort):
             frame(float(x))
         assert gpu.allocations == before
         assert sum(projector.counts(arena).values()) == 220
+
+
+@pytest.mark.parametrize("n", [1, 3, 255, 256, 1000])
+def test_a_new_buffer_is_zero_and_keeps_every_part_that_is_written(gpu, n):
+    """After a map NVIDIA's driver 580 kept the first of these writes alone."""
+    buffer = gpu.reserve(16 * n)
+    assert buffer.read() == bytes(16 * n)
+    parts = np.random.default_rng(n).integers(1, 1 << 30, (4, n), np.uint32)
+    for k, part in enumerate(parts):
+        buffer.write(part, offset=4 * n * k)
+    copy = gpu.reserve(16 * n)
+    gpu.ctx.copy_buffer(copy, buffer)
+    for each in (buffer, copy):
+        np.testing.assert_array_equal(np.frombuffer(each.read(), np.uint32), parts.reshape(-1))
+        each.release()

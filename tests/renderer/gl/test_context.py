@@ -9,7 +9,15 @@ import moderngl
 import numpy as np
 import pytest
 
-from shapeshift.renderer.gl.context import KINDS, NoContext, describe, is_software, open_context
+from shapeshift.renderer.gl.context import (
+    KINDS,
+    VERSIONS,
+    NoContext,
+    create_newest,
+    describe,
+    is_software,
+    open_context,
+)
 from shapeshift.renderer.timing import PassTimer
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -141,3 +149,17 @@ def test_the_drivers_timer_counts_what_the_driver_does(ctx):
         took = timer.collect()
         assert list(took) == ["decode", "splat"] and all(ms >= 0 for ms in took.values())
     assert len(timer._unused) == 2  # queries that wait to be used again: GL counts none
+
+
+@pytest.mark.parametrize("newest", VERSIONS)
+def test_a_driver_that_gives_just_what_is_asked_for_is_asked_for_its_newest(newest):
+    """NVIDIA's gives 3.3 to who asks for 3.3, though it could 4.6; Mesa its newest, always."""
+    asked = []
+
+    def create(*version):
+        asked.append(version)
+        return 77 if version <= newest else None
+
+    assert create_newest(create) == 77
+    assert asked[-1] == newest and asked == sorted(asked, reverse=True)
+    assert create_newest(lambda *version: None) is None

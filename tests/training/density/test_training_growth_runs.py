@@ -12,6 +12,7 @@ import pytest
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.training.first_anchors import first_anchors
 from shapeshift.training.first_anchors.first_anchors import base_colors
 from shapeshift.training.losses.min_opacity import SHARE
 from shapeshift.training.schedule import LIGHT_FROM
@@ -60,6 +61,19 @@ def test_a_way_to_grow_gives_the_same_bits_whole_and_resumed(device, balls, way,
     untrained = Trainer(device, balls, settings).held_out_psnr(9)
     for name, psnr in whole.held_out_psnr(9).items():
         assert psnr > untrained[name] + 5, name
+
+
+@pytest.mark.parametrize("by_shape", [True, False])
+def test_a_cap_of_shapes_is_kept_by_a_checkpoint(device, balls, by_shape, monkeypatch, tmp_path):
+    """Hulls are not carved again when a run goes on."""
+    monkeypatch.setattr(first_anchors, "cap_of_shapes", lambda first, most: most + 77)
+    settings = replace(BASE, max_anchors=100, max_by_shape=by_shape)
+    trainer = Trainer(device, balls, settings)
+    assert trainer.anchor_cap == trainer.anchors_count == 100 + 77 * by_shape
+    write_checkpoint(tmp_path / "c.npz", *trainer.checkpoint())
+    monkeypatch.undo()
+    resumed = Trainer(device, balls, settings, read_checkpoint(tmp_path / "c.npz"))
+    assert resumed.anchor_cap == trainer.anchor_cap
 
 
 def test_first_base_colours_of_a_stop_are_those_of_its_photos(device, balls):

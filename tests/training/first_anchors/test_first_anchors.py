@@ -8,6 +8,7 @@ from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.first_anchors.first_anchors import (
     FLATNESS,
     SIZES,
+    cap_of_shapes,
     choose_positions,
     first_anchors,
     neighbour_distance,
@@ -129,6 +130,40 @@ def test_a_small_shape_within_a_large_one_has_as_many_places_as_alone():
     alone = choose_positions(first._replace(guesses=small, guess_shapes=(small,)), 1000)
     one = choose_positions(first._replace(guesses=small, guess_shapes=()), 1000)
     np.testing.assert_array_equal(alone, one)
+
+
+def hulls_of(*shapes: np.ndarray) -> InitialPoints:
+    """Hulls beside twenty triangulated points."""
+    points = RNG(3).random((20, 3))
+    return InitialPoints(points, "points", (points,), np.concatenate(shapes), 0.3, shapes)
+
+
+def test_a_cap_counts_the_shapes_that_hulls_are():
+    """Layers one within the other, one that two stops share, and halves of one."""
+    small, large = 0.3 * sphere(2000), sphere(8000)
+    assert cap_of_shapes(hulls_of(small, large), 1000) == 2000
+    assert cap_of_shapes(hulls_of(small, 2 * sphere(4000), large), 1000) == 3000
+    assert cap_of_shapes(hulls_of(large, large.copy()), 1000) == 1000
+    assert cap_of_shapes(hulls_of(small, large, large.copy()), 1000) == 2000
+    turned = large @ np.linalg.qr(RNG(5).normal(size=(3, 3)))[0]  # the same shape, other points
+    assert cap_of_shapes(hulls_of(large, turned), 1000) == 1000
+    for apart, shapes in ((0.24, 1), (0.26, 2)):  # on either side of a quarter
+        low = np.quantile(large[:, 1], apart)
+        moved = np.where(large[:, 1:2] < low, large - (0, 9, 0), large)
+        assert cap_of_shapes(hulls_of(large, moved), 1000) == 1000 * shapes
+    assert cap_of_shapes(hulls_of(small, large)._replace(guess_shapes=()), 1000) == 1000
+
+
+@pytest.mark.parametrize("most", [1, 3, 4, 100])
+def test_a_cap_is_never_less_than_it_was(most):
+    """One shape, none, and a share that is less than an anchor (of 3 and fewer)."""
+    both = hulls_of(sphere(50), sphere(50) + 9)
+    assert cap_of_shapes(first_of(GRID), most) == most
+    assert cap_of_shapes(hulls_of(sphere(50)), most) == most
+    assert cap_of_shapes(both, most) == (2 * most if most > 3 else most)
+    places = first_anchors(both, most, [photo_of((9, 9, 9))], None, by_shape=True)
+    assert places.most == cap_of_shapes(both, most) and len(places.anchors) <= places.most
+    assert first_anchors(both, most, [photo_of((9, 9, 9))], None).most == most
 
 
 def test_what_the_optimiser_starts_with():

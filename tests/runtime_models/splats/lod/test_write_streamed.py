@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from shapeshift.runtime_models.files import memory
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.lod import levels as module_levels
 from shapeshift.runtime_models.splats.operations.decimate import decimate
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.sog import write_streamed as module
@@ -62,6 +63,34 @@ def test_a_codebook_has_the_ends_and_the_nearest_code_is_taken():
     np.testing.assert_allclose(np.abs(book[codes] - values), best, atol=1e-5)
     alike, zeros = coded(np.full((3, 3), 7.0, np.float32))
     assert (alike[zeros] == 7).all()
+
+
+@pytest.mark.parametrize(("splats", "leaf"), [(1, 200), (200, 200), (20_000, 500)])
+def test_progress_rises_from_0_to_1_without_standing_still(tmp_path, monkeypatch, splats, leaf):
+    """In steps of no more than writing a whole level, where that is one file: here a tenth is."""
+    monkeypatch.setattr(module, "MOST_OF_A_FILE", 2000)
+    told: list[float] = []
+    write_streamed(plain(shell(splats)), tmp_path, leaf, "test", told.append)
+    assert told == sorted(told) and told[0] == 0 and told[-1] == 1
+    if splats > leaf:
+        # The longest piece that says nothing: the moments and errors of level 1.
+        assert max(np.diff(told)) < (1 - module_levels.PAIRING) * 0.5
+        assert len(told) > 30
+
+
+@pytest.mark.parametrize("coefficients", [1, 16])
+def test_progress_is_of_the_time_that_each_piece_takes(coefficients):
+    """Against the sum written out: cut, write, merge, write, merge, write."""
+    told: list[float] = []
+    merged, written_part = module.parts_of(3, coefficients, told.append)
+    for level in range(3):
+        merged(level, 1.0)
+        written_part(level, 0.5)
+    file = module.WRITING + module.HARMONICS * (coefficients - 1)
+    cut, pair = module.CUTTING, module.MERGING
+    ends = [cut, cut + file / 2, cut + file + pair, cut + file + pair + file / 4]
+    ends += [cut + 1.5 * file + 1.5 * pair, cut + 1.625 * file + 1.5 * pair]
+    np.testing.assert_allclose(told, np.array(ends) / (cut + 1.75 * file + 1.5 * pair))
 
 
 @pytest.mark.parametrize("coefficients", [4, 9, 16])
