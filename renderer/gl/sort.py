@@ -13,8 +13,9 @@ class Sorter:
     """Fills arena.order (indices of the splats that have a key) and the draw command.
 
     backend "gl": LSD radix, 8 bits a pass, reduce then scan; no subgroups, no read-back, any
-    GL 4.3.  Its first pass leaves out what is culled, by indirect dispatch those that follow, too.  "numpy": reads the keys back; on software GL they are in the same memory and
-    numpy's radix sort of 16-bit halves is 20 times faster (6 against 120 ms for 400,000 keys).
+    GL 4.3; its first pass leaves out what is culled, and those that follow, too, by indirect
+    dispatch.  "numpy": reads the keys back; on software GL they are in the same memory and numpy's
+    radix sort of 16-bit halves is 20 times faster (6 against 120 ms for 400,000 keys).
     """
 
     def __init__(self, gpu: Gpu, backend: str) -> None:
