@@ -261,10 +261,7 @@ class Renderer:
         self._geometry_runs = self._color_runs = 0
         stats = FrameStats(self._timer.collect(), self._scene.splat_count, *told)
         stats.sorts, stats.order_age, stats.color_sets = sorts, self.drawing.order_age, color_sets
-        stats.debug, stats.streaming = (
-            self._debug[0][1] if self._debug else {},
-            self.streaming.stats,
-        )
+        stats.debug, stats.streaming = next((d[1] for d in self._debug), {}), self.streaming.stats
         return stats
 
     def _settings_of_frame(self) -> RenderSettings:
