@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from shapeshift.rasterizer.project import (
     chunks_of,
     grid_of,
 )
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
 
 KERNEL = Path(__file__).parent / "kernels" / "project_arena.cl"
 FARTHEST = 1e18  # metres, or pixels: its square is a finite float
@@ -110,15 +114,8 @@ def project_arena(
         variant["ANTIALIASED"] = 1
     packed = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     frame = device.constants(np.concatenate(packed))
-    unseen = said = into[0].unseen  # of rows that say "culled" already
-    if isinstance(clusters, Clusters):
-        unseen = said = device.empty(clusters_of(count), np.int32) if said is None else said
-        asked = (views, orders, poses[0].size, frame, unseen, into[0].unseen is not None)
-        find_unseen(device, clusters, *asked)
-    elif clusters is not None:
-        unseen = clusters.unseen
-    else:
-        unseen = said = None
+    asked = (views, orders, poses[0].size, frame)
+    unseen, said = _left_out(device, clusters, into[0].unseen, count, asked)
     projected = [replace(p, low_pass=limits.low_pass, unseen=said) for p in into]
     buffers = [_buffers(p) for p in projected]
     scratch = projected[0].in_tiles
@@ -130,6 +127,23 @@ def project_arena(
         *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
     )  # fmt: skip
     return projected
+
+
+def _left_out(
+    device: Device, clusters: Clusters | Chosen | None, said: "Array | None", count: int,
+    asked: tuple,
+) -> "tuple[Array | None, Array | None]":  # fmt: skip
+    """Flags of clusters for a launch, and those of rows that say "culled" after it.
+
+    said: the latter before it; asked: what find_unseen takes of a frame.
+    """
+    if isinstance(clusters, Chosen):
+        return clusters.unseen, said
+    if clusters is None:
+        return None, None
+    unseen = device.empty(clusters_of(count), np.int32) if said is None else said
+    find_unseen(device, clusters, *asked, unseen, said is not None)
+    return unseen, unseen
 
 
 def clusters_unseen(
