@@ -5,15 +5,17 @@
 //  fx x + (cx + sqrt(T low pass)) z + fx sqrt(T variance (1 + tangent^2)) < 0
 // and so on for its other sides: planes, whatever z is, so that a box needs its farthest corner
 // alone.  The root of a sum is at most the sum of the roots.
-// Hidden: all of a box comes, in the order, behind the limits of all tiles that it may reach.  These
-// are guesses; where a tile was not done before the nearest box that it hides, it is drawn again.
-// Reads:   frame as project_arena has it (limits, views, poses), bounds of bound_clusters.cl; of each
-//          view limit (tiles,), how deep in the order a tile is thought to be done, or none at all.
+// Hidden: all of a box comes, in the order, behind the limits of all tiles that it may reach.
+// These are guesses; where a tile was not done before the nearest box that it hides, it is drawn
+// again.
+// Reads:   frame as project_arena has it (limits, views, poses), bounds of bound_clusters.cl; of
+//          each view limit (tiles,), how deep in the order a tile is thought to be done, or none.
 // Writes:  unseen (clusters,): 0 where a view may see one, else from bit 1 on, one more than the
 //          splats that pass the gate "opacity"; bit 0 where it was not 0 before and `again` is 1.
 //          With limits nearest (tiles,) of each view: the bits of infinity less those of the least
-//          depth that is hidden there, 0 as it is given where none is; reached (views, clusters), columns from and to and rows
-//          from and to; hidden (clusters,): splats that are hidden and not out of view.
+//          depth that is hidden there, 0 as it is given where none is; reached (views, clusters),
+//          columns from and to and rows from and to; hidden (clusters,): splats that are hidden
+//          and not out of view.
 // Units:   metres in the object and in the camera, pixels, tiles.
 #include "common/camera.cl"
 #include "common/limits.cl"
