@@ -8,10 +8,10 @@
 //          = 1 value and weight of each splat (float4 x and w); with FOVEATED = 1 the kind of each
 //          tile, a byte; where there is one `only` (tiles,): 0 leaves a tile as it is.
 // Writes:  image (H, W, 4), alpha = 1 - T; where there is one ends (tiles, 2): the last splat that
-//          a tile took in and that of a batch more, -1 where it would have taken a longer list; with HEAT heat_image (H, W, 2), blended as the colours
-//          are.  With FOVEATED the same at half the width and height (rounded up): samples at the
-//          corner that four pixels share, or their mean; the image has no pixels of coarse tiles
-//          then, which foveate.cl fills.
+//          a tile took in and that of a batch more, -1 where it would have taken a longer list;
+//          with HEAT heat_image (H, W, 2), blended as the colours are.  With FOVEATED the same at
+//          half the width and height (rounded up): samples at the corner that four pixels share,
+//          or their mean; the image has no pixels of coarse tiles then, which foveate.cl fills.
 // Units:   pixels, row 0 on top; display sRGB; transmittance T in 0..1.
 #define SIDE 4     // pixels of a block, and blocks of a tile
 #define BLOCKS 16  // bits of a ushort

@@ -1,6 +1,6 @@
 // sort_count: how often each digit occurs in a group's keys.  First of the three steps of a pass of
-// a radix sort: least significant digit first, stable.  The first pass leaves culled keys behind, so
-// that those that follow have as many as are sorted.
+// a radix sort: least significant digit first, stable.  The first pass leaves culled keys behind,
+// so that those that follow have as many as are sorted.
 // Reads:   keys; how many are sorted in counts.
 // Writes:  histogram [group][digit].
 // Units:   none.
