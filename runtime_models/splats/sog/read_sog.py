@@ -114,21 +114,22 @@ class Sog:
         found = found if isinstance(found, list) else [found]
         if key == "codebook" and len(found) == 256 and found[0] is None:
             found = [extrapolated(found), *found[1:]]
-        numeric = all(type(number) in (int, float) for number in found)
-        if not least <= len(found) <= most or not numeric:
+        if not least <= len(found) <= most or not set(map(type, found)) <= {int, float}:
             raise self.bad(f"{part} needs {least} to {most} numbers as its {key}")
-        if not all(abs(number) < LARGEST_NUMBER for number in found):  # False for NaN
+        try:
+            numbers = np.array(found, np.float64)
+        except OverflowError:  # a whole number beyond 1e308
+            numbers = np.array([np.inf])
+        if not (np.abs(numbers) < LARGEST_NUMBER).all():  # False for NaN
             raise self.bad(f"the {key} of {part} is not finite")
-        self.known[part, key] = np.array(found, np.float32)
+        self.known[part, key] = numbers.astype(np.float32)
         self.known[part, key].flags.writeable = False
         return self.known[part, key]
 
-    def pixels(self, part: str, number: int = 0, channels: int = 4) -> np.ndarray:
-        """(N, 4) uint8: of each splat the pixel of one of a part's pictures; (N, 3) where three
-        channels are wanted and no more are in the file.
-        """
+    def pixels(self, part: str, number: int = 0) -> np.ndarray:
+        """(N, 4) uint8: of each splat the pixel of one of a part's pictures."""
         most = 4 * self.count + ROOM
-        picture = self.files.image(self.names(part)[number], self.count, most, channels)
+        picture = self.files.image(self.names(part)[number], self.count, most)
         return picture.reshape(-1, picture.shape[2])[: self.count]
 
     def palette(self) -> np.ndarray:

@@ -57,9 +57,9 @@ def write_sog(splats: PlainSplats, folder: Path, generator: str) -> None:
             "mins": low.tolist(), "maxs": high.tolist(),
             "files": ["means_l.webp", "means_u.webp"],
         },
-        "scales": {"codebook": scale_book.tolist(), "files": ["scales.webp"]},
+        "scales": {"codebook": shortest(scale_book), "files": ["scales.webp"]},
         "quats": {"files": ["quats.webp"]},
-        "sh0": {"codebook": color_book.tolist(), "files": ["sh0.webp"]},
+        "sh0": {"codebook": shortest(color_book), "files": ["sh0.webp"]},
         **harmonics,
     }  # fmt: skip
     write_whole(folder / META, json.dumps(meta).encode())
@@ -78,7 +78,7 @@ def coded_harmonics(rest: np.ndarray, pictures: dict[str, np.ndarray]) -> dict:
     return {
         "count": len(sets),
         "bands": COEFFICIENTS.index(rest.shape[1]),
-        "codebook": book.tolist(),
+        "codebook": shortest(book),
         "files": ["shN_centroids.webp", "shN_labels.webp"],
     }
 
@@ -108,6 +108,11 @@ def codebook(values: np.ndarray) -> np.ndarray:
         book = np.sort(np.where(number > FEW, mean, book))
     book[0], book[-1] = low, high
     return book.astype(np.float32)
+
+
+def shortest(book: np.ndarray) -> list[float]:
+    """The numbers with the fewest digits that are these float32 (n,): 10, not 17."""
+    return [float(str(number)) for number in book]
 
 
 def smallest_three(wxyz: np.ndarray) -> np.ndarray:

@@ -19,7 +19,13 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.sog import write_streamed as module
 from shapeshift.runtime_models.splats.sog.read_streamed import levels, read_level, read_tree
 from shapeshift.runtime_models.splats.sog.sh_palette import make_palette
-from shapeshift.runtime_models.splats.sog.write_sog import CODES, codebook, coded, write_sog
+from shapeshift.runtime_models.splats.sog.write_sog import (
+    CODES,
+    codebook,
+    coded,
+    shortest,
+    write_sog,
+)  # fmt: skip
 from shapeshift.runtime_models.splats.sog.write_streamed import write_streamed
 from tests.support.splat_scenes import shell
 from tests.support.splats.ply_files import some_splats
@@ -91,6 +97,14 @@ def test_progress_is_of_the_time_that_each_piece_takes(coefficients):
     ends = [cut, cut + file / 2, cut + file + pair, cut + file + pair + file / 4]
     ends += [cut + 1.5 * file + 1.5 * pair, cut + 1.625 * file + 1.5 * pair]
     np.testing.assert_allclose(told, np.array(ends) / (cut + 1.75 * file + 1.5 * pair))
+
+
+def test_numbers_of_a_codebook_are_short_and_exact():
+    book = np.float32([-1e30, -0.1, -0.0, 1e-38, 1 / 3, 0.1, 1.0, 16777217, 3.4e38])
+    book = np.concatenate([book, np.random.default_rng(0).normal(size=2000).astype(np.float32)])
+    text = json.dumps(shortest(book))
+    assert np.float32(json.loads(text)).tobytes() == book.tobytes()
+    assert len(text) < 0.6 * len(json.dumps(book.tolist()))
 
 
 @pytest.mark.parametrize("coefficients", [4, 9, 16])
