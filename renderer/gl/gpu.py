@@ -113,6 +113,19 @@ class Gpu:
         self.release()
 
 
+def overwrite(buffer: moderngl.Buffer, data: Any, offset: int = 0) -> None:
+    """Other bytes from `offset` on in a buffer that a pass has read or written before.
+
+    GL promises that such a pass is done before; with NVIDIA's driver 580 writes overtake compute
+    passes that still run.  So what is written as a whole gets new memory, and a part waits.
+    """
+    if offset == 0 and memoryview(data).nbytes == buffer.size:
+        buffer.orphan()
+    else:
+        buffer.ctx.finish()
+    buffer.write(data, offset)
+
+
 def release_framebuffer(framebuffer: moderngl.Framebuffer) -> None:
     """Gives back a framebuffer with all that was drawn into."""
     for image in framebuffer.color_attachments:

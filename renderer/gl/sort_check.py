@@ -4,7 +4,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, overwrite
 from shapeshift.renderer.gl.sort import KEY_BITS, Sorter, quantize, stable_order
 from shapeshift.renderer.gl.target import warn_once
 
@@ -41,7 +41,7 @@ def first_wrong(gpu: Gpu, sorter: Sorter) -> str:
         with Arena(gpu, [count]) as arena:
             for bits in KEY_BITS:
                 write_keys(arena, keys)
-                arena.order.write(np.full(max(count, 1), UNWRITTEN, np.uint32))
+                overwrite(arena.order, np.full(max(count, 1), UNWRITTEN, np.uint32))
                 sorter.sort(arena, bits)
                 if not _in_order(arena, keys, bits):
                     return f"{count} keys of {bits} bits"
@@ -56,8 +56,8 @@ def write_keys(arena: Arena, keys: np.ndarray) -> None:
     counts[layout.COUNTS["NEAREST"]] = drawn.min(initial=layout.CULLED_KEY)
     counts[layout.COUNTS["FARTHEST"]] = drawn.max(initial=0)
     if len(keys):
-        arena.keys.write(keys)
-    arena.counts.write(counts)
+        overwrite(arena.keys, keys)
+    overwrite(arena.counts, counts)
 
 
 def _known_keys(count: int) -> np.ndarray:
