@@ -10,7 +10,7 @@ from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer import layout
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.gl.buffers import bind
-from shapeshift.renderer.gl.gpu import groups_for
+from shapeshift.renderer.gl.gpu import groups_for, overwrite
 from shapeshift.renderer.gl.quads import QuadsDrawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.runtime_models.leaf_levels import LeafSplats
@@ -211,7 +211,7 @@ class PagedQuads(QuadsDrawing):
         data, each, at = data[order], 4 * data.shape[1], 0
         for low, high in runs_of(pages[order]):
             place = each * low + each // PAGE * start
-            buffer.write(data[at : at + high - low], offset=place)
+            overwrite(buffer, data[at : at + high - low], offset=place)
             at += high - low
 
     def _release_harmonics(self) -> None:
