@@ -216,6 +216,14 @@ def percentiles(values: list[float]) -> dict[str, float]:
     return {f"p{p}": float(np.percentile(values, p)) for p in PERCENTILES}
 
 
+def draws_on_cpu(drawing: str, ctx) -> bool:
+    """Whether the processor makes the pixels: then its time is what a frame costs."""
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.renderer.gl.context import is_software
+
+    return open_device().kind == "cpu" if drawing == "tiles" else is_software(ctx)
+
+
 def gl_renderer(ctx) -> str:
     from shapeshift.renderer.gl.context import describe
 

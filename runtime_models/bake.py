@@ -1,24 +1,24 @@
 """Any model at one control value as plain splats: what an export writes."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS, basis
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
+from shapeshift.runtime_models.eyes import eyes_of
+from shapeshift.runtime_models.fit_harmonics import (
+    Recolor,
+    fit_colors,
+    fit_seen_colors,
+    recolored,
+)
 from shapeshift.runtime_models.model import BadFile, Finding, Model, ScaffoldModel, SplatLayers
 from shapeshift.runtime_models.parts import splat_labels
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.stop_weights import Controls
 
 LEAST_ALPHA = 1 / 255  # no renderer draws a fainter splat
-DIRECTIONS = 64  # colours are asked for along so many: four times the functions of degree 3
-BLOCK = 1 << 13  # splats at a time of what is colored anew: bounds the memory
-
-ColorAt = Callable[[Controls], np.ndarray]  # (n, 3) as the model has them at a control
-# (those of some splats, their rows in the model) -> colours (n, 3) as shown
-Recolor = Callable[[ColorAt, np.ndarray], np.ndarray]
 
 
 def bake(
@@ -32,8 +32,9 @@ def bake(
     """The splats of a model at x, one value or one an anchor (layers: a splat), that are there.
 
     Colours that depend on the direction become spherical harmonics of `sh_degree`, the best in
-    least squares over all directions alike; trained harmonics are cut at that degree, which is the
-    same.  recolor: false colours, laid over before that.  eye (3,), metres in the object's frame:
+    least squares over the directions from which the model's photos were taken (`eyes_of`), or where
+    it knows none over all directions alike; trained harmonics are cut at that degree, which is the
+    latter.  recolor: false colours, laid over before that.  eye (3,), metres in the object's frame:
     where a model is seen from whose shape depends on it; the others need none.  keep (N,) bool: of
     the model's splats no others are written.  Raises BadFile.
     """
@@ -57,16 +58,20 @@ def bake(
         if recolor:
             sh = recolored(sh, lambda at, rows: recolor(at, np.flatnonzero(there)[rows]))
     else:
+        rows = np.flatnonzero(there)
 
         def along(direction: np.ndarray) -> np.ndarray:
-            rows = np.flatnonzero(there)
-
             def color_at(control: Controls) -> np.ndarray:
                 return evaluator.color_along(control, direction, eye)[rows]
 
             return recolor(color_at, rows) if recolor else color_at(x)
 
-        sh = fit_colors(along, len(model.anchors), count, int(there.sum()))
+        eyes = eyes_of(model)
+        if len(eyes):
+            of_anchor = rows // model.splats_per_anchor
+            sh = fit_seen_colors(along, model.anchors, of_anchor, eyes, count)
+        else:
+            sh = fit_colors(along, len(model.anchors), count, len(rows))
     return as_plain(
         model, [of_rows(a, there) for a in (means, scales, wxyz, opacity)], sh, there, absent
     )
@@ -113,55 +118,3 @@ def as_plain(
         antialiased=model.antialiased,
         extra={name: of_rows(column, there) for name, column in model.extra.items()},
     )
-
-
-def spread_directions(count: int) -> np.ndarray:
-    """(count, 3) float32 unit directions, evenly over the sphere (a golden spiral)."""
-    step = np.arange(count) + 0.5
-    z = 1 - 2 * step / count
-    turn = np.pi * (1 + 5**0.5) * step
-    radius = np.sqrt(1 - z * z)
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], 1).astype(np.float32)
-
-
-def fit_rows(count: int, number: int = DIRECTIONS) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (D, 3), and (D, count) what a colour along each adds to every coefficient."""
-    directions = spread_directions(number)
-    solve = np.linalg.pinv(basis(directions.astype(np.float64), count))  # (count, D)
-    return directions, solve.T.astype(np.float32)
-
-
-def fit_colors(
-    color_along: Callable[[np.ndarray], np.ndarray], anchors: int, count: int, splats: int
-) -> np.ndarray:
-    """(splats, count, 3) harmonics of the colours (splats, 3) that are shown along directions
-    (anchors, 3).
-
-    One direction after the other for all anchors: the sum over directions is the least-squares
-    solution, so that nothing but it and the colours of one direction is held.
-    """
-    sh = np.zeros((splats, count, 3), np.float32)
-    for direction, parts in zip(*fit_rows(count), strict=True):
-        color = color_along(np.tile(direction, (anchors, 1))) - np.float32(0.5)
-        for coefficient, part in enumerate(parts):
-            sh[:, coefficient] += part * color
-    return sh
-
-
-def recolored(sh: np.ndarray, recolor: Recolor) -> np.ndarray:
-    """(N, M, 3) harmonics of what `recolor` makes of the colours of harmonics (N, M, 3)."""
-    out = np.empty_like(sh)
-    directions, parts = fit_rows(sh.shape[1], 4 * sh.shape[1])
-    values = basis(directions, sh.shape[1])  # (D, M)
-    for start in range(0, len(sh), BLOCK):
-        rows = np.arange(start, min(start + BLOCK, len(sh)))
-        color = np.maximum(values @ sh[rows] + np.float32(0.5), 0)  # (n, D, 3), as shade does
-        every = np.repeat(rows, len(directions))
-        flat = color.reshape(-1, 3)
-
-        def color_at(control: Controls, flat: np.ndarray = flat) -> np.ndarray:
-            return flat
-
-        shown = recolor(color_at, every).reshape(color.shape)
-        out[rows] = parts.T @ (shown - np.float32(0.5))
-    return out

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.runtime_models.eyes import EYES, spread_eyes
 from shapeshift.runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
@@ -26,9 +27,12 @@ ACTIVATION = {
 GATE = ((1, 1, -1, 0.5), (-1, 1, -1, -0.5), (1, 1, 0, 0.5), (1, -1, 0, -0.5))
 
 
-def origin_in(capture: Capture) -> dict[str, object]:
-    """What a package says of where its zero lies in the world of its capture, if elsewhere."""
-    return {"origin_m": list(capture.origin)} if any(capture.origin) else {}
+def notes_of(capture: Capture) -> dict[str, object]:
+    """What a package says of its capture: its name, where its photos were taken, and where the
+    package's zero lies in the capture's world, if elsewhere."""
+    taken = [p.view.world_from_eye.position for p in capture.photos if p.split == "train"]
+    notes: dict[str, object] = {"capture": capture.folder.name, EYES: spread_eyes(np.array(taken))}
+    return notes | ({"origin_m": list(capture.origin)} if any(capture.origin) else {})
 
 
 def model_of(

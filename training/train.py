@@ -22,7 +22,7 @@ from shapeshift.training.density.density_budget import anchor_cap
 from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
 from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color, camera_of
-from shapeshift.training.export import model_of, origin_in
+from shapeshift.training.export import model_of, notes_of
 from shapeshift.training.first_anchors.first_anchors import base_colors, first_anchors
 from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import initial_weights, padded
@@ -39,6 +39,7 @@ from shapeshift.training.supervision.backgrounds import (
     background_warning,
     choose_background,
     has_one_exposure,
+    still_warnings,
 )
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
@@ -90,6 +91,7 @@ class Trainer(Run):
             raise BadFile(f"{capture.folder}: modality '{empty[0]}' has no training photos.")
         with self.counted_start():
             background = choose_background(settings.background, capture.background, photos)
+            self.warnings += [] if background else still_warnings(photos)
         if settings.background == "auto" and background and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
             self.warnings.append(background_warning(background))
@@ -379,9 +381,8 @@ class Trainer(Run):
         return out
 
     def model(self) -> AnchorModel:
-        provenance = origin_in(self.capture) | {
+        provenance = notes_of(self.capture) | {
             "trained_by": "shapeshift train",
-            "capture": self.capture.folder.name,
             "settings": self.settings.as_dict(),
             "iterations": self.iteration,
             "voxel_m": self.voxel,

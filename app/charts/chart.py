@@ -127,7 +127,7 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     from shapeshift.app.charts.chart_scene import QUICK, Walk, digest, make_chart_scene
     from shapeshift.app.charts.chart_settings import settings_of
     from shapeshift.app.charts.leaf_rows import budgets_of
-    from shapeshift.app.measure import machine_line
+    from shapeshift.app.measure import draws_on_cpu, machine_line
 
     x = None
     if not (options.x or any(subject.file for subject in subjects)):
@@ -156,14 +156,6 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     front = draw_chart(file.rows, title, options.out, on_cpu)
     print_front(front, len(file.rows), options.out)
     return 0
-
-
-def draws_on_cpu(drawing: str, ctx) -> bool:
-    """Whether the processor makes the pixels: then its time is what a frame costs."""
-    from shapeshift.rasterizer.device import open_device
-    from shapeshift.renderer.gl.context import is_software
-
-    return open_device().kind == "cpu" if drawing == "tiles" else is_software(ctx)
 
 
 def measure_rows(pricing, file, settings, pictures: bool) -> None:

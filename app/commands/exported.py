@@ -10,8 +10,9 @@ import numpy as np
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.colors.false_colors import mixed_colors, shade_of
 from shapeshift.renderer.colors.palette import palette_colors
-from shapeshift.runtime_models.bake import ColorAt, Recolor, bake
+from shapeshift.runtime_models.bake import bake
 from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.fit_harmonics import ColorAt, Recolor
 from shapeshift.runtime_models.lod.level_files import ENDING, LEVELS
 from shapeshift.runtime_models.model import BadFile, Finding, Model, SplatLayers
 from shapeshift.runtime_models.package.package_files import MANIFEST

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.colors.light_harmonics import most_light
+from shapeshift.runtime_models.eyes import EYES, eyes_of, spread_eyes
 from shapeshift.runtime_models.model import HEADS, AnchorFrames, AnchorModel, BadFile, Finding, Mlp
 
 FORMAT = "shapeshift-blocks 1"
@@ -104,11 +105,14 @@ def joined(models: Sequence[AnchorModel], names: Sequence[str]) -> BlockModel:
         frames = AnchorFrames(stacked([f.scales for f in known]), stacked([f.wxyz for f in known]))
     lights = [model.light for model in models if model.light is not None]
     findings: tuple[Finding, ...] = sum((model.findings for model in models), ())
+    places = np.concatenate([eyes_of(model) for model in models])
+    eyes = {EYES: spread_eyes(places)} if len(places) else {}
     return BlockModel(
         stacked([model.anchors for model in models]),
         stacked([model.features for model in models]),
         first.networks, first.splats_per_anchor, first.encoding, first.stops,
-        first.provenance | {"blocks": len(models), "files": list(names)}, findings, first.pace,
+        first.provenance | eyes | {"blocks": len(models), "files": list(names)}, findings,
+        first.pace,
         first.between_stops, frames, light=stacked(lights) if lights else None,
         block=np.repeat(np.arange(len(models), dtype=np.int32), counts),
         more=tuple(model.networks for model in models[1:]),

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from itertools import pairwise
 
+from shapeshift.runtime_models.eyes import EYES, MOST_EYES
 from shapeshift.runtime_models.files.json_fields import Fields, is_number, parse_json, shown
 from shapeshift.runtime_models.model import (
     BETWEEN_STOPS,
@@ -70,6 +71,7 @@ def read_manifest(data: bytes, where: str) -> Manifest:
         raise BadFile(f"{where} has up axis {shown(up)}, expected '+Y'; turn the scene.")
     provenance = Fields(top.value("provenance", {}), f"{where}: 'provenance'", ADVICE)
     check_view(provenance)
+    check_eyes(provenance)
     heads, stops = top.object("heads"), read_stops(top)
     lit = found == LIGHT_FORMAT
     return Manifest(
@@ -193,3 +195,17 @@ def check_view(provenance: Fields) -> None:
         raise BadFile(f"{view.where}: eye and target are one point, expected two.")
     if not 0.01 < view.number("fov_y", 1.0) < 3.1:
         raise view.error("fov_y", "an angle above 0.01 and below 3.1 radians")
+
+
+def check_eyes(provenance: Fields) -> None:
+    """Where photos were taken, if it says so: exports fit colours as they are seen from there."""
+    eyes = provenance.value(EYES, [])
+    if not isinstance(eyes, list) or len(eyes) > MOST_EYES or not all(map(is_place, eyes)):
+        wanted = f"a list of at most {MOST_EYES} places of three finite numbers up to"
+        raise provenance.error(EYES, f"{wanted} {LARGEST_NUMBER:g}")
+
+
+def is_place(value: object) -> bool:
+    if not (isinstance(value, list) and len(value) == 3 and all(map(is_number, value))):
+        return False
+    return all(abs(number) <= LARGEST_NUMBER for number in value)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.runtime_models.bake import spread_directions
+from shapeshift.runtime_models.fit_harmonics import spread_directions
 from shapeshift.runtime_models.rotation import normalize, rotation_matrices
 from shapeshift.scene.colliders.collider_wrap import CELLS
 

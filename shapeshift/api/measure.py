@@ -144,6 +144,7 @@ def chart(
     from shapeshift.app.charts.chart_measure import Pricing, open_pair
     from shapeshift.app.charts.chart_scene import QUICK, Walk, make_chart_scene
     from shapeshift.app.charts.chart_settings import settings_of
+    from shapeshift.app.measure import draws_on_cpu
 
     if frames < 0 or frames == 1:
         raise UsageError(f"frames is {frames}, expected 2 or more, or 0.")
@@ -167,13 +168,6 @@ def chart(
     if out is not None:
         draw(rows, scene, size, pricing.drawing, plain(str(out)), on_cpu)
     return rows
-
-
-def draws_on_cpu(drawing: str, ctx: Any) -> bool:
-    """As the command asks it."""
-    from shapeshift.app.charts import chart
-
-    return chart.draws_on_cpu(drawing, ctx)
 
 
 def draw(

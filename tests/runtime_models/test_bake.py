@@ -8,16 +8,19 @@ import pytest
 from shapeshift.app.commands.exported import ExportLook, Part, bake_part
 from shapeshift.renderer.colors.palette import LUMINANCE, palette_values
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.runtime_models.bake import (
+from shapeshift.runtime_models.bake import LEAST_ALPHA, bake
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS, basis, shade
+from shapeshift.runtime_models.evaluate import directions, evaluate
+from shapeshift.runtime_models.eyes import EYES, MOST_EYES, eyes_of, spread_eyes
+from shapeshift.runtime_models.fit_harmonics import (
     BLOCK,
-    LEAST_ALPHA,
-    bake,
+    ROUND,
+    ROUND_SHARE,
     fit_rows,
+    fit_seen_colors,
     recolored,
     spread_directions,
 )
-from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS, basis, shade
-from shapeshift.runtime_models.evaluate import directions, evaluate
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.write_plain import merged, placed
@@ -83,6 +86,87 @@ def test_directions_solve_every_degree():
         spread, parts = fit_rows(count)
         np.testing.assert_allclose(parts.T @ basis(spread, count), np.eye(count), atol=1e-5)
         assert np.linalg.cond(basis(spread.astype(float), count)) < 1.1
+
+
+# Where the model knows from where its photos were taken
+
+
+@pytest.mark.parametrize("anchors", [1, 255, 256, 257])
+@pytest.mark.parametrize("count", COEFFICIENTS)
+def test_seen_colors_are_the_weighted_fit_of_each_anchor(anchors, count, monkeypatch):
+    """Beside numpy's own solver, an anchor at a time, on rows times the roots of their weights."""
+    monkeypatch.setattr("shapeshift.runtime_models.fit_harmonics.BLOCK", 256)
+    rng = np.random.default_rng(anchors)
+    places = rng.uniform(-1, 1, (anchors, 3)).astype(np.float32)
+    rows = np.flatnonzero(rng.uniform(size=2 * anchors) < 0.8) // 2  # of some one, of some none
+    eyes = rng.normal(size=(5, 3)) + np.array([0, 3, 0])  # all above
+    own = rng.normal(size=(len(rows), 3, 3)).astype(np.float32)
+
+    def color_along(toward: np.ndarray) -> np.ndarray:
+        bent = np.einsum("nij,nj->ni", own, toward[rows])
+        return np.abs(bent).astype(np.float32)
+
+    found = fit_seen_colors(color_along, places, rows, eyes, count)
+    spread = [np.tile(d, (anchors, 1)) for d in spread_directions(ROUND)]
+    looks = spread + [directions(places, eye) for eye in eyes]
+    root = np.sqrt([ROUND_SHARE / ROUND] * ROUND + [(1 - ROUND_SHARE) / 5] * 5)[:, None]
+    colors = np.stack([color_along(look) for look in looks])  # (D, n, 3)
+    assert found.shape == (len(rows), count, 3) and found.dtype == np.float32
+    for i in {0, len(rows) // 2, len(rows) - 1} if len(rows) else ():
+        toward = np.stack([look[rows[i]] for look in looks]).astype(np.float64)
+        matrix, wanted = root * basis(toward, count), root * (colors[:, i] - 0.5)
+        np.testing.assert_allclose(
+            found[i], np.linalg.lstsq(matrix, wanted, rcond=None)[0], rtol=2e-3, atol=2e-3
+        )  # float32 sums, of equations whose condition is 1 / ROUND_SHARE and more
+        fitted = root * basis(toward, count) @ found[i]
+        least = root * basis(toward, count) @ np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+        assert np.sum((fitted - wanted) ** 2) <= np.sum((least - wanted) ** 2) * 1.0001 + 1e-9
+
+
+def test_an_export_is_better_where_the_photos_were(model):
+    """From between the eyes; from below, where there was none, it is worse than without them."""
+    turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    eyes = np.stack([0.8 * np.cos(turn), np.full(12, 3.0), 0.8 * np.sin(turn)], axis=1)
+    knowing = replace(model, provenance={EYES: spread_eyes(eyes)})
+    assert {tuple(eye) for eye in eyes_of(knowing)} == {tuple(eye) for eye in eyes.round(3)}
+
+    def error(of: np.ndarray, eye: np.ndarray) -> float:
+        whole = evaluate(model, 0.3, eye)
+        there = whole.opacity >= LEAST_ALPHA
+        toward = np.repeat(directions(model.anchors, eye), 4, axis=0)[there]
+        return float(np.sqrt(np.mean((shade(of, toward) - whole.color[there]) ** 2)))
+
+    half = np.pi / 12  # between two of them
+    between, below = np.array([0.8 * np.cos(half), 3, 0.8 * np.sin(half)]), np.array([0.0, -4, 0])
+    for degree in (0, 1, 2, 3):
+        with_eyes, without = (bake(m, 0.3, sh_degree=degree).sh for m in (knowing, model))
+        assert error(with_eyes, between) < 0.6 * error(without, between)
+        assert error(with_eyes, below) > error(without, below)
+
+
+def test_an_eye_at_an_anchor_and_a_single_eye_are_sound(model):
+    for eyes in ([model.anchors[0].tolist()], [[0.0, 1e30, 0.0]], [[0, 2, 0]]):
+        assert np.isfinite(bake(replace(model, provenance={EYES: eyes}), 0.3).sh).all()
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, MOST_EYES - 1, MOST_EYES, MOST_EYES + 1, 500])
+def test_eyes_are_far_from_one_another(count):
+    """Some of the places, each once; no place is farther from them than they from each other."""
+    places = np.random.default_rng(count).normal(size=(count, 3)) * 7
+    found = np.array(spread_eyes(places)).reshape(-1, 3)
+    assert len(found) == min(count, MOST_EYES)
+    if not count:
+        return
+    off = np.linalg.norm(places[:, None] - found, axis=2)  # (N, E)
+    assert off.min(axis=0).max() < 0.01  # rounded to four digits of about 40 m
+    assert len(set(off.argmin(axis=0))) == len(found)
+    if len(found) > 1:
+        apart = np.linalg.norm(found[:, None] - found, axis=2)[~np.eye(len(found), dtype=bool)]
+        assert off.min(axis=1).max() <= apart.min() + 0.01
+
+
+def test_eyes_at_one_place_are_one():
+    assert spread_eyes(np.tile([1.23456, -7, 0], (9, 1))) == [[1.2346, -7.0, 0.0]]
 
 
 def test_a_control_value_an_anchor(model):

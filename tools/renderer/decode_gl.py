@@ -22,13 +22,15 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
 from shapeshift.rasterizer.device import NoDevice  # noqa: E402
+from shapeshift.renderer.colors.false_colors import Shade  # noqa: E402
 from shapeshift.renderer.gl.buffers import Arena  # noqa: E402
 from shapeshift.renderer.gl.context import open_context  # noqa: E402
 from shapeshift.renderer.gl.decode import MLPS, Decoder  # noqa: E402
 from shapeshift.renderer.gl.gpu import Gpu  # noqa: E402
-from shapeshift.runtime_models.evaluate import BATCH, Evaluator, directions, open_session  # noqa: E402
+from shapeshift.runtime_models.evaluate import BATCH, Evaluator, directions  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.package.write_onnx import write_onnx  # noqa: E402
+from shapeshift.runtime_models.session import open_session  # noqa: E402
 from tests.support.splat_scenes import random_model  # noqa: E402
 
 LIMITS = {"onnxruntime": 1.2, "gl": 15.0}  # times the floor
@@ -109,14 +111,19 @@ def rows_of(gpu: Gpu, anchors: int) -> list[tuple]:
     try:
         from shapeshift.renderer.tiles.tiles import TilesDrawing
 
-        drawing = TilesDrawing(mlps="onnxruntime")
+        forms = {form: TilesDrawing(mlps=form) for form in ("onnxruntime", "opencl")}
     except NoDevice as reason:
         sys.stderr.write(f"no rows of the tiles: {reason}\n")
         return rows
-    drawing.allocate([model])
-    parts = (drawing.decode_geometry, drawing.decode_color, drawing.device.queue.finish)
-    add("tiles, onnxruntime", LIMITS["onnxruntime"], decoding(*parts))
-    drawing.close()
+    for form, drawing in forms.items():
+        drawing.allocate([model])
+
+        def shaded(i: int, x: float, eye: np.ndarray, drawing: TilesDrawing = drawing) -> None:
+            drawing.decode_color(i, Shade(x), eye)
+
+        parts = (drawing.decode_geometry, shaded, drawing.device.queue.finish)
+        add(f"tiles, {form}", LIMITS["onnxruntime"], decoding(*parts))
+        drawing.close()
     return rows
 
 

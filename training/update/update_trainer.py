@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shapeshift.runtime_models.eyes import EYES, spread_eyes
 from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, BadFile
 from shapeshift.runtime_models.package.write_package import EXACT
 from shapeshift.runtime_models.rotation import normalize
@@ -191,6 +192,9 @@ class UpdateTrainer(Trainer):
             "anchors": self.anchors_count - self.fixed,
         }
         before = self.base.model.provenance
+        if EYES in before:  # else the old photos' are not known, and all directions count
+            taken = [photo.view.world_from_eye.position for photo in self.capture.photos]
+            before = before | {EYES: spread_eyes(np.array([*before[EYES], *taken]))}
         return before | {"updates": [*before.get("updates", []), update]}
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shapeshift.app import cli
-from shapeshift.app.charts import chart
+from shapeshift.app.charts import chart, decode_chart
 from shapeshift.app.charts.chart_measure import ChartRow, Pricing
 from shapeshift.app.charts.chart_picture import draw_chart, family, family_of, name_points
 from shapeshift.app.charts.chart_rows import RowsFile
@@ -343,3 +343,24 @@ def test_only_the_exact_row_is_drawn_as_exact():
     assert family_of(make_row(EXACT, changes="target=rgba32f")) == ""
     assert family_of(make_row("rgba16f", db=56)) == "pixels"
     assert family_of(make_row("from 2 px", changes="min_pixels=2")) == "culls"
+
+
+@pytest.mark.parametrize("on_cpu", [True, False])
+def test_decoding_is_timed_with_every_back_end(ctx, monkeypatch, on_cpu):
+    monkeypatch.setattr(decode_chart, "RUN_S", 0.0)
+    for name in decode_chart.BACK_ENDS:
+        row = decode_chart.decode_row(name, ctx, make_random_model(70), on_cpu)
+        assert (row.back_end, row.anchors, row.splats, row.runs) == (name, 70, 350, 3)
+        assert row.all_ms > 0 < row.color_ms
+
+
+@pytest.mark.parametrize("run_ms, runs", [(1, 9), (300, 7), (2000, 3)])
+def test_a_figure_takes_two_seconds_or_three_runs(monkeypatch, run_ms, runs):
+    now = [0.0]
+    monkeypatch.setattr(decode_chart.time, "process_time", lambda: now[0])
+
+    def job() -> None:
+        now[0] += run_ms / 1e3
+
+    times = decode_chart.timed(job, on_cpu=True)
+    assert len(times) == runs and times == pytest.approx([run_ms] * runs)

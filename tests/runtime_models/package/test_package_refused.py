@@ -167,6 +167,13 @@ BROKEN = {
     "view from nowhere": (edit(provenance={"view": LOOK | {"eye": [0, 1]}}), "a list of 3 finite"),
     "view of itself": (edit(provenance={"view": LOOK | {"eye": [0, 0, 0]}}), "are one point"),
     "view of no width": (edit(provenance={"view": LOOK | {"fov_y": 0}}), "'fov_y' is 0; an angle"),
+    "eyes of another kind": (edit(provenance={"eyes": 3}), "'eyes' is 3; a list of at most 64"),
+    "eyes in braces": (edit(provenance={"eyes": {"a": 1}}), "a list of at most 64 places"),
+    "an eye of a plane": (edit(provenance={"eyes": [[0, 1]]}), "places of three finite numbers"),
+    "an eye of a word": (edit(provenance={"eyes": [[0, 1, "2"]]}), "three finite numbers"),
+    "an eye of NaN": (edit(provenance={"eyes": [[0, 1, float("nan")]]}), "three finite numbers"),
+    "an eye too far": (edit(provenance={"eyes": [[0, 1, 2e30]]}), "finite numbers up to 1e+30"),
+    "too many eyes": (edit(provenance={"eyes": [[0, 1, 2]] * 65}), "a list of at most 64 places"),
     # heads
     "no heads": (edit(heads={}), "'heads': 'offset' is missing"),
     "no file": (head("scale", file=None), "'scale': 'file' is missing"),
