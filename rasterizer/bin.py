@@ -140,9 +140,7 @@ def _bin_ordered_groups(
     hidden: np.ndarray | None = None,
 ) -> Tiles:  # fmt: skip
     """The GPU form for an order that is there: one radix sort, by tiles."""
-    kernels, scratch = device.program(KERNELS / "bin_gpu.cl"), projected.scratch
-    if scratch is None or scratch.grid != grid:
-        raise ValueError("an order is of splats that project_arena has put on this grid.")
+    kernels, scratch = device.program(KERNELS / "bin_gpu.cl"), _scratch_on(device, projected, grid)
     shown, tiles = order.shape[0], grid[0] * grid[1]
     offsets = device.empty(shown + 1, np.int32)
     at = (projected.record, scratch.tile_bounds)
@@ -163,20 +161,25 @@ def _bin_ordered_groups(
     return Tiles(grid, starts, intersections, scratch.tile_bounds, order, slots)
 
 
+def _scratch_on(device: Device, projected: Projected, grid: tuple[int, int]) -> TileScratch:
+    """The tile bounds and keys on a grid: those that project_arena left, or made now."""
+    scratch = projected.scratch
+    if scratch is None or scratch.grid != grid:
+        scratch = TileScratch.empty(device, projected.depth.shape[0], grid)
+        device.launch(
+            device.program(KERNELS / "bin.cl")["find_tile_bounds"], scratch.status.shape[0], 1,
+            projected.depth.shape[0], scratch.chunk, *grid, projected.record, projected.depth,
+            *scratch.arrays(),
+        )  # fmt: skip
+    return scratch
+
+
 def _bin_chunks(
     device: Device, projected: Projected, grid: tuple[int, int], order: "Array | None" = None,
     hidden: np.ndarray | None = None,
 ) -> Tiles:  # fmt: skip
     """The CPU form: a work-item owns a chunk of splats and a table of counts."""
-    kernels = device.program(KERNELS / "bin.cl")
-    scratch = projected.scratch
-    if scratch is None or scratch.grid != grid:
-        scratch = TileScratch.empty(device, projected.depth.shape[0], grid)
-        device.launch(
-            kernels["find_tile_bounds"], scratch.status.shape[0], 1,
-            projected.depth.shape[0], scratch.chunk, *grid, projected.record, projected.depth,
-            *scratch.arrays(),
-        )  # fmt: skip
+    scratch = _scratch_on(device, projected, grid)
     total = int(device.view(scratch.status)[:, 1].sum(dtype=np.int64))
     order = sort_order(device, scratch) if order is None else order
     made = (order, projected.record, scratch, total, hidden)

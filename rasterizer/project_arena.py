@@ -3,10 +3,17 @@
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, clusters_of, find_unseen
+from shapeshift.rasterizer.clusters.clusters import (
+    CLUSTER,
+    Chosen,
+    Clusters,
+    clusters_of,
+    find_unseen,
+)
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
 from shapeshift.rasterizer.project import (
@@ -21,6 +28,9 @@ from shapeshift.rasterizer.project import (
     chunks_of,
     grid_of,
 )
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
 
 KERNEL = Path(__file__).parent / "kernels" / "project_arena.cl"
 FARTHEST = 1e18  # metres, or pixels: its square is a finite float
@@ -63,7 +73,7 @@ def project_arena(
     device: Device, mean_opacity, covariance, color, object_index, world_from_object,
     cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
     into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (), second_color=None,
-    clusters: Clusters | None = None, pages: PageMap | None = None,
+    clusters: Clusters | Chosen | None = None, pages: PageMap | None = None,
 ) -> list[Projected]:  # fmt: skip
     """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
 
@@ -78,7 +88,8 @@ def project_arena(
     antialiased: one an object, or none where no object is: opacity falls as the low pass grows the
     ellipse, by sqrt(det / det with it) (Mip-Splatting's 2D filter, gsplat's "antialiased").
     clusters: boxes of the same arena, by which it leaves out what no view sees: not with
-    keep_outside, and `into` must be the latest result that was made in its arrays.
+    keep_outside, and `into` must be the latest result that was made in its arrays.  Chosen ones are
+    projected into these, and what they hold of others stays; orders and counts are theirs alone.
     pages: the rows that are drawn, in pages of mean_opacity and covariance; color, second_color and
     object_index are theirs, N is their number.
     """
@@ -103,12 +114,9 @@ def project_arena(
         variant["ANTIALIASED"] = 1
     packed = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     frame = device.constants(np.concatenate(packed))
-    unseen = None
-    if clusters is not None:
-        said = into[0].unseen  # of rows that say "culled" already
-        unseen = device.empty(clusters_of(count), np.int32) if said is None else said
-        find_unseen(device, clusters, views, poses[0].size, frame, unseen, said is not None)
-    projected = [replace(p, low_pass=limits.low_pass, unseen=unseen) for p in into]
+    asked = (views, orders, poses[0].size, frame)
+    unseen, said = _left_out(device, clusters, into[0].unseen, count, asked)
+    projected = [replace(p, low_pass=limits.low_pass, unseen=said) for p in into]
     buffers = [_buffers(p) for p in projected]
     scratch = projected[0].in_tiles
     device.launch(
@@ -121,6 +129,23 @@ def project_arena(
     return projected
 
 
+def _left_out(
+    device: Device, clusters: Clusters | Chosen | None, said: "Array | None", count: int,
+    asked: tuple,
+) -> "tuple[Array | None, Array | None]":  # fmt: skip
+    """Flags of clusters for a launch, and those of rows that say "culled" after it.
+
+    said: the latter before it; asked: what find_unseen takes of a frame.
+    """
+    if isinstance(clusters, Chosen):
+        return clusters.unseen, said
+    if clusters is None:
+        return None, None
+    unseen = device.empty(clusters_of(count), np.int32) if said is None else said
+    find_unseen(device, clusters, *asked, unseen, said is not None)
+    return unseen, unseen
+
+
 def clusters_unseen(
     device: Device, clusters: Clusters, cameras: list[Camera], limits: Limits, world_from_object
 ) -> np.ndarray:
@@ -129,7 +154,8 @@ def clusters_unseen(
     packed = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     unseen = device.empty(clusters.bounds.shape[0], np.int32)
     frame = device.constants(np.concatenate(packed))
-    find_unseen(device, clusters, len(cameras), poses[0].size, frame, unseen, False)
+    clusters = replace(clusters, occluders=None)
+    find_unseen(device, clusters, len(cameras), 0, poses[0].size, frame, unseen, False)
     found: np.ndarray = device.view(unseen) != 0
     return found
 

@@ -1,5 +1,6 @@
 """raster: intersection lists -> image, and the gradients of an image -> those of the records."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -141,6 +142,25 @@ def rasterize_with_heat(
     return [device.view(image) for image in images], [device.view(image) for image in hot]
 
 
+def rasterize_noting(
+    device: Device, views: list[tuple[Projected, Tiles]], size: tuple[int, int],
+    min_transmittance: float, images: "list[Array]", ends: "list[Array]",
+    only: list[np.ndarray] | None = None,
+) -> None:  # fmt: skip
+    """The CPU form of rasterize_rgba_views into images (H, W, 4).
+
+    ends: of each view (tiles, 2) int32, the last splat that a tile took in and that of the next
+    batch; -1 where more might have followed.
+
+    only: (tiles,) bool of each view; of other tiles images and ends stay as they are.
+    """
+    drawn = zip(views, images, strict=True)
+    inputs = [(t.starts, t.intersections, p.record, image) for (p, t), image in drawn]
+    masks = only and [device.upload(each.astype(np.uint8)) for each in only]
+    noting = list(zip(ends, masks or [None] * len(views), strict=True))
+    _draw_cpu(device, inputs, size, views[0][1].grid, float(min_transmittance), noting)
+
+
 def compile_with_heat(
     device: Device, form: str | None = None, min_transmittance: float = MIN_TRANSMITTANCE
 ) -> None:
@@ -157,11 +177,15 @@ def compile_with_heat(
 
 
 def _draw_cpu(
-    device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int], least: float
-) -> None:
-    """Two views a launch, a work-item a tile of both."""
+    device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int], least: float,
+    noting: "Sequence[tuple[Array | None, Array | None]]" = (),
+) -> None:  # fmt: skip
+    """Two views a launch, a work-item a tile of both.  noting: ends and only of each view."""
+    defines = {"HEAT": 1} if len(inputs[0]) > 4 else {}
+    kernel = device.program(KERNELS / "draw_cpu.cl", **defines)["draw"]
+    noting = noting or [(None, None)] * len(inputs)
+    inputs = [(*i[:4], *also, *i[4:]) for i, also in zip(inputs, noting, strict=True)]
     width = len(inputs[0])
-    kernel = device.program(KERNELS / "draw_cpu.cl", **({"HEAT": 1} if width > 4 else {}))["draw"]
     for first in range(0, len(inputs), 2):
         left, right = [*inputs[first : first + 2], [None] * width][:2]
         device.launch(kernel, grid[0] * grid[1], 1, *size, grid[0], least, *left, *right)

@@ -168,6 +168,11 @@ class Drawing(ABC):
     def counts(self) -> dict[str, int]:
         """{drawn, *CULL_REASONS} of the view drawn last: gates in their order."""
 
+    @property
+    def hidden(self) -> int:
+        """Splats that the last frame left out behind others: no gate was asked about them."""
+        return 0
+
     @abstractmethod
     def presentable(self, i: int) -> np.ndarray | moderngl.Texture:
         """The image of view i as resolve takes it: (H, W, 4), row 0 on top, or on the GPU, row 0 at

@@ -31,6 +31,7 @@ SLOTS = {
     "ORDER_OUT": 2,
     "HISTOGRAM": 3,  # uint (groups, RADIX)
     "COMMAND": 4,  # uint (5,)      one indirect draw
+    "DISPATCH": 5,  # uint (3,)      work groups of the sort's passes after the first
     # splat
     "ORDER": 1,  # uint (N,)      indices, near to far
     # surface

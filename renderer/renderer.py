@@ -257,11 +257,11 @@ class Renderer:
     def _stats_of(self, sorts: int, color_sets: int) -> FrameStats:
         """The counters of the frame that was just drawn; they begin anew."""
         drawn = (culled := self.drawing.counts()).pop("drawn")
-        runs, self._geometry_runs, self._color_runs = (self._geometry_runs, self._color_runs), 0, 0
-        stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
+        told = (drawn, culled, self.drawing.hidden, self._geometry_runs, self._color_runs)
+        self._geometry_runs = self._color_runs = 0
+        stats = FrameStats(self._timer.collect(), self._scene.splat_count, *told)
         stats.sorts, stats.order_age, stats.color_sets = sorts, self.drawing.order_age, color_sets
-        stats.debug = self._debug[0][1] if self._debug else stats.debug
-        stats.streaming = self.streaming.stats
+        stats.debug, stats.streaming = next((d[1] for d in self._debug), {}), self.streaming.stats
         return stats
 
     def _settings_of_frame(self) -> RenderSettings:

@@ -116,6 +116,7 @@ class FrameStats:
     splats: int = 0
     drawn: int = 0
     culled: dict[str, int] = field(default_factory=dict)  # CULL_REASONS
+    hidden: int = 0  # left out with their clusters, behind what is drawn: no gate was asked
     geometry_runs: int = 0  # objects whose four geometry networks ran for this frame
     color_runs: int = 0  # objects whose colours were computed for this frame, once for each eye
     color_sets: int = 1  # 2 where each of two eyes had its own

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
 
@@ -20,6 +22,35 @@ KERNELS = Path(__file__).parents[1] / "kernels" / "clusters"
 CLUSTER = 256  # rows; common/limits.cl has it, too
 BOUNDS = 12  # floats of a cluster
 GROUP = 64  # work-items
+INFINITE = np.float32(np.inf).view(np.int32)
+
+
+@dataclass(frozen=True)
+class Occluders:
+    """How deep in the order tiles are thought to be done, and what was left out behind them."""
+
+    limits: tuple  # buffers, of each view (tiles,) float32 metres, inf: not at all
+    nearest: "tuple[Array, ...]"  # of each view (tiles,) int32: see kernels/clusters/find_unseen.cl
+    reached: "Array"  # (views, C, 4) int32 tiles: columns from and to, rows from and to
+    hidden: "Array"  # (C,) int32: splats that are hidden, not out of view
+
+    @classmethod
+    def of(cls, device: Device, limits: list[np.ndarray], clusters: int) -> "Occluders":
+        """limits: (tiles down, tiles across) of each view."""
+        flat = [np.ravel(limit).astype(np.float32) for limit in limits]
+        return cls(
+            tuple(device.constants(limit) for limit in flat),
+            tuple(device.zeros(len(limit), np.int32) for limit in flat),
+            device.empty((len(limits), clusters, 4), np.int32),
+            device.empty(clusters, np.int32),
+        )
+
+    def nearest_boxes(self, device: Device) -> list[np.ndarray]:
+        """Of each view (tiles,) float32 metres in the order, inf where no box was left out."""
+        return [
+            (INFINITE - device.view(each).astype(np.int32)).view(np.float32)
+            for each in self.nearest
+        ]
 
 
 @dataclass(frozen=True)
@@ -28,6 +59,14 @@ class Clusters:
 
     bounds: "Array"  # (C, 12) float32: see kernels/clusters/bound_clusters.cl
     min_alpha: float  # fainter splats are in no box
+    occluders: Occluders | None = None  # of one frame
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Clusters that are projected once more, into arrays that hold the others."""
+
+    unseen: "Array"  # (C,) int32 as find_unseen.cl has them: 0 for those that are projected
 
 
 def clusters_of(count: int) -> int:
@@ -51,13 +90,20 @@ def bound_clusters(
 
 
 def find_unseen(
-    device: Device, clusters: Clusters, views: int, pose: int, frame, unseen: "Array", again: bool
-) -> None:
+    device: Device, clusters: Clusters, views: int, orders: int, pose: int, frame,
+    unseen: "Array", again: bool,
+) -> None:  # fmt: skip
     """Fills unseen (C,) int32 with flags as kernels/clusters/find_unseen.cl has them.
 
-    frame: that of project_arena, with so many views and floats an object.  again: what is not 0 in
-    `unseen` is true of the arrays that a projection will fill.
+    frame: that of project_arena, with so many views, orders and floats an object.  again: what is
+    not 0 in `unseen` is true of the arrays that a projection will fill.
     """
     kernel = device.program(KERNELS / "find_unseen.cl")["find_unseen"]
-    count = clusters.bounds.shape[0]
-    device.launch(kernel, count, GROUP, count, views, pose, again, frame, clusters.bounds, unseen)
+    count, given = clusters.bounds.shape[0], clusters.occluders
+    behind: tuple = (None,) * 6
+    if given is not None:
+        second = [each[-1] if views > 1 else None for each in (given.limits, given.nearest)]
+        behind = (given.limits[0], second[0], given.nearest[0], second[1])
+        behind += (given.reached, given.hidden)
+    shared = (count, views, orders, pose, again, frame)
+    device.launch(kernel, count, GROUP, *shared, clusters.bounds, unseen, *behind)

@@ -36,7 +36,7 @@ def rasterize_foveated(
     inputs: list[list] = []
     for i, (projected, tiles) in enumerate(views):
         image, halved = pictures[i]
-        given = [tiles.starts, tiles.intersections, projected.record, image]
+        given = [tiles.starts, tiles.intersections, projected.record, image, None, None]
         beside = [heats[i], hot[i][0]] if heats else []
         kinds = device.constants(foveas[i].kinds_of_tiles(size))
         inputs.append([*given, *beside, kinds, halved, *([hot[i][1]] if heats else [])])

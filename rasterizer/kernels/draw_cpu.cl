@@ -6,11 +6,12 @@
 // 3DGS's, front to back (paper eq. 2): C += c alpha T, T *= 1 - alpha.
 // Reads:   the lists of bin (starts, intersections) and the records (N, 12) of each view; with HEAT
 //          = 1 value and weight of each splat (float4 x and w); with FOVEATED = 1 the kind of each
-//          tile, a byte.
-// Writes:  image (H, W, 4), alpha = 1 - T; with HEAT heat_image (H, W, 2), blended as the colours
-//          are.  With FOVEATED the same at half the width and height (rounded up): samples at the
-//          corner that four pixels share, or their mean; the image has no pixels of coarse tiles
-//          then, which foveate.cl fills.
+//          tile, a byte; where there is one `only` (tiles,): 0 leaves a tile as it is.
+// Writes:  image (H, W, 4), alpha = 1 - T; where there is one ends (tiles, 2): the last splat that
+//          a tile took in and that of a batch more, -1 where it would have taken a longer list;
+//          with HEAT heat_image (H, W, 2), blended as the colours are.  With FOVEATED the same at
+//          half the width and height (rounded up): samples at the corner that four pixels share,
+//          or their mean; the image has no pixels of coarse tiles then, which foveate.cl fills.
 // Units:   pixels, row 0 on top; display sRGB; transmittance T in 0..1.
 #define SIDE 4     // pixels of a block, and blocks of a tile
 #define BLOCKS 16  // bits of a ushort
@@ -155,7 +156,10 @@ inline void store_heat_means(float16 hot, float16 weight, int x0, int y0, int wi
 // blocks).
 inline void draw_tile(int tile, int width, int height, int tiles_x, __global const int* tile_start,
                       __global const int* intersections, __global const float* record,
-                      float min_transmittance, __global float* image AND_HEAT AND_FINE) {
+                      float min_transmittance, __global float* image, __global int* ends,
+                      __global const uchar* only AND_HEAT AND_FINE) {
+  if (only && !only[tile]) return;
+  if (ends) vstore2((int2)(-1), tile, ends);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
   const int begin = tile_start[tile], end = tile_start[tile + 1];
 #if !defined(HEAT) && !defined(FOVEATED)
@@ -258,6 +262,9 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       if (!(some.x | some.y)) open &= ~(1u << k);
     }
   }
+  // Nothing of the list behind p was looked at; a batch that is not full would have taken more.
+  if (ends && !open && (p - begin) % BATCH == 0)
+    vstore2((int2)(intersections[p - 1], intersections[min(p + BATCH, end) - 1]), tile, ends);
   // Premultiplied, over nothing: the background is put behind it when it is shown.
 #ifdef FOVEATED
   const int half_w = (width + 1) / 2, half_h = (height + 1) / 2;
@@ -291,15 +298,15 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
 // One view, or the same tile of two views one after the other: eyes share what the caches hold.
 __kernel void draw(int width, int height, int tiles_x, float min_transmittance,
                    __global const int* starts_0, __global const int* intersections_0,
-                   __global const float* record_0, __global float* image_0 AND_HEAT_OF(0)
-                       AND_FINE_OF(0),
+                   __global const float* record_0, __global float* image_0, __global int* ends_0,
+                   __global const uchar* only_0 AND_HEAT_OF(0) AND_FINE_OF(0),
                    __global const int* starts_1, __global const int* intersections_1,
-                   __global const float* record_1, __global float* image_1 AND_HEAT_OF(1)
-                       AND_FINE_OF(1)) {
+                   __global const float* record_1, __global float* image_1, __global int* ends_1,
+                   __global const uchar* only_1 AND_HEAT_OF(1) AND_FINE_OF(1)) {
   const int tile = get_global_id(0);
   draw_tile(tile, width, height, tiles_x, starts_0, intersections_0, record_0, min_transmittance,
-            image_0 GIVE_HEAT(0) GIVE_FINE(0));
+            image_0, ends_0, only_0 GIVE_HEAT(0) GIVE_FINE(0));
   if (image_1)
     draw_tile(tile, width, height, tiles_x, starts_1, intersections_1, record_1, min_transmittance,
-              image_1 GIVE_HEAT(1) GIVE_FINE(1));
+              image_1, ends_1, only_1 GIVE_HEAT(1) GIVE_FINE(1));
 }

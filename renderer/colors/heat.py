@@ -5,7 +5,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
 
 
 class Heater:
@@ -38,9 +38,9 @@ class Heater:
             if self._weights is not None:
                 self._weights.release()
             self._weights = self._gpu.reserve(weights.nbytes, "weights of a thermal stop")
-        self._weights.write(weights)
+        overwrite(self._weights, weights)
         if palette is not None:
-            self._palette.write(np.pad(np.float32(palette), ((0, 0), (0, 1))))
+            overwrite(self._palette, np.pad(np.float32(palette), ((0, 0), (0, 1))))
         bind(color=arena.color, heat=arena.heat, palette=self._palette, tint=self._weights)
         self._add["first"].value, self._add["colored"].value = first, palette is not None
         self._gpu.run(

@@ -31,7 +31,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer import layout
-from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
 from shapeshift.renderer.limits import too_many
 
 STAGED_SPLATS = 1 << 20  # decoded at a time; bounds the staging buffer to 46 MB
@@ -91,6 +91,7 @@ class Arena:
         self._sorted = gpu.reserve(4)  # of counts, while others are counted
         self.command = gpu.upload(np.array([0, 1, 0, 0, 0], np.uint32))
         fit = min(STAGED_SPLATS, gpu.max_block // (4 * STAGED_FLOATS))
+        self.dispatch = gpu.upload(np.array([0, 1, 1], np.uint32))
         self.staged = min(max(counts, default=0), fit)
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
@@ -118,7 +119,7 @@ class Arena:
         """Object i has none, where there is any at all."""
         rows = self.starts[i + 1] - self.starts[i]
         if self.set in self._heats and rows:
-            self.heat.write(bytes(16 * rows), offset=16 * self.starts[i])
+            overwrite(self.heat, bytes(16 * rows), offset=16 * self.starts[i])
 
     def color_set(self, which: int, count: int) -> None:
         """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
@@ -200,7 +201,7 @@ class Arena:
             arrays = (means[part], scales[part], wxyz[part], opacity[part])
             for name, array in zip(PARTS, arrays, strict=True):
                 rows = np.ascontiguousarray(array, np.float32)
-                self.staging.write(rows, offset=4 * self.staging_at(name))
+                overwrite(self.staging, rows, offset=4 * self.staging_at(name))
             self.pack_staged(first, part.stop - part.start)
 
     def write_color(self, i: int, color: np.ndarray) -> None:
@@ -209,7 +210,7 @@ class Arena:
         rows = np.zeros((end - start, 4), np.float32)
         rows[:, :3] = color
         if end > start:
-            self.color.write(rows, offset=16 * start)
+            overwrite(self.color, rows, offset=16 * start)
 
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """mean_opacity (n, 4) and covariance (n, 8) of object i."""
@@ -228,13 +229,13 @@ class Arena:
         for buffer, rows, width in parts if end > start else ():
             if rows is not None:
                 data = np.ascontiguousarray(rows, np.float32)
-                buffer.write(data, offset=4 * width * start)
+                overwrite(buffer, data, offset=4 * width * start)
 
     def write_heat(self, i: int, heat: np.ndarray) -> None:
         """Uploads what thermal stops have in the colours of object i, (n, 4), to the set in use."""
         start, end = self._rows(i, heat, "heats")
         if end > start:
-            self.heat.write(np.ascontiguousarray(heat, np.float32), offset=16 * start)
+            overwrite(self.heat, np.ascontiguousarray(heat, np.float32), offset=16 * start)
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
         """(n, 3) colours of object i in the set in use, and (n, 4) heat; None: there is none."""
@@ -260,7 +261,7 @@ class Arena:
         for buffer in (
             self.mean_opacity, self.covariance, *self.colors, self.records,
             self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
-            self.command, self.staging, self._sorted,
+            self.command, self.dispatch, self.staging, self._sorted,
         ):  # fmt: skip
             buffer.release()
         for buffer in self._heats.values():

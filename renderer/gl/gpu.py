@@ -80,6 +80,15 @@ class Gpu:
         program.run(groups)
         self.ctx.memory_barrier()
 
+    def run_indirect(
+        self, program: moderngl.ComputeShader, groups: moderngl.Buffer, **uniforms: Any
+    ) -> None:
+        """The same with as many groups as a buffer (3,) of the GPU says."""
+        for name, value in uniforms.items():
+            program[name].value = value
+        program.run_indirect(groups)
+        self.ctx.memory_barrier()
+
     @contextmanager
     def drawing_into(self, framebuffer: moderngl.Framebuffer) -> Iterator[None]:
         """Binds a framebuffer for the body; then again what was bound, so that a window stays the
@@ -102,6 +111,19 @@ class Gpu:
 
     def __exit__(self, *failure) -> None:
         self.release()
+
+
+def overwrite(buffer: moderngl.Buffer, data: Any, offset: int = 0) -> None:
+    """Other bytes from `offset` on in a buffer that a pass has read or written before.
+
+    GL promises that such a pass is done before; with NVIDIA's driver 580 writes overtake compute
+    passes that still run.  So what is written as a whole gets new memory, and a part waits.
+    """
+    if offset == 0 and memoryview(data).nbytes == buffer.size:
+        buffer.orphan()
+    else:
+        buffer.ctx.finish()
+    buffer.write(data, offset)
 
 
 def release_framebuffer(framebuffer: moderngl.Framebuffer) -> None:

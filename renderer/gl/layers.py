@@ -5,7 +5,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, is_each
 
@@ -44,13 +44,13 @@ class Layers:
         model = self._model
         program, weights = self._weigh, self._weights
         if not is_each(x):
-            weights.write(model.weights(x))
+            overwrite(weights, model.weights(x))
         else:
             program = self._gpu.compute("weigh.comp", OWN_CONTROL=1)
             if self._own_weights is None:
                 self._own_weights = self._gpu.reserve(4 * model.splat_count, "weights")
             weights = self._own_weights
-            weights.write(model.weights(x)[model.layer, np.arange(model.splat_count)])
+            overwrite(weights, model.weights(x)[model.layer, np.arange(model.splat_count)])
         bind(mean_opacity=arena.mean_opacity, layer=self._layer)
         bind(layer_weights=weights, own_opacity=self._opacity)
         groups = groups_for(model.splat_count, layout.WORKGROUP)

@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import PARTS, Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
 from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.blocks.evaluate_blocks import control_of
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
@@ -168,7 +168,7 @@ class GlNetworks:
             head.program["control_vecs"].value = vecs(width)
         rows = np.zeros((len(self._model.anchors), 4 * vecs(width)), np.float32)
         rows[:, :width] = self._model.psi(x)
-        self._control.write(rows)
+        overwrite(self._control, rows)
         return self._own
 
     def geometry(self, arena: Arena, start: int, x: Controls) -> None:
@@ -256,5 +256,5 @@ class _Head:
         """Folds Psi(x) into the first layer's bias, where it is not there already."""
         if x != self.x:
             bias = self.packed.folded_bias(model.psi(x)[0])
-            self.weights.write(bias, offset=self.packed.bias_at)
+            overwrite(self.weights, bias, offset=self.packed.bias_at)
             self.x = x

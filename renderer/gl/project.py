@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.scene.pose import View
 
@@ -54,7 +54,7 @@ class Projector:
             raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
         counts = NO_COUNTS.copy()
         counts[layout.COUNTS["SORTED"]] = arena.count  # from which project subtracts
-        arena.counts.write(counts)
+        overwrite(arena.counts, counts)
         if not arena.count:
             return
         arena.make_room(len(views))

@@ -20,7 +20,7 @@ from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.debug.overdraw import count_overdraw
 from shapeshift.renderer.gl.debug.splat_edges import draw_edges
 from shapeshift.renderer.gl.decode import Decoder
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, overwrite
 from shapeshift.renderer.gl.lenses.foveated import FoveatedSplatter
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
@@ -209,7 +209,7 @@ class QuadsDrawing(Drawing):
             yield
         finally:
             for buffer, data in kept:
-                buffer.write(data)
+                overwrite(buffer, data)
             self._sort_policy = sort_policy
             self.sorts, self.order_age, self._changed = now
 
@@ -287,7 +287,7 @@ class QuadsDrawing(Drawing):
             self._projector.project(arena, [view], settings)
             self._sorter.sort(arena, settings.key_bits)
             made = draw_surface(self._gpu, arena, view, settings)
-            arena.counts.write(counts)
+            overwrite(arena.counts, counts)
         return made
 
     def close(self) -> None:

@@ -10,11 +10,12 @@ KEY_BITS = (16, 32)
 
 
 class Sorter:
-    """Fills arena.order (indices; culled splats last) and the draw command.
+    """Fills arena.order (indices of the splats that have a key) and the draw command.
 
     backend "gl": LSD radix, 8 bits a pass, reduce then scan; no subgroups, no read-back, any
-    GL 4.3.  "numpy": reads the keys back; on software GL they are in the same memory and
-    numpy's radix sort of 16-bit halves is 20 times faster (6 against 120 ms for 400,000 keys).
+    GL 4.3; its first pass leaves out what is culled, and those that follow, too, by indirect
+    dispatch.  "numpy": reads the keys back; on software GL they are in the same memory and numpy's
+    radix sort of 16-bit halves is 20 times faster (6 against 120 ms for 400,000 keys).
     """
 
     def __init__(self, gpu: Gpu, backend: str) -> None:
@@ -33,12 +34,12 @@ class Sorter:
         """Sorts by arena.keys: 32 is exact, 16 divides the frame's depths into 65535 steps."""
         if key_bits not in KEY_BITS:
             raise ValueError(f"key_bits is {key_bits}; choose 16 or 32 (exact).")
+        bind(counts=arena.counts, command=arena.command, dispatch=arena.dispatch)
+        self._gpu.run(self._command, 1)
         if arena.count and self.backend == "gl":
             self._sort_on_gpu(arena, key_bits)
         elif arena.count:
             self._sort_with_numpy(arena, key_bits)
-        bind(counts=arena.counts, command=arena.command)
-        self._gpu.run(self._command, 1)
 
     def _sort_on_gpu(self, arena: Arena, key_bits: int) -> None:
         if key_bits == 16:
@@ -49,12 +50,23 @@ class Sorter:
         groups = groups_for(arena.count, layout.WORKGROUP * layout.SORT_BLOCKS)
         here = (arena.keys, arena.order)
         there = (arena.keys_spare, arena.order_spare)
+        culled = layout.CULLED_KEY if key_bits == 32 else (1 << 16) - 1
+        bind(histogram=arena.histogram, counts=arena.counts, dispatch=arena.dispatch)
         for shift in range(0, key_bits, 8):  # an even number of passes: the result ends `here`
             bind(keys=here[0], order_in=here[1], keys_out=there[0], order_out=there[1])
-            bind(histogram=arena.histogram)
-            self._gpu.run(self._count, groups, count=arena.count, shift=shift)
-            self._gpu.run(self._scan, 1, group_count=groups)
-            self._gpu.run(self._scatter, groups, count=arena.count, shift=shift)
+            for program in (self._count, self._scan, self._scatter):
+                program["shift"].value = shift
+            for program in (self._count, self._scatter):
+                program["count"].value, program["culled"].value = arena.count, culled
+            self._scan["group_count"].value = groups
+            if shift == 0:
+                self._gpu.run(self._count, groups)
+                self._gpu.run(self._scan, 1)
+                self._gpu.run(self._scatter, groups)
+            else:
+                self._gpu.run_indirect(self._count, arena.dispatch)
+                self._gpu.run(self._scan, 1)
+                self._gpu.run_indirect(self._scatter, arena.dispatch)
             here, there = there, here
 
     def _sort_with_numpy(self, arena: Arena, key_bits: int) -> None:

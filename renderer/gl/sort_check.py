@@ -4,7 +4,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, overwrite
 from shapeshift.renderer.gl.sort import KEY_BITS, Sorter, quantize, stable_order
 from shapeshift.renderer.gl.target import warn_once
 
@@ -41,7 +41,7 @@ def first_wrong(gpu: Gpu, sorter: Sorter) -> str:
         with Arena(gpu, [count]) as arena:
             for bits in KEY_BITS:
                 write_keys(arena, keys)
-                arena.order.write(np.full(max(count, 1), UNWRITTEN, np.uint32))
+                overwrite(arena.order, np.full(max(count, 1), UNWRITTEN, np.uint32))
                 sorter.sort(arena, bits)
                 if not _in_order(arena, keys, bits):
                     return f"{count} keys of {bits} bits"
@@ -56,8 +56,8 @@ def write_keys(arena: Arena, keys: np.ndarray) -> None:
     counts[layout.COUNTS["NEAREST"]] = drawn.min(initial=layout.CULLED_KEY)
     counts[layout.COUNTS["FARTHEST"]] = drawn.max(initial=0)
     if len(keys):
-        arena.keys.write(keys)
-    arena.counts.write(counts)
+        overwrite(arena.keys, keys)
+    overwrite(arena.counts, counts)
 
 
 def _known_keys(count: int) -> np.ndarray:
@@ -72,15 +72,15 @@ def _known_keys(count: int) -> np.ndarray:
 
 def _in_order(arena: Arena, keys: np.ndarray, bits: int) -> bool:
     """Whether arena.order is the stable order of the keys, or of the 16-bit steps they became."""
-    count = len(keys)
+    there = keys != layout.CULLED_KEY
+    count = np.count_nonzero(there)
     order = np.frombuffer(arena.order.read(), np.uint32)[:count]
     if bits == 32:
-        return np.array_equal(order, stable_order(keys))
-    if not np.array_equal(np.sort(order), np.arange(count)):
+        return np.array_equal(order, stable_order(keys)[:count])
+    if not np.array_equal(np.sort(order), np.flatnonzero(there)):
         return False
-    steps = np.zeros(count, np.int64)
+    steps = np.full(len(keys), 65535, np.int64)
     steps[order] = np.frombuffer(arena.keys.read(), np.uint32)[:count]
     # The driver's division may round a step otherwise than numpy's, no further.
     close = np.abs(steps - quantize(keys)).max(initial=0) <= 1
-    culled = np.array_equal(steps == 65535, keys == layout.CULLED_KEY)
-    return bool(close and culled and np.array_equal(order, stable_order(steps, 16)))
+    return bool(close and np.array_equal(order, stable_order(steps, 16)[:count]))

@@ -41,11 +41,14 @@ class Culling:
         """Splats moved, grew or faded."""
         self._clusters, self._rested, self._paused = None, 0, 0
 
+    def boxes(self, min_alpha: float) -> Clusters | None:
+        """The boxes, where they are true."""
+        made = self._clusters if self.allowed else None
+        return made if made is not None and made.min_alpha == min_alpha else None
+
     def in_use(self, min_alpha: float) -> Clusters | None:
-        """The boxes, where they are true and told to be of use."""
-        made = self._clusters
-        usable = self.allowed and not self._paused and made is not None
-        return made if usable and made is not None and made.min_alpha == min_alpha else None
+        """The same where they were of use."""
+        return None if self._paused else self.boxes(min_alpha)
 
     def next_frame(self, device: Device, arena: "Arena", least: float) -> None:
         """Once a frame; arena: mean_opacity, covariance, object_index, pages; least: alpha."""

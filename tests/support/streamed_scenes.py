@@ -1,6 +1,7 @@
 """Small scenes in levels of detail on disk, read leaf by leaf."""
 
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,6 +59,15 @@ def scene_of(*models: SplatLayers) -> Scene:
 
 def view_at(eye=(0.0, 0.5, 6.0), target=(0.0, 0.0, 0.0), size=(160, 96), fov_y=0.8) -> View:
     return View(look_at(np.array(eye), np.array(target)), perspective(fov_y, size), 0.05, 100, size)
+
+
+def rest(renderer, view) -> int:
+    """Frames of one view until nothing is on its way."""
+    for n in range(400):
+        if not renderer.draw([view]).streaming.pending:
+            return n
+        time.sleep(0.002)  # for the thread that reads
+    raise AssertionError("still on its way")
 
 
 def changed_tree(folder: Path, change) -> None:

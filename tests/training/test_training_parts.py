@@ -13,9 +13,11 @@ from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.divergence_guard import DivergenceGuard
 from shapeshift.training.first_anchors.initial import (
-    choose_voxel,
     filler_points,
     initial_points,
+)
+from shapeshift.training.first_anchors.spacing import (
+    choose_voxel,
     median_neighbour,
     voxel_centres,
 )

@@ -31,8 +31,10 @@ from shapeshift.training.drawing import Color
 from shapeshift.training.first_anchors.first_anchors import neighbour_distance, photo_colors
 from shapeshift.training.first_anchors.initial import (
     Report,
-    choose_voxel,
     initial_points,
+)
+from shapeshift.training.first_anchors.spacing import (
+    choose_voxel,
     voxel_centres,
 )
 from shapeshift.training.heads.optimizer import Adam

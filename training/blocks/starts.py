@@ -29,7 +29,10 @@ from shapeshift.training.blocks.block_start import (
 )
 from shapeshift.training.blocks.cover import CoarsePicture, Cover, Progress, cover_of
 from shapeshift.training.blocks.cut import FAR, Wanted, cut_whole, far_away
-from shapeshift.training.first_anchors.initial import median_neighbour, voxel_centres
+from shapeshift.training.first_anchors.spacing import (
+    median_neighbour,
+    voxel_centres,
+)
 from shapeshift.training.settings import TrainSettings
 
 LIST = "cut.json"

@@ -10,6 +10,8 @@ import numpy as np
 
 from shapeshift.training.first_anchors.initial import (
     InitialPoints,
+)
+from shapeshift.training.first_anchors.spacing import (
     median_neighbour,
     voxel_centres,
 )

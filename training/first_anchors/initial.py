@@ -9,15 +9,13 @@ import numpy as np
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View
+from shapeshift.training.first_anchors.hull import visual_hulls
 from shapeshift.training.first_anchors.point_sources import CLOUDS, cloud_points, depth_points
 from shapeshift.training.first_anchors.triangulation import triangulated_points
-from shapeshift.training.first_anchors.views import common_box, distance_of, pixel_of, seen_first
+from shapeshift.training.first_anchors.views import common_box, distance_of, pixel_of
 from shapeshift.training.photos import LoadedPhoto, sampled
-from shapeshift.training.supervision.backgrounds import NOISE
 
 SOURCES = ("auto", "capture", "depth", "hull", "triangulated", "random")  # or a file: see CLOUDS
-COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of a cube of the carved box's volume
-HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
 FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
 RANDOM_POINTS = 20_000
 NO_POINTS = np.zeros((0, 3))
@@ -25,11 +23,9 @@ GUESSES = 0.08  # of the anchors at most: guesses where the photos show what has
 ON_HULL = 0.3  # of the anchors at most, where the others stand at triangulated points
 FEWEST = 100  # triangulated points; fewer are chance ...
 FEWEST_ALONE = 20  # ... but better than none where nothing else says how far things are
-LEAST_SEEN = 0.5  # of a hull's points; of objects seen from all around 0.65 to 0.85 are
 LEAST_WATCHED = 0.1  # of the place that cameras look at together: else they look at several
 NEAREST, FARTHEST = 0.3, 4.0  # guesses along rays, in median distances to what cameras look at
 Report = Callable[[str], None]  # what is done now, in words
-SAMPLE = 1000  # points whose nearest neighbour is looked for
 
 
 class InitialPoints(NamedTuple):
@@ -42,114 +38,6 @@ class InitialPoints(NamedTuple):
     guess_share: float = GUESSES  # of the anchors, at most
     guess_shapes: tuple[np.ndarray, ...] = ()  # the guesses of each shape, where there are several
     doubts: tuple[str, ...] = ()  # what a person should know of it, a sentence each
-
-
-def median_neighbour(points: np.ndarray, rng: np.random.Generator) -> float:
-    """Median distance in metres from a point to its nearest neighbour, over a sample."""
-    picked = rng.choice(len(points), min(SAMPLE, len(points)), replace=False)
-    square = (points**2).sum(1)
-    nearest = []
-    for chunk in np.array_split(picked, max(1, len(picked) // 100)):
-        distance2 = square[chunk, None] + square[None] - 2 * points[chunk] @ points.T
-        distance2[np.arange(len(chunk)), chunk] = np.inf
-        nearest.append(distance2.min(axis=1))
-    return float(np.sqrt(np.median(np.maximum(np.concatenate(nearest), 0))))
-
-
-def voxel_centres(points: np.ndarray, voxel: float) -> np.ndarray:
-    """(A, 3) float32 the grid nodes of spacing `voxel` that have a point, each once, sorted."""
-    return (np.unique(np.round(points / voxel), axis=0) * voxel).astype(np.float32)
-
-
-def choose_voxel(points: np.ndarray, most: int, rng: np.random.Generator) -> float:
-    """Median neighbour distance, or as much more as it takes to come down to `most` anchors."""
-    low = max(median_neighbour(points, rng), 1e-9)
-    if len(voxel_centres(points, low)) <= most:
-        return low
-    high = low
-    while len(voxel_centres(points, high)) > most:
-        low, high = high, high * 2
-    for _ in range(8):  # to 0.4 %
-        middle = (low * high) ** 0.5
-        low, high = (middle, high) if len(voxel_centres(points, middle)) > most else (low, middle)
-    return high
-
-
-def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | None:
-    """(H, W) bool where the photo shows the object; None where that is unknown."""
-    if photo.see_through:
-        return photo.rgba[..., 3] >= 128
-    if background is None:
-        return None
-    difference = np.abs(photo.over(background) - np.asarray(background, np.float32)).max(axis=2)
-    shape = difference > NOISE
-    return shape if photo.weight is None else shape | ~(photo.weight > 0)  # unknown: not carved
-
-
-def carve(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:
-    """(P, 3) centres of the surface cells of a box that no silhouette shows as background.
-
-    photos: (view, silhouette).  The box from `low` to `high` has about side^3 cells, all cubes:
-    in cells that are long one way, points would be nearest to each other the other way.
-    """
-    edge = float(np.prod((high - low) / side)) ** (1 / 3)  # metres
-    counts = np.maximum(np.rint((high - low) / edge), 1).astype(int)
-    axes = [(np.arange(count) + 0.5 - count / 2) * edge for count in counts]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) + (low + high) / 2
-    solid, seen = np.ones(len(points), bool), np.zeros(len(points), int)
-    for view, shape in photos:
-        left = np.flatnonzero(solid)
-        pixel, inside = pixel_of(view, points[left])
-        column, row = pixel[inside].astype(int).T
-        solid[left[inside]] = shape[row, column]
-        seen[left[inside]] += 1
-    solid &= seen >= max(2, len(photos) // 4)
-    cells = np.pad(solid.reshape(counts), 1)
-    buried = np.ones_like(cells)
-    for shift in (-1, 1):
-        for dimension in range(3):
-            buried &= np.roll(cells, shift, dimension)
-    surface = (cells & ~buried)[1:-1, 1:-1, 1:-1].reshape(-1)
-    return points[surface]
-
-
-def visual_hull(photos: list[tuple], centre: np.ndarray, half: float) -> np.ndarray:
-    """(P, 3) surface of what all silhouettes allow, carved coarsely first, then in its own box."""
-    photos = photos[:: -(-len(photos) // HULL_PHOTOS)]
-    coarse = carve(photos, centre - half, centre + half, COARSE_SIDE)
-    if not len(coarse):
-        return coarse
-    margin = 2 * half / COARSE_SIDE
-    fine = carve(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
-    return seen_part(fine, [view for view, _ in photos])
-
-
-def seen_part(hull: np.ndarray, views: list[View]) -> np.ndarray:
-    """The hull without what none of the photos sees of it, where that is the larger part.
-
-    What was photographed from one side only has a hull like a wedge behind it: no step would ever
-    change what stands there, and a view from another side shows it.
-    """
-    if len(hull) < 2:
-        return hull
-    edge = median_neighbour(hull, np.random.default_rng(0))
-    seen = seen_first(hull, edge, views)
-    return hull if seen.mean() >= LEAST_SEEN else hull[seen]
-
-
-def visual_hulls(photos: list[LoadedPhoto], background: tuple | None) -> list[np.ndarray]:
-    """(P, 3) the hull of each modality, since one may hide what another shows.
-
-    Empty where no photo tells object from background.
-    """
-    centre, half = common_box([p.view for p in photos])
-    photos, found = sampled(photos), []
-    for modality in dict.fromkeys(p.modality for p in photos):
-        shapes = [(p.view, silhouette(p, background)) for p in photos if p.modality == modality]
-        shapes = [(view, shape) for view, shape in shapes if shape is not None]
-        if shapes:
-            found.append(visual_hull(shapes, centre, half))
-    return found
 
 
 def filler_points(
@@ -238,7 +126,7 @@ def initial_points(
             where = "on the hull alone" if hull else "at random places"
             doubts = (f"{why}  The first anchors stand {where}.",)
     if hull:
-        return hull._replace(doubts=doubts)
+        return hull._replace(doubts=hull.doubts + doubts)
     if source not in ("auto", "random"):
         lacking = {
             "capture": "has no points of its own (COLMAP's points3D, or 'points' in its JSON)",
@@ -255,9 +143,9 @@ def hull_points(capture: Capture, photos: list[LoadedPhoto]) -> InitialPoints | 
 
     Raises BadFile where masks contradict each other.
     """
-    hulls = visual_hulls(photos, capture.background)
+    hulls, doubts = visual_hulls(photos, capture.background)
     if shapes := tuple(hull for hull in hulls if len(hull)):
-        return InitialPoints(np.concatenate(shapes), "hull", shapes)
+        return InitialPoints(np.concatenate(shapes), "hull", shapes, doubts=doubts)
     if hulls and any(p.see_through for p in sampled(photos)):
         raise BadFile(
             f"{capture.folder}: the masks have no volume in common; check that masks and poses "
@@ -273,6 +161,7 @@ def with_hull(found: InitialPoints, hull: InitialPoints) -> InitialPoints:
         guesses=hull.points,
         guess_share=ON_HULL,
         guess_shapes=hull.shapes,
+        doubts=hull.doubts,
     )
 
 

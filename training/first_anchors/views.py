@@ -21,6 +21,19 @@ def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return pixel, inside
 
 
+def pixel_size(points: np.ndarray, views: list[View]) -> np.ndarray:
+    """(P,) metres that a pixel of the view that sees a point finest is wide there; Inf where none
+    does.
+    """
+    finest = np.full(len(points), np.inf)
+    for view in views:
+        camera_from_world, fx, fy, _, _ = view.pinhole()
+        _, inside = pixel_of(view, points)
+        depth = points[inside] @ camera_from_world[2, :3] + camera_from_world[2, 3]
+        finest[inside] = np.minimum(finest[inside], depth / max(fx, fy))
+    return finest
+
+
 def seen_first(points: np.ndarray, edge: float, views: list[View]) -> np.ndarray:
     """(P,) whether any view has nothing of a surface before a point of it.
 

@@ -4,7 +4,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, overwrite
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import View
@@ -21,7 +21,7 @@ def count_overdraw(
         return np.zeros((height, width), np.float32)
     counts = arena.counts.read()
     projector.project(arena, [view], settings)
-    arena.counts.write(counts)
+    overwrite(arena.counts, counts)
     program = gpu.program("overdraw.vert", "overdraw.frag")
     program["size"].value, program["min_alpha"].value = view.size, settings.min_alpha
     target = gpu.target(view.size, "f4")

@@ -5,7 +5,7 @@ import numpy as np
 
 from shapeshift.rasterizer.splat_edges import BAND_PX, EDGE_POWER, KINDS, POINT_PX
 from shapeshift.renderer.gl.buffers import Arena, bind
-from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.gpu import Gpu, overwrite
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import View
@@ -23,7 +23,7 @@ def draw_edges(
         return np.zeros((height, width, 4), np.float32)
     counts = arena.counts.read()
     projector.project(arena, [view], settings, keep_outside=True)
-    arena.counts.write(counts)
+    overwrite(arena.counts, counts)
     program = gpu.program("splat.vert", "splat_edges.frag", HEAT=0, KIND=KINDS.index(kind))
     values = {
         "size": view.size, "min_alpha": settings.min_alpha, "first": 0, "per_unit": 1.0,

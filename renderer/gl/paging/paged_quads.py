@@ -10,7 +10,7 @@ from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer import layout
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.gl.buffers import bind
-from shapeshift.renderer.gl.gpu import groups_for
+from shapeshift.renderer.gl.gpu import groups_for, overwrite
 from shapeshift.renderer.gl.quads import QuadsDrawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.runtime_models.leaf_levels import LeafSplats
@@ -28,7 +28,9 @@ class PagedQuads(QuadsDrawing):
     belong to the run before them.
     """
 
+    weighs_pages = True
     _is_paged: tuple[bool, ...] = ()  # of each object
+    _left_out = np.zeros(0, np.float32)  # the part of each page that is not drawn
     _owner = np.zeros(0, np.int32)  # object of each page; -1: it is free
     _first = 0  # row of the arena where pages begin
     _sh: moderngl.Buffer | None = None  # (pages, coefficients * 3, PAGE)
@@ -46,7 +48,7 @@ class PagedQuads(QuadsDrawing):
         self._first = sum(map(arena_rows, models))
         self.allocate(models, PAGE * pages)
         self._is_paged = tuple(getattr(model, "leaves", None) is not None for model in models)
-        self._owner = np.full(pages, -1, np.int32)
+        self._owner, self._left_out = np.full(pages, -1, np.int32), np.zeros(pages, np.float32)
         self._coefficients, self._brightest_placed = coefficients, 1.0
         size = 12 * coefficients * PAGE * pages
         self._sh = self._gpu.reserve(size, "spherical harmonics")
@@ -84,7 +86,7 @@ class PagedQuads(QuadsDrawing):
             length = float(np.sqrt(np.square(given.sh).sum(axis=1).max()))
             most = 0.5 + length * math.sqrt(given.sh.shape[1] / (4 * math.pi))
             self._brightest_placed = max(self._brightest_placed, most)
-        self._owner[pages] = owner
+        self._owner[pages], self._left_out[pages] = owner, 0
         self._note_runs()
         self._changed = True
 
@@ -93,6 +95,18 @@ class PagedQuads(QuadsDrawing):
         self._owner[pages] = -1
         self._note_runs()
         self._changed = True
+
+    def weigh_pages(self, pages: np.ndarray, part: float) -> None:
+        program = self._gpu.compute("paging/fade_pages.comp")
+        bind(covariance=self.arena.covariance)
+        for first, last in runs_of(np.sort(pages)):
+            count = PAGE * (last - first)
+            self._gpu.run(
+                program, groups_for(count, layout.WORKGROUP), count=count,
+                start=self._first + PAGE * first, left_out=1 - part,
+            )  # fmt: skip
+        self._left_out[pages] = 1 - part
+        self._changed |= len(pages) > 0
 
     def shade_pages(self, pages: np.ndarray) -> None:
         for color in self.arena.colors:
@@ -132,7 +146,9 @@ class PagedQuads(QuadsDrawing):
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         if not self._is_paged[i]:
             return super().read_splats(i)
-        return self._read(i, self.arena.mean_opacity, 4), self._read(i, self.arena.covariance, 8)
+        shapes = self._read(i, self.arena.covariance, 8)
+        shapes[:, 6:] = 0  # what is left out is the page's
+        return self._read(i, self.arena.mean_opacity, 4), shapes
 
     def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
         if not self._is_paged[i]:
@@ -140,7 +156,9 @@ class PagedQuads(QuadsDrawing):
             return
         self._write(self.pages_of(i), self.arena.mean_opacity, mean_opacity)
         if covariance is not None:
-            self._write(self.pages_of(i), self.arena.covariance, covariance)
+            shapes = covariance.copy()
+            shapes[:, 6] = np.repeat(self._left_out[self.pages_of(i)], PAGE)
+            self._write(self.pages_of(i), self.arena.covariance, shapes)
         self._changed = True
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
@@ -193,7 +211,7 @@ class PagedQuads(QuadsDrawing):
         data, each, at = data[order], 4 * data.shape[1], 0
         for low, high in runs_of(pages[order]):
             place = each * low + each // PAGE * start
-            buffer.write(data[at : at + high - low], offset=place)
+            overwrite(buffer, data[at : at + high - low], offset=place)
             at += high - low
 
     def _release_harmonics(self) -> None:

@@ -92,14 +92,18 @@ class Sog:
     count: int
     findings: list[Finding] = field(default_factory=list)
     known: dict[tuple[str, str], np.ndarray] = field(default_factory=dict)  # numbers, checked once
+    named: dict[str, list[str]] = field(default_factory=dict)  # files of parts, checked once
 
     def names(self, part: str) -> list[str]:
         """The files of a part; [] where there is none, which only harmonics may be."""
-        if part == "shN" and part not in self.meta.data:
-            return []
-        names = self.meta.object(part).texts("files")
-        if len(names) != PICTURES[part]:
-            raise self.bad(f"{part} needs the names of {PICTURES[part]} files")
+        if part in self.named:
+            return self.named[part]
+        names: list[str] = []
+        if part != "shN" or part in self.meta.data:
+            names = self.meta.object(part).texts("files")
+            if len(names) != PICTURES[part]:
+                raise self.bad(f"{part} needs the names of {PICTURES[part]} files")
+        self.named[part] = names
         return names
 
     def file_names(self) -> list[str]:
@@ -114,21 +118,22 @@ class Sog:
         found = found if isinstance(found, list) else [found]
         if key == "codebook" and len(found) == 256 and found[0] is None:
             found = [extrapolated(found), *found[1:]]
-        numeric = all(type(number) in (int, float) for number in found)
-        if not least <= len(found) <= most or not numeric:
+        if not least <= len(found) <= most or not set(map(type, found)) <= {int, float}:
             raise self.bad(f"{part} needs {least} to {most} numbers as its {key}")
-        if not all(abs(number) < LARGEST_NUMBER for number in found):  # False for NaN
+        try:
+            numbers = np.array(found, np.float64)
+        except OverflowError:  # a whole number beyond 1e308
+            numbers = np.array([np.inf])
+        if not (np.abs(numbers) < LARGEST_NUMBER).all():  # False for NaN
             raise self.bad(f"the {key} of {part} is not finite")
-        self.known[part, key] = np.array(found, np.float32)
+        self.known[part, key] = numbers.astype(np.float32)
         self.known[part, key].flags.writeable = False
         return self.known[part, key]
 
-    def pixels(self, part: str, number: int = 0, channels: int = 4) -> np.ndarray:
-        """(N, 4) uint8: of each splat the pixel of one of a part's pictures; (N, 3) where three
-        channels are wanted and no more are in the file.
-        """
+    def pixels(self, part: str, number: int = 0) -> np.ndarray:
+        """(N, 4) uint8: of each splat the pixel of one of a part's pictures."""
         most = 4 * self.count + ROOM
-        picture = self.files.image(self.names(part)[number], self.count, most, channels)
+        picture = self.files.image(self.names(part)[number], self.count, most)
         return picture.reshape(-1, picture.shape[2])[: self.count]
 
     def palette(self) -> np.ndarray:

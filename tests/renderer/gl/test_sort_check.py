@@ -15,10 +15,11 @@ from tests.support.splat_scenes import alone
 RENDERERS = EITHER_ON_GL
 
 BREAKAGES = {  # what a driver could do to a shader: (file, text, wrong text)
-    "a key is lost at the end": ("count", "if (i < count)", "if (i + 1u < count)"),
+    "a key is lost at the end": ("count", "i < end ?", "i + 1u < end ?"),
     "a block is lost": ("count", "block < SORT_BLOCKS", "block + 1u < SORT_BLOCKS"),
-    "an add is not atomic": ("count", "atomicAdd(occurrences[(keys[i] >> shift) & 255u], 1u)",
-                             "occurrences[(keys[i] >> shift) & 255u] = 1u"),
+    "an add is not atomic": ("count", "atomicAdd(occurrences[(key >> shift) & 255u], 1u)",
+                             "occurrences[(key >> shift) & 255u] = 1u"),
+    "culled ones are counted": ("count", "if (key != culled)", "if (i < end)"),
     "a group is lost": ("scan", "next += here;", "next += group > 0u ? 0u : here;"),
     "a prefix is short": ("scan", "reach < RADIX", "reach < 128u"),
     "ranks are reversed": ("scatter", "to + rank]", "to + total - 1u - rank]"),

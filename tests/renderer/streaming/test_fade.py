@@ -1,14 +1,12 @@
 """Levels that follow each other: both are drawn for some frames, the end is exact."""
 
-import time
-
 import numpy as np
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.streaming.fade import FRAMES
 from tests.support.splat_scenes import shell
-from tests.support.streamed_scenes import open_levels, scene_of, view_at, write_levels
+from tests.support.streamed_scenes import open_levels, rest, scene_of, view_at, write_levels
 
 BUDGET = 8000
 NEAR, FAR = view_at((0, 0.5, 3.5)), view_at((0, 0.5, 9))
@@ -25,15 +23,6 @@ def moving(folder):
         renderer.streaming.converges = False
         renderer.update(scene_of(open_levels(folder, BUDGET)))
         yield renderer
-
-
-def rest(renderer, view) -> int:
-    """Frames of one view until nothing is on its way."""
-    for n in range(400):
-        if not renderer.draw([view]).streaming.pending:
-            return n
-        time.sleep(0.002)  # for the thread that reads
-    raise AssertionError("still on its way")
 
 
 def test_both_levels_are_drawn_for_so_many_frames_and_then_one(moving):

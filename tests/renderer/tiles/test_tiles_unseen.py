@@ -314,6 +314,7 @@ def test_boxes_wait_until_a_scene_rests(renderer, monkeypatch):
 
 def test_where_too_little_is_out_of_view_nobody_is_asked(renderer, monkeypatch):
     monkeypatch.setattr(culling, "LEAST_SPLATS", CLUSTER)
+    monkeypatch.setattr(renderer.drawing.occlusion, "allowed", False)  # it asks by itself
     layers = in_order(COUNT)
     far = View(look_at((0, 0, 90), (0, 0, 0)), (-0.4, 0.4, -0.4, 0.4), 0.05, 100, (64, 64))
     renderer.settings = RenderSettings()

@@ -15,6 +15,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.sog.read_sog import read_raw_sog
+from shapeshift.runtime_models.splats.sog.sog_files import file_inside, is_file_without_links
 from tests.support.splats.sog_scenes import random_sog, webp, write_folder, write_zip
 
 
@@ -46,6 +47,29 @@ def test_names_that_leave_the_folder(tmp_path, name):
         if name and "\0" not in name:
             archive.writestr(name, webp(pictures["means_l.webp"]))
     refused(zipped, "none of its own")
+
+
+def test_files_without_links_are_told_by_a_look_at_each_part(tmp_path):
+    """Beside resolving the whole path, which says the same of what holds no link."""
+    folder = tmp_path / "scene"
+    (folder / "below").mkdir(parents=True)
+    for name in ("a", "below/b"):
+        (folder / name).write_bytes(b"")
+    (tmp_path / "outside").mkdir()
+    (tmp_path / "outside" / "c").write_bytes(b"")
+    (folder / "out").symlink_to(tmp_path / "outside")
+    (folder / "in").symlink_to(folder / "below")
+    (folder / "d").symlink_to(folder / "a")
+    plain = [n for n in ("a", "below/b", "below", "none", "out/c", "in/b", "d", "a/b")
+             if is_file_without_links(folder, n)]  # fmt: skip
+    assert plain == ["a", "below/b"]
+    assert file_inside(folder, "in/b", "x") == folder / "in" / "b"
+    assert file_inside(folder, "d", "x").is_file()
+    for name, why in (("out/c", "none of its own"), ("below", "lacks"), ("none", "lacks")):
+        with pytest.raises(BadFile, match=why):
+            file_inside(folder, name, "x")
+    (tmp_path / "other").symlink_to(folder)  # a link to the scene's own folder is none of these
+    assert is_file_without_links(tmp_path / "other", "below/b")
 
 
 def test_a_link_out_of_the_folder(tmp_path):

@@ -13,15 +13,11 @@ from shapeshift.scene.captures.las_run import las_points
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.read_las import read_las
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.first_anchors import initial, point_sources
+from shapeshift.training.first_anchors import hull, point_sources
 from shapeshift.training.first_anchors.first_anchors import first_anchors
-from shapeshift.training.first_anchors.initial import (
-    carve,
-    choose_voxel,
-    initial_points,
-    visual_hulls,
-    voxel_centres,
-)
+from shapeshift.training.first_anchors.hull import carve, visual_hulls
+from shapeshift.training.first_anchors.initial import initial_points
+from shapeshift.training.first_anchors.spacing import choose_voxel, voxel_centres
 from shapeshift.training.photos import LoadedPhoto, load_photos
 from shapeshift.training.synthetic.balls import make_balls
 from tests.support.training.point_files import write_las
@@ -46,8 +42,11 @@ def photos(balls) -> list[LoadedPhoto]:
 
 @pytest.fixture
 def coarse(monkeypatch) -> None:
-    """Hulls of an eighth of the cells: enough where it does not matter how fine they are."""
-    monkeypatch.setattr(initial, "FINE_SIDE", initial.FINE_SIDE // 2)
+    """Hulls of an eighth of the cells: enough where it does not matter how fine they are; as many
+    of them as of large photos.
+    """
+    monkeypatch.setattr(hull, "FINE_SIDE", hull.FINE_SIDE // 2)
+    monkeypatch.setattr(hull, "FINEST", 0.1)
 
 
 def rod_photos(half: np.ndarray) -> list[LoadedPhoto]:
@@ -84,7 +83,8 @@ def test_shapes_of_their_own_get_as_many_anchors_as_alone(coarse):
 
 def test_cells_of_a_long_thin_hull_are_cubes():
     half = np.array([0.07, 0.8, 0.06])
-    (points,) = visual_hulls(rod_photos(half), None)
+    (points,), doubts = visual_hulls(rod_photos(half), None)
+    assert doubts == ()
     gaps = [np.diff(np.unique(points[:, axis].round(9))) for axis in range(3)]
     np.testing.assert_allclose(np.concatenate(gaps), gaps[0][0], rtol=1e-6)
     voxel = choose_voxel(points, 10**6, RNG(0))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from shapeshift.scene.pose import View
+from shapeshift.training.first_anchors.hull import seen_part, visual_hull
 from shapeshift.training.first_anchors.initial import (
     FARTHEST,
     NEAREST,
@@ -11,8 +12,6 @@ from shapeshift.training.first_anchors.initial import (
     free_sight,
     points_before,
     random_points,
-    seen_part,
-    visual_hull,
 )
 from shapeshift.training.first_anchors.views import common_box, distance_of, pixel_of, seen_first
 from shapeshift.training.photos import LoadedPhoto
