@@ -71,7 +71,7 @@ def print_table(facts: dict) -> None:
             value = ", ".join(map(str, value))
         elif isinstance(value, int) and not isinstance(value, bool):
             value = f"{value:,}"
-        table.add_row(key, Text(str(value)))  # names may hold brackets
+        table.add_row(key.replace("_", " "), Text(str(value)))  # names may hold brackets
     open_console(stderr=False).print(table)
 
 
