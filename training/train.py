@@ -39,6 +39,7 @@ from shapeshift.training.supervision.backgrounds import (
     background_warning,
     choose_background,
     has_one_exposure,
+    still_warnings,
 )
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
@@ -90,6 +91,7 @@ class Trainer(Run):
             raise BadFile(f"{capture.folder}: modality '{empty[0]}' has no training photos.")
         with self.counted_start():
             background = choose_background(settings.background, capture.background, photos)
+            self.warnings += [] if background else still_warnings(photos)
         if settings.background == "auto" and background and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
             self.warnings.append(background_warning(background))

@@ -170,10 +170,16 @@ float sort_value(vec3 mean) {
     return value > BEHIND ? value : BEHIND / (1.0 + BEHIND - value);
 }
 
+// The opacity of a part of a splat: why it is this one, project_arena.cl says.
+float weighed(float opacity, float part) {
+    return opacity > 0.0 ? mix(opacity * part, opacity * pow(part, 0.69), opacity) : opacity;
+}
+
 // Once for all views.
 Splat load_splat(uint i) {
-    vec4 s0 = covariance[2u * i], s1 = covariance[2u * i + 1u];  // xx xy xz yy | yz zz
+    vec4 s0 = covariance[2u * i], s1 = covariance[2u * i + 1u];  // xx xy xz yy | yz zz, left out
     vec4 mean = mean_opacity[i];
+    if (s1.z > 0.0) mean.w = weighed(mean.w, 1.0 - s1.z);
     mat3 sigma = mat3(s0.x, s0.y, s0.z, s0.y, s0.w, s1.x, s0.z, s1.x, s1.y);
     // alpha = o exp(-r / 2) = min_alpha at r = 2 ln(o / min_alpha), the power threshold.
     float cutoff_sigmas = sqrt(max(2.0 * log(mean.w / min_alpha), 0.0));

@@ -87,3 +87,15 @@ def test_a_contract_needs_its_words():
         "// draw: splats.\n// more of it\n// Reads:   a,\n//          b\n// Units:   px\nint x;\n"
     )
     assert contract(text) == {"purpose": "draw: splats. more of it", "Reads": "a, b", "Units": "px"}
+
+
+def test_builtins_of_clang_that_take_plain_pointers_are_for_processors_alone():
+    """NVIDIA's compiler knows __builtin_prefetch, and refuses it any __global pointer."""
+    guard = "#if defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__))"
+    found = 0
+    for path, text in FILES.items():
+        for part in text.split("__builtin_prefetch")[:-1]:
+            found += 1
+            within = text[: text.index(part) + len(part)].rsplit(guard, 1)
+            assert len(within) == 2 and "#e" not in within[1], f"{path}: outside of {guard}"
+    assert found == 2

@@ -74,7 +74,8 @@ def test_it_is_never_a_void_and_clearer_while_one_moves(floor, target):
     resting = light(picture(floor, target, grid=replace(CLEAR, clearness=REST)))
     moving = light(picture(floor, target))
     assert 5 < resting.max() < moving.max()
-    assert (picture(floor, target, grid=replace(CLEAR, clearness=0.0))[..., 0] == 26).all()
+    nothing = picture(floor, target, grid=replace(CLEAR, clearness=0.0))[..., 0]
+    assert np.isin(nothing, [25, 26]).all()  # 0.1 is 25.5 of 255
 
 
 def test_splats_hide_it_as_much_as_they_cover(ctx, floor, target):
@@ -83,7 +84,7 @@ def test_splats_hide_it_as_much_as_they_cover(ctx, floor, target):
     covered[:45, :50], covered[:45, 50:] = 1.0, 0.5  # the upper half
     bare, hidden = light(picture(floor, target)), light(picture(floor, target, coverage=covered))
     top, left = SIZE[1] // 2 - 5, SIZE[0] // 2 - 5
-    assert np.abs(hidden[:top, :left]).max() == 0
+    assert np.abs(hidden[:top, :left]).max() <= 1  # 0.1 is 25.5 of 255, and `light` says 26
     np.testing.assert_array_equal(hidden[top + 10 :], bare[top + 10 :])
     half = hidden[:top, left + 10 :] - bare[:top, left + 10 :] / 2
     assert np.abs(half).max() <= 1.01

@@ -96,7 +96,9 @@ inline void activate(Head head, floatn* z) {
     return;
   }
   if (head.activation == EXP) {
-    UNROLL for (int o = 0; o < TILE; o++) z[o] = exp2n(LOG2E * z[o], MOST);
+    // The bits of a GPU's NaN are others than a CPU's, and exp2n adds to them.
+    UNROLL for (int o = 0; o < TILE; o++)
+      z[o] = select(exp2n(LOG2E * z[o], MOST), z[o], z[o] != z[o]);
   } else if (head.activation == SOFTPLUS) {  // log(1 + e^z), never e of a large number
     for (int o = 0; o < TILE; o++) {
       const floatn above = select(z[o], TO_FLOATN 0.0f, z[o] < 0.0f);

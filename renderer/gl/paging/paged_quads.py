@@ -28,7 +28,9 @@ class PagedQuads(QuadsDrawing):
     belong to the run before them.
     """
 
+    weighs_pages = True
     _is_paged: tuple[bool, ...] = ()  # of each object
+    _left_out = np.zeros(0, np.float32)  # the part of each page that is not drawn
     _owner = np.zeros(0, np.int32)  # object of each page; -1: it is free
     _first = 0  # row of the arena where pages begin
     _sh: moderngl.Buffer | None = None  # (pages, coefficients * 3, PAGE)
@@ -46,7 +48,7 @@ class PagedQuads(QuadsDrawing):
         self._first = sum(map(arena_rows, models))
         self.allocate(models, PAGE * pages)
         self._is_paged = tuple(getattr(model, "leaves", None) is not None for model in models)
-        self._owner = np.full(pages, -1, np.int32)
+        self._owner, self._left_out = np.full(pages, -1, np.int32), np.zeros(pages, np.float32)
         self._coefficients, self._brightest_placed = coefficients, 1.0
         size = 12 * coefficients * PAGE * pages
         self._sh = self._gpu.reserve(size, "spherical harmonics")
@@ -84,7 +86,7 @@ class PagedQuads(QuadsDrawing):
             length = float(np.sqrt(np.square(given.sh).sum(axis=1).max()))
             most = 0.5 + length * math.sqrt(given.sh.shape[1] / (4 * math.pi))
             self._brightest_placed = max(self._brightest_placed, most)
-        self._owner[pages] = owner
+        self._owner[pages], self._left_out[pages] = owner, 0
         self._note_runs()
         self._changed = True
 
@@ -93,6 +95,18 @@ class PagedQuads(QuadsDrawing):
         self._owner[pages] = -1
         self._note_runs()
         self._changed = True
+
+    def weigh_pages(self, pages: np.ndarray, part: float) -> None:
+        program = self._gpu.compute("paging/fade_pages.comp")
+        bind(covariance=self.arena.covariance)
+        for first, last in runs_of(np.sort(pages)):
+            count = PAGE * (last - first)
+            self._gpu.run(
+                program, groups_for(count, layout.WORKGROUP), count=count,
+                start=self._first + PAGE * first, left_out=1 - part,
+            )  # fmt: skip
+        self._left_out[pages] = 1 - part
+        self._changed |= len(pages) > 0
 
     def shade_pages(self, pages: np.ndarray) -> None:
         for color in self.arena.colors:
@@ -132,7 +146,9 @@ class PagedQuads(QuadsDrawing):
     def read_splats(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         if not self._is_paged[i]:
             return super().read_splats(i)
-        return self._read(i, self.arena.mean_opacity, 4), self._read(i, self.arena.covariance, 8)
+        shapes = self._read(i, self.arena.covariance, 8)
+        shapes[:, 6:] = 0  # what is left out is the page's
+        return self._read(i, self.arena.mean_opacity, 4), shapes
 
     def write_splats(self, i: int, mean_opacity: np.ndarray, covariance: np.ndarray | None) -> None:
         if not self._is_paged[i]:
@@ -140,7 +156,9 @@ class PagedQuads(QuadsDrawing):
             return
         self._write(self.pages_of(i), self.arena.mean_opacity, mean_opacity)
         if covariance is not None:
-            self._write(self.pages_of(i), self.arena.covariance, covariance)
+            shapes = covariance.copy()
+            shapes[:, 6] = np.repeat(self._left_out[self.pages_of(i)], PAGE)
+            self._write(self.pages_of(i), self.arena.covariance, shapes)
         self._changed = True
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:

@@ -4,9 +4,11 @@
 // Units:   none.
 
 mat3 rotation(vec4 wxyz) {
-    // Divided by the largest first: squares of very small or large numbers leave the floats.
+    // Squares of very small or large numbers leave the floats.  By two factors, not divided by the
+    // largest: a GPU multiplies by 1 / 3e38, which it takes for 0.
     float largest = max(max(abs(wxyz.x), abs(wxyz.y)), max(abs(wxyz.z), abs(wxyz.w)));
-    vec4 q = wxyz == vec4(0.0) ? vec4(1.0, 0.0, 0.0, 0.0) : wxyz / largest;  // NaN stays
+    float scale = largest > 1e15 ? 1e-20 : largest < 1e-15 ? 1e20 : 1.0;
+    vec4 q = wxyz == vec4(0.0) ? vec4(1.0, 0.0, 0.0, 0.0) : wxyz * scale;  // NaN stays
     q /= length(q);
     float w = q.x, x = q.y, y = q.z, z = q.w;
     return mat3(

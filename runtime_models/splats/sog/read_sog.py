@@ -92,14 +92,18 @@ class Sog:
     count: int
     findings: list[Finding] = field(default_factory=list)
     known: dict[tuple[str, str], np.ndarray] = field(default_factory=dict)  # numbers, checked once
+    named: dict[str, list[str]] = field(default_factory=dict)  # files of parts, checked once
 
     def names(self, part: str) -> list[str]:
         """The files of a part; [] where there is none, which only harmonics may be."""
-        if part == "shN" and part not in self.meta.data:
-            return []
-        names = self.meta.object(part).texts("files")
-        if len(names) != PICTURES[part]:
-            raise self.bad(f"{part} needs the names of {PICTURES[part]} files")
+        if part in self.named:
+            return self.named[part]
+        names: list[str] = []
+        if part != "shN" or part in self.meta.data:
+            names = self.meta.object(part).texts("files")
+            if len(names) != PICTURES[part]:
+                raise self.bad(f"{part} needs the names of {PICTURES[part]} files")
+        self.named[part] = names
         return names
 
     def file_names(self) -> list[str]:

@@ -63,7 +63,7 @@ class SogRows(Sog):
     ) -> None:  # fmt: skip
         files = copy(sog.files)
         files.memory, files.held = unlimited(), 0  # few rows, and for a moment
-        super().__init__(files, sog.meta, sog.version, count, known=sog.known)
+        super().__init__(files, sog.meta, sog.version, count, known=sog.known, named=sog.named)
         self._kept, self._palette = pixels, palette
 
     def pixels(self, part: str, number: int = 0) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.sog.read_sog import COEFFICIENTS, FIRST_MODE, PALETTE_ROW
 from shapeshift.runtime_models.splats.sog.sh_palette import make_palette
@@ -45,7 +46,8 @@ def write_sog(splats: PlainSplats, folder: Path, generator: str) -> None:
     }
     harmonics = {}
     if splats.sh.shape[1] > 1:
-        harmonics = {"shN": coded_harmonics(splats.sh[:, 1:], pictures)}
+        shown = shown_area(splats.scales, splats.opacity)
+        harmonics = {"shN": coded_harmonics(splats.sh[:, 1:], shown, pictures)}
     for name, pixels in pictures.items():
         write_picture(pixels, folder / f"{name}.webp")
     meta = {
@@ -65,9 +67,13 @@ def write_sog(splats: PlainSplats, folder: Path, generator: str) -> None:
     write_whole(folder / META, json.dumps(meta).encode())
 
 
-def coded_harmonics(rest: np.ndarray, pictures: dict[str, np.ndarray]) -> dict:
-    """What meta.json says of harmonics (N, M - 1, 3); their two pictures are put beside others."""
-    sets, labels = make_palette(rest)
+def coded_harmonics(
+    rest: np.ndarray, shown: np.ndarray, pictures: dict[str, np.ndarray]
+) -> dict:  # fmt: skip
+    """What meta.json says of harmonics (N, M - 1, 3) of splats that show so much (N,); their two
+    pictures are put beside others.
+    """
+    sets, labels = make_palette(rest, shown)
     book, codes = coded(sets.reshape(-1, 3))
     rows = -(-len(sets) // PALETTE_ROW)
     padded = np.zeros((rows * PALETTE_ROW * rest.shape[1], 3), np.uint8)

@@ -262,6 +262,8 @@ def test_a_quaternion_of_any_length_turns_alike():
 
 
 def test_blocks_that_nobody_sees_stay_as_they_are():
+    if device().kind == "gpu":
+        pytest.skip("an anchor is a block there")
     model = make_random_model(3 * BLOCK + 2, k=2)
     seen = np.zeros(len(model.anchors), bool)
     seen[[BLOCK + 3, 3 * BLOCK + 1]] = True

@@ -14,6 +14,7 @@ from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.stereo import stereo_pair
+from tests.support.renderer.frames import step_error
 from tests.support.renderer.gl_models import read
 from tests.support.renderer.heat_scenes import BEHIND, CASES, STOPS, VIEW, decoded, model, scene_of
 from tests.support.splat_scenes import psnr_db, random_layers
@@ -112,7 +113,7 @@ def test_a_window_shows_what_is_resolved(ctx, drawing, dtype):
             pixels = np.frombuffer(target.read(components=4, dtype=dtype), read)
             shown = pixels.reshape(*VIEW.size[::-1], 4)[::-1, :, :3] / (255 if dtype == "f1" else 1)
             away = np.abs(shown - np.clip(renderer.resolved(), 0, 1)).max()
-            assert away < (0.503 / 255 if dtype == "f1" else 1e-4)
+            assert away < (step_error(ctx) / 255 if dtype == "f1" else 1e-4)
 
 
 @pytest.mark.parametrize("mlps", ["gl", "onnxruntime"])

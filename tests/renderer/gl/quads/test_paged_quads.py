@@ -7,6 +7,7 @@ import pytest
 
 from shapeshift.renderer.gl.paging.paged_quads import runs_of
 from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.metrics import psnr
@@ -67,3 +68,60 @@ def test_runs_of_pages():
     assert list(runs_of(np.array([], int))) == []
     assert list(runs_of(np.array([3]))) == [(3, 4)]
     assert list(runs_of(np.array([0, 1, 2, 5, 7, 8]))) == [(0, 3), (5, 6), (7, 9)]
+
+
+def faded(renderer, folder) -> tuple[list[np.ndarray], list[int]]:
+    """Frames of one view in motion as the budget doubles, until nothing changes; and how many
+    leaves fade in each.
+    """
+    drawn(renderer, scene_of(open_levels(folder, 1500)), view_at())  # of 2,500
+    stream, pictures, held = renderer.streaming.stream, [], []
+    whole = stream.left
+    for n, budget in enumerate((whole, whole // 2)):  # what frames want is read then
+        stream.left = budget
+        renderer.draw([replace(view_at(), near=0.06 + 0.001 * n)])  # another one: it is asked again
+    stream.left = whole
+    renderer.streaming.converges = False
+    try:
+        for _ in range(60):
+            pending = renderer.draw([view_at()]).streaming.pending
+            held.append(int(np.count_nonzero(np.unique(stream.table.left) >= 0)))
+            pictures.append(renderer.image(0).copy())
+            if not pending:
+                return pictures, held
+    finally:
+        renderer.streaming.converges = True
+    raise AssertionError("it never rests")
+
+
+def test_levels_fade_as_those_of_tiles(quads, folder):
+    """The other drawing as the oracle: frame by frame the same leaves fade by the same parts."""
+    mine, held = faded(quads, folder)
+    with Renderer(None, "tiles") as tiles:
+        other, by_tiles = faded(tiles, folder)
+    assert held == by_tiles and max(held) > 0 and held[-1] == 0
+    for image, expected in zip(mine, other, strict=True):
+        assert psnr(image, expected) > 45  # as of any scene
+
+
+@pytest.mark.parametrize("part", [0.0, 0.25, 1.0])
+def test_parts_survive_what_is_written_over_splats(quads, folder, part):
+    """And what is read of them knows nothing of parts."""
+    _, _ = drawn(quads, scene_of(open_levels(folder, ALL)), view_at())
+    drawing, pages = quads.drawing, quads.drawing.pages_of(0)[::3]
+    before = drawing.read_splats(0)
+    whole = picture_of(quads)
+    drawing.weigh_pages(pages, part)
+    weighed = picture_of(quads)
+    for was, now in zip(before, drawing.read_splats(0), strict=True):
+        np.testing.assert_array_equal(was, now)
+    drawing.write_splats(0, *before)
+    np.testing.assert_array_equal(picture_of(quads), weighed)
+    assert np.abs(weighed - whole).max() > 0.05 or part == 1
+    drawing.weigh_pages(pages, 1.0)
+    np.testing.assert_array_equal(picture_of(quads), whole)
+
+
+def picture_of(renderer) -> np.ndarray:
+    renderer.drawing.draw([view_at()], renderer.settings, PassTimer(None))
+    return renderer.image(0).copy()

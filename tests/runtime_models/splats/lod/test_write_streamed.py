@@ -15,10 +15,12 @@ from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.lod import levels as module_levels
 from shapeshift.runtime_models.splats.operations.decimate import decimate
+from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.sog import sh_palette
 from shapeshift.runtime_models.splats.sog import write_streamed as module
 from shapeshift.runtime_models.splats.sog.read_streamed import levels, read_level, read_tree
-from shapeshift.runtime_models.splats.sog.sh_palette import make_palette
+from shapeshift.runtime_models.splats.sog.sh_palette import LEAST_WEIGHT, make_palette
 from shapeshift.runtime_models.splats.sog.write_sog import (
     CODES,
     codebook,
@@ -111,12 +113,13 @@ def test_numbers_of_a_codebook_are_short_and_exact():
 @pytest.mark.parametrize("count", [1, 2, 255, 256, 257, 2000])
 def test_harmonics_come_back_as_the_mean_of_their_set(tmp_path, count, coefficients):
     splats = some_splats(count, coefficients)
-    sets, labels = make_palette(splats.sh[:, 1:])
-    assert len(sets) == 1 << max(int(np.log2(count / 4)), 0) and labels.max() == len(sets) - 1
-    sizes = np.bincount(labels)
-    assert sizes.max() - sizes.min() <= 1
-    for number in range(0, len(sets), 17):
-        mean = splats.sh[labels == number, 1:].mean(axis=0)
+    shown = shown_area(splats.scales, splats.opacity).astype(np.float64)
+    sets, labels = make_palette(splats.sh[:, 1:], shown)
+    assert len(sets) == 1 << max(int(np.log2(count / 4)), 0) and labels.max() < len(sets)
+    weight = shown / shown.mean() + LEAST_WEIGHT
+    for number in np.unique(labels)[::17]:
+        mine = labels == number
+        mean = np.average(splats.sh[mine, 1:], axis=0, weights=weight[mine])
         np.testing.assert_allclose(sets[number], mean, atol=1e-5)
     write_sog(splats, tmp_path, "test")
     back = read_model(tmp_path, Reading(up="+Y"))
@@ -128,8 +131,40 @@ def test_sets_of_harmonics_are_of_those_that_are_alike():
     """Sixteen kinds of splats, many of each: a set of each kind, to the last bits."""
     kinds = np.random.default_rng(0).normal(size=(16, 15, 3)).astype(np.float32)
     which = np.random.default_rng(1).permutation(np.arange(1024) % 16)
-    sets, labels = make_palette(kinds[which])
+    sets, labels = make_palette(kinds[which], np.ones(1024))
     np.testing.assert_allclose(sets[labels], kinds[which], atol=1e-5)
+
+
+def lost(rest: np.ndarray, weight: np.ndarray, sets: np.ndarray, labels: np.ndarray) -> float:
+    away = ((sets[labels] - rest) ** 2).sum(axis=(1, 2))
+    return float((weight * away).sum() / weight.sum())
+
+
+@pytest.mark.parametrize("coefficients", [4, 16])
+def test_what_shows_most_loses_least(monkeypatch, coefficients):
+    """Weights as spread as areas are: half of the error of sets that know none; and each round
+    takes some, as Lloyd's algorithm never gives any.
+    """
+    rng = np.random.default_rng(2)
+    rest = rng.normal(size=(3000, coefficients - 1, 3)).astype(np.float32)
+    weight = rng.lognormal(0, 2, 3000)
+    even = lost(rest, weight, *make_palette(rest, np.ones(3000)))
+    before = np.inf
+    for rounds in range(4):
+        monkeypatch.setattr(sh_palette, "ROUNDS", rounds)
+        now = lost(rest, weight, *make_palette(rest, weight))
+        assert now < before
+        before = now
+    assert now < 0.6 * even
+
+
+@pytest.mark.parametrize("weight", [np.zeros(64), np.r_[np.zeros(63), 1e30], np.full(64, 1e-30)])
+def test_weights_of_nothing_and_of_one_alone(weight):
+    rest = np.random.default_rng(3).normal(size=(64, 3, 3)).astype(np.float32)
+    sets, labels = make_palette(rest, weight)
+    assert np.isfinite(sets).all() and sets.shape == (16, 3, 3) and labels.max() < 16
+    if weight.max() > 1:
+        np.testing.assert_allclose(sets[labels[63]], rest[63], atol=1e-4)
 
 
 def test_antialiased_and_far_scenes_come_back(tmp_path):
