@@ -376,7 +376,7 @@ def test_rows_in_pages(at_once, tmp_path):
             hidden.append(stats.hidden)
             for picture in pictures[1:]:
                 np.testing.assert_array_equal(picture, pictures[0])
-        assert renderer.drawing._page_map is not None
+        assert renderer.drawing.paged is not None
     assert min(hidden) > 1000
 
 
