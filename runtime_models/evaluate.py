@@ -365,15 +365,15 @@ class FrameColumns:
         """(n, k * size) in the object's frame of such in each anchor's own; may be `values`.  rows:
         of the anchors.
         """
-        count = len(values)
+        count, width = values.shape  # of no anchors, too
         if name == "offset":
-            own = values.reshape(count, -1, 3)  # (n, k, 3)
-            return np.matmul(own, self._axes[rows].transpose(0, 2, 1)).reshape(count, -1)
+            own = values.reshape(count, width // 3, 3)  # (n, k, 3)
+            return np.matmul(own, self._axes[rows].transpose(0, 2, 1)).reshape(count, width)
         if name == "scale":
             values *= self._scales[rows]
         elif name == "rotation":
-            turns = self._wxyz.reshape(len(self._axes), -1, 4)[rows].reshape(-1, 4)
-            values = product(turns, values.reshape(-1, 4)).reshape(count, -1)
+            turns = self._wxyz.reshape(len(self._axes), width // 4, 4)[rows].reshape(-1, 4)
+            values = product(turns, values.reshape(-1, 4)).reshape(count, width)
         return values
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -27,11 +28,13 @@ class LeafLevels:
         """(L,) the last level that each leaf has."""
         return self.counts.shape[1] - 1 - np.argmax(self.counts[:, ::-1] > 0, axis=1)
 
-    @property
+    @cached_property
     def finest_counts(self) -> np.ndarray:
-        """(L,) splats of the finest level that each leaf has."""
+        """(L,) splats of the finest level that each leaf has, read only."""
         finest = np.argmax(self.counts > 0, axis=1)
-        return self.counts[np.arange(len(finest)), finest]
+        found = self.counts[np.arange(len(finest)), finest]
+        found.flags.writeable = False  # a thousand copies ask each frame
+        return found
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,8 @@ def print_table(facts: dict) -> None:
 
     table = Table(show_header=False)
     for key, value in facts.items():
+        if value is None:
+            continue
         if key == "stops":
             value = "\n".join(f"{s['x']:.3f}  {s['name']} ({s['kind']})" for s in value)
         elif key == "heads":
@@ -63,9 +65,13 @@ def print_table(facts: dict) -> None:
             )
         elif key == "label_names":
             continue  # told with the labels
+        elif isinstance(value, dict):
+            value = ", ".join(f"{name} {each}" for name, each in value.items())
+        elif isinstance(value, list | tuple):
+            value = ", ".join(map(str, value))
         elif isinstance(value, int) and not isinstance(value, bool):
             value = f"{value:,}"
-        table.add_row(key, Text("" if value is None else str(value)))  # names may hold brackets
+        table.add_row(key, Text(str(value)))  # names may hold brackets
     open_console(stderr=False).print(table)
 
 

@@ -20,6 +20,7 @@ LOW_THINGS = 25.0  # spacings above the plane: other things there keep their pla
 
 class Footprint(NamedTuple):
     hole: np.ndarray  # (X, Y) bool: cells that are filled anew
+    shade: np.ndarray  # (X, Y) bool: those of them that photos show, in the thing's shadow
     good: np.ndarray  # (X, Y) bool: cells of the plane that may be copied
     ring: np.ndarray  # (X, Y) bool: cells around the hole whose look a patch has to go on
 
@@ -93,6 +94,7 @@ def footprint_of(
     hole = grow(stood) & inside
     if evidence is not None:
         hole &= ~seen_cells(grid, evidence, covered & ~hole) | (core & stood)
+    stands = hole
     if shadows:
         hole = with_shadow(hole, covered, inside, grid)
     outer = grow(hole, iterations=1 if shadows else 4)  # beyond the contact shadow
@@ -101,7 +103,7 @@ def footprint_of(
     usual = np.median(grid.count[grid.count > 0]) if grid.on.any() else 0.0
     thin = ndimage.uniform_filter(grid.count, 3) < 0.35 * usual
     good = covered & ~grow(there(low)) & ~hole & ~thin
-    return Footprint(hole, good, ring)
+    return Footprint(hole, hole & ~stands, good, ring)
 
 
 def seen_cells(grid: PlaneCells, evidence: np.ndarray, usual: np.ndarray) -> np.ndarray:

@@ -75,6 +75,7 @@ def find_stamp(
         shifts.append(np.tile(-(step @ axes) * grid.cell_m, (len(here), 1)))
     filled = np.any([chosen for chosen, _ in patches], axis=0)
     slab = (grid.height > -BELOW * looks.spacing_m) & (grid.height < ABOVE * looks.spacing_m)
+    slab = np.where(grid.rows_in(foot.shade), grid.on, slab)  # there photos show what is beside it
     dropped = (labels == 0) & grid.rows_in(filled) & slab
     middles = (np.argwhere(filled) + 0.5) * grid.cell_m + grid.low
     return Stamp(

@@ -32,6 +32,7 @@ from shapeshift.renderer.streaming.pages import (
 )
 from shapeshift.renderer.streaming.seen import CoarseLook
 from shapeshift.renderer.streaming.sight import LeafSight, sight_of
+from shapeshift.renderer.streaming.sources import Sources
 from shapeshift.renderer.streaming.swap import NONE, patient, swapped
 from shapeshift.renderer.streaming.upload import Uploader
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
@@ -43,6 +44,7 @@ from shapeshift.scene.scene import Scene
 
 CHANGED = 0.02  # of the budget: what a frame in motion may upload, in splats
 EACH = 8  # frames, one in so many looks ahead
+AMPLE = 0.88  # of the pages: where no more are needed, the whole budget is tried again
 SPARE = 0.125  # more pages for fades where there are parents: nodes of 48 splats leave none free
 SPLATS_A_UNIT = 500_000  # a compute unit of the processor: budget "auto"
 LEAST_AUTO, MOST_AUTO = 1_000_000, 4_000_000
@@ -74,6 +76,7 @@ class Stream:
         self.budget = budget or max(source.budget for source in self._sources) or auto_budget()
         fixed = sum(map(arena_rows, models))
         self.left = self.budget - fixed  # splats, for leaves
+        self._fitting = 1.0  # of them, in the pages
         if not self.left > 0:
             raise BadFile(
                 f"objects without levels of detail have {fixed:,} splats and the budget is "
@@ -82,9 +85,8 @@ class Stream:
         nodes, self.tree = self._nodes()
         made = {id(source): steps_of(source.levels) for source in self._sources}
         self._steps = joined([made[id(source)] for source in self._sources])
-        sizes = [len(source.part) for source in self._sources]
-        self.first = np.concatenate([[0], np.cumsum(sizes, dtype=int)])
-        self._object = np.repeat(np.arange(len(sizes)), sizes)  # of each leaf, in self.objects
+        self._from = Sources(self._sources)
+        self.first, self._object = self._from.first, self._from.object
         self._every_count = every_count(self._sources)  # (L, K) splats
         self._is_leaf = np.ones(len(self._object), bool) if self.tree is None else (
             self.tree.height == 0
@@ -147,8 +149,7 @@ class Stream:
             return []
         moving = not self.converges and now[: len(views)] != self._last[: len(views)]
         taken = self._drawing.trim()
-        for source in self._sources:
-            source.share_memory(taken)
+        self._from.share_memory(taken)
         self._views = (self._views[1], views)
         self._poses, self._shown = poses, shown
         sight = self.find_sight(poses, shown, views)
@@ -175,41 +176,28 @@ class Stream:
         """Levels of all leaves that fit the budget and the pages, and what each is worth."""
         beside = sight.wide & (weight <= 0) & (not self.converges)
         held = None if self.converges else self.table.level
-        left = self.left
+        part = 1.0 if self.converges else self._fitting
         while True:
             pixels = np.where(beside, BESIDE, weight)
-            level, worth = choose_nodes(self._steps, self.tree, pixels, left, held)
+            level, worth = choose_nodes(self._steps, self.tree, pixels, int(part * self.left), held)
             level = np.where(beside & (level >= 0), self._steps.coarsest, level)
             if not self.converges:
-                level = self._finest_of(level, [~source.broken() for source in self._sources])
-            if pages_needed(self._counts(level)).sum() <= self._pages:
+                level = self._from.finest_of(level, self._from.whole(), self._steps.coarsest)
+            needed = int(pages_needed(self._counts(level)).sum())
+            if needed <= self._pages:
+                self._fitting = part if needed > AMPLE * self._pages else 1.0
                 return level, worth
-            left = int(0.9 * left)
+            part *= 0.9
 
     def _counts(self, level: np.ndarray) -> np.ndarray:
         """(L,) splats of all leaves at these levels."""
         rows = np.arange(len(level))
         return np.where(level >= 0, self._every_count[rows, np.maximum(level, 0)], 0)
 
-    def _finest_of(self, level: np.ndarray, parts: Sequence[np.ndarray]) -> np.ndarray:
-        """(L,) the finest level from the wanted one on that lies in one of these parts (a mask a
-        source), or is the coarsest, which is in memory.
-        """
-        kinds = self._every_count.shape[1]
-        numbers = np.arange(kinds)
-        there = np.zeros(self._every_count.shape, bool)
-        for source, first, mask in zip(self._sources, self.first, parts, strict=False):
-            own = source.levels.counts
-            there[first : first + len(own), : own.shape[1]] = mask[source.part] & (own > 0)
-        there |= numbers == self._steps.coarsest[:, None]
-        fits = there & (numbers >= level[:, None])
-        return np.where(level >= 0, np.argmax(fits, axis=1), level)
-
     def _stats(self, changed: int, pending: bool, in_sight: int) -> StreamStats:
-        problem = next((source.problem for source in self._sources if source.problem), "")
         shown = int(self.table.splats.sum())
         return StreamStats(
-            self.budget, shown, in_sight, self.stats.whole, changed, pending, problem
+            self.budget, shown, in_sight, self.stats.whole, changed, pending, self._from.problem
         )
 
     def find_sight(
@@ -243,12 +231,12 @@ class Stream:
         pages = [table.free(np.setdiff1d(gone, out))]
         due = np.flatnonzero(wanted != table.level)
         if not self.converges:
-            at_hand = self._at_hand()
+            at_hand = self._from.at_hand()
             if self.reads:
                 missing = self._missing(wanted, worth, at_hand)
                 self._fetcher.want([*missing, *self._ahead(at_hand)])
             self._decoded = sum(int(np.count_nonzero(there)) for there in at_hand)
-            level = self._finest_of(wanted, at_hand)
+            level = self._from.finest_of(wanted, at_hand, self._steps.coarsest)
             now = table.level
             level = np.where((now != NOT_DRAWN) & (level != wanted) & (level > now), now, level)
             level = np.where(fades.leaves, now, level)  # one change after the other
@@ -281,20 +269,9 @@ class Stream:
         self, wanted: np.ndarray, worth: np.ndarray, at_hand: Sequence[np.ndarray]
     ) -> list[tuple[LeafSource, int]]:
         """Parts that are wanted and not at hand, what is worth most first."""
-        found: dict[tuple[int, int], float] = {}
-        sources = {id(source): source for source in self._sources}
-        for source, first, there in zip(self._sources, self.first, at_hand, strict=False):
-            own = slice(first, first + len(source.part))
-            rows = np.flatnonzero((wanted[own] >= 0) & (wanted[own] != self.table.level[own])
-                                  & (wanted[own] != self._steps.coarsest[own]))  # fmt: skip
-            parts = source.part[rows, wanted[own][rows]]
-            most = np.zeros(len(there))
-            np.maximum.at(most, parts, worth[own][rows])
-            for part in np.flatnonzero((most > 0) & ~there & ~source.broken()):
-                key = (id(source), int(part))
-                found[key] = max(found.get(key, 0.0), float(most[part]))
-        order = sorted(found, key=lambda key: (-found[key], key[1]))
-        return [(sources[which], part) for which, part in order]
+        coming = (wanted >= 0) & (wanted != self.table.level) & (wanted != self._steps.coarsest)
+        leaves = np.flatnonzero(coming)
+        return self._from.missing(leaves, wanted[leaves], worth[leaves], at_hand)
 
     def _ahead(self, at_hand: Sequence[np.ndarray]) -> list[tuple[LeafSource, int]]:
         """Parts that the eye will want if it goes on as it does, and that are not at hand."""
@@ -309,18 +286,12 @@ class Stream:
         wanted, worth = choose_nodes(self._steps, self.tree, weight, self.left)
         return self._missing(wanted, worth, at_hand)
 
-    def _at_hand(self) -> list[np.ndarray]:
-        """What each object's source has decoded."""
-        once = {id(source): source for source in self._sources}
-        found = {number: source.at_hand() for number, source in once.items()}
-        return [found[id(source)] for source in self._sources]
-
     @property
     def due(self) -> bool:
         """Whether another frame of the same views would show more."""
         if not self.stats.pending:
             return False
-        decoded = sum(int(np.count_nonzero(there)) for there in self._at_hand())
+        decoded = sum(int(np.count_nonzero(there)) for there in self._from.at_hand())
         fades = bool(self._fades.leaves.any())
         return fades or self.stats.changed > 0 or decoded != self._decoded
 

@@ -131,3 +131,16 @@ def test_a_border_that_moves_runs_what_it_has_met_alone(frames, sides, monkeypat
         for ours, wanted in zip(found, fresh.geometry(x), strict=True):
             # A few rows have other sums in a matrix product than many: half a step of float32.
             np.testing.assert_allclose(ours, wanted, rtol=2e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("frames", [False, True])
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_model_without_anchors_has_no_splats(count, frames):
+    """As a thing has that was cut away whole."""
+    model = make_random_model(3, k=4)
+    model = (with_frames(model) if frames else model).with_anchors(slice(0, count))
+    splats = Evaluator(model).geometry(0.5)
+    assert [array.shape for array in splats] == [
+        (4 * count, 3), (4 * count, 3), (4 * count, 4), (4 * count,)
+    ]  # fmt: skip
+    assert evaluate(model, 0.5, np.zeros(3)).color.shape == (4 * count, 3)

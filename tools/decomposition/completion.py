@@ -5,7 +5,8 @@
 Labels come from true label maps of 24 views by evidence; 12 of them with their photos verify.  All
 other figures are of 8 views that nothing was made from: holes are pixels of the thing's mask with
 alpha below .5; "stood" is the PSNR there against the tracer without the thing, over all views;
-"rest" is how alike all other pixels stay, in the worst view; "off_plane" is how far fills lie off
+"rest" is how alike all other pixels stay, in the worst view, "rest_before" and "rest_after" their
+PSNR against the tracer, over all views; "off_plane" is how far fills lie off
 the plane, in sides of a cell.  "lifted" and "foreign" are stamps made wrong on purpose: copies
 30 mm too high, and copies of the pipe: both have to be refused.
 """
@@ -58,7 +59,8 @@ STUDIO = (GREY, GREY, GREY)
 VIEWS, VERIFYING, HELD_OUT = 24, 12, 8
 FIELDS = (
     "thing", "step", "anchors_copied", "anchors_dropped", "patches", "holes_before", "holes_after",
-    "stood_before_db", "stood_after_db", "rest_db", "photo_before_db", "photo_after_db", "strange",
+    "stood_before_db", "stood_after_db", "rest_db",
+    "rest_before_db", "rest_after_db", "photo_before_db", "photo_after_db", "strange",
     "off_plane", "cpu_s", "verdict",
 )  # fmt: skip
 
@@ -91,29 +93,34 @@ def labelled_demo(device) -> tuple:
 
 
 def held_out(device, name: str, before, after, views: list, maps: list, real: list, sheet) -> list:
-    """Holes, PSNR where it stood, likeness of the rest; a sheet of the first view that shows it."""
+    """Holes, PSNR where it stood, likeness and PSNR of the rest; a sheet of the first view."""
     from scipy import ndimage
 
     drawings = [ModelPictures(device, each) for each in (before, after)]
     holes, errors, pixels, rest = [0, 0], [0.0, 0.0], 0, np.inf
+    beside, aside = [0.0, 0.0], 0
     for view, labels, truth in zip(views, maps, real, strict=True):
         mask = labels == LABELS[name]
         if mask.sum() < 60:
             continue
         pair = [each.draw(view, 0.0) for each in drawings]
         stood = ndimage.binary_dilation(mask, iterations=2)
-        pixels += int(stood.sum())
+        away = ~ndimage.binary_dilation(mask, iterations=MARGIN)
+        pixels, aside = pixels + int(stood.sum()), aside + int(away.sum())
         for i, picture in enumerate(pair):
             holes[i] += int((mask & (picture[..., 3] < OPEN)).sum())
-            errors[i] += float(((over(picture, STUDIO) - truth)[stood] ** 2).mean(1).sum())
-        away = ~ndimage.binary_dilation(mask, iterations=MARGIN)
+            error = ((over(picture, STUDIO) - truth) ** 2).mean(2)
+            errors[i] += float(error[stood].sum())
+            beside[i] += float(error[away].sum())
         apart = over(pair[0], STUDIO) - over(pair[1], STUDIO)
         rest = min(rest, decibels(float((apart[away] ** 2).mean())))
         if sheet is not None:
             sheet([*(over(picture, STUDIO) for picture in pair), truth])
             sheet = None
     stood_db = [decibels(error / max(pixels, 1)) for error in errors]
-    return [*holes, *(f"{db:.2f}" for db in stood_db), f"{rest:.1f}"]
+    rest_db = [decibels(error / max(aside, 1)) for error in beside]
+    return [*holes, *(f"{db:.2f}" for db in stood_db), f"{rest:.1f}",
+            *(f"{db:.2f}" for db in rest_db)]  # fmt: skip
 
 
 def wrong_stamps(device, model, evidence, views: list, label: int) -> list:
@@ -182,12 +189,13 @@ def rows_of(device, names: list[str], sheets: Path | None):
             yield [name, step, *counts, *figures, *told_of(told.verdict), f"{seconds:.2f}", word]
     for step, stamp, verdict in wrong_stamps(device, model, evidence, verifying, LABELS["mug"]):
         counts = [len(stamp.rows), int(stamp.dropped.sum()), stamp.patches]
-        yield ["mug", step, *counts, verdict.holes_before, verdict.holes_after, "", "",
-               f"{verdict.alike_db:.1f}", *told_of(verdict), "", verdict.sentence()]  # fmt: skip
+        holes = [verdict.holes_before, verdict.holes_after]
+        yield ["mug", step, *counts, *holes, "", "", f"{verdict.alike_db:.1f}", "", "",
+               *told_of(verdict), "", verdict.sentence()]  # fmt: skip
     nothing = replace(model, labels=np.zeros(len(model.anchors), np.uint8))
     after, (told,) = complete(device, nothing, verifying, [LABELS["mug"]], evidence)
     added = len(after.anchors) - len(model.anchors)
-    yield ["nothing", "footprint", added, 0, 0, *[""] * 10, told.why]
+    yield ["nothing", "footprint", added, 0, 0, *[""] * 12, told.why]
 
 
 def main() -> None:
