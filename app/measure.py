@@ -83,6 +83,7 @@ class Measure:
             "splats": self.subject.scene.splat_count,
             "drawn": stats.drawn,
             "culled": stats.culled,
+            "hidden": stats.hidden,
             "sorts": float(np.mean(sorts)),
             "draw_passes": [name for name in passes if name in DRAW_PASSES],
             "draw_pass_ratio": float(np.median(mono) / drawing) if drawing else None,

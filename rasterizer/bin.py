@@ -126,6 +126,7 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
 
 def _sort_groups(device: Device, scratch: TileScratch, visible: int) -> "Array":
     """The GPU form of sort_order: a radix sort of all places, the empty ones last."""
+    assert scratch.pairs is not None, "an order from before needs no sort"
     kernels, count = device.program(KERNELS / "bin_gpu.cl"), scratch.pairs.shape[0]
     keys, splats = device.empty(count, np.uint32), device.empty(count, np.int32)
     device.launch(

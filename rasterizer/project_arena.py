@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -131,7 +131,7 @@ def project_arena(
 
 def _left_out(
     device: Device, clusters: Clusters | Chosen | None, said: "Array | None", count: int,
-    asked: tuple,
+    asked: tuple[int, int, int, Any],
 ) -> "tuple[Array | None, Array | None]":  # fmt: skip
     """Flags of clusters for a launch, and those of rows that say "culled" after it.
 

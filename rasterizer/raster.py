@@ -156,8 +156,10 @@ def rasterize_noting(
     """
     drawn = zip(views, images, strict=True)
     inputs = [(t.starts, t.intersections, p.record, image) for (p, t), image in drawn]
-    masks = only and [device.upload(each.astype(np.uint8)) for each in only]
-    noting = list(zip(ends, masks or [None] * len(views), strict=True))
+    masks: list[Array | None] = [None] * len(views)
+    if only is not None:
+        masks = [device.upload(each.astype(np.uint8)) for each in only]
+    noting = list(zip(ends, masks, strict=True))
     _draw_cpu(device, inputs, size, views[0][1].grid, float(min_transmittance), noting)
 
 

@@ -164,8 +164,9 @@ class TilesDrawing(TilesArena):
         assert self._last is not None
         views, settings, _, sort, colors = self._last
         into = [
-            replace(p, culled_counts=self.device.empty(p.culled_counts.shape, np.int32))
+            replace(p, culled_counts=self.device.empty(counts.shape, np.int32))
             for p in self._projected
+            if (counts := p.culled_counts) is not None  # in what project_arena made
         ]
         projected = self._launch(views, settings, sort, into, colors, Chosen(flags))
         self.device.queue.finish()

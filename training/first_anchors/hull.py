@@ -43,8 +43,8 @@ def visual_hulls(
     centre, half = common_box([p.view for p in photos])
     photos, found, doubts = sampled(photos), [], []
     for modality in dict.fromkeys(p.modality for p in photos):
-        mine = [(p, silhouette(p, background)) for p in photos if p.modality == modality]
-        mine = [(photo, shape) for photo, shape in mine if shape is not None]
+        told = ((p, silhouette(p, background)) for p in photos if p.modality == modality)
+        mine = [(photo, shape) for photo, shape in told if shape is not None]
         mine = mine[:: -(-len(mine) // HULL_PHOTOS)] if mine else []
         shapes = [(photo.view, shape) for photo, shape in mine]
         if not shapes:

@@ -116,7 +116,7 @@ def is_file_without_links(folder: Path, name: str) -> bool:
             found = os.lstat(place)
             mode = found.st_mode
             # A junction of Windows is a directory with a tag.
-            if stat.S_ISLNK(mode) or getattr(found, "st_reparse_tag", 0):
+            if stat.S_ISLNK(mode) or getattr(found, "st_reparse_tag", False):
                 return False
     except OSError:
         return False

@@ -19,6 +19,7 @@ from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.scene.pose import HiddenMesh, Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.splat_scenes import only, psnr_db, random_layers
+from tests.support.streamed_scenes import open_levels, rest, write_levels
 
 SIZE = (112, 80)  # 7 x 5 tiles
 LEAST = 1 / 255
@@ -197,27 +198,29 @@ def test_what_moves_between_frames(renderer, at_once):
 
 
 @pytest.mark.parametrize("front", [31, 32, 33, 63, 64, 65, 96])
-def test_lists_that_end_with_and_within_a_batch(renderer, at_once, front):
-    """So many opaque splats before one cluster: a pixel takes in its whole batch of 32, and what
-    the last batch would have held of the cluster must not be missed.
+def test_lists_that_end_with_and_within_a_batch(renderer, at_once, front, monkeypatch):
+    """So many splats before one bright cluster, after which just less than 1e-4 is left: a tile is
+    done, but a batch of 32 is blended to its end, and so are those of the cluster that it holds.
     """
-    rng = np.random.default_rng(front)
-    n = front + CLUSTER
-    means = np.column_stack([0.02 * rng.normal(size=(n, 2)), -0.01 * np.arange(n) / n])
-    means[front:, 2] -= 1
-    scales, wxyz = np.full((n, 3), 0.6), np.eye(4)[np.zeros(n, int)]
-    parts = (means, scales, wxyz, np.full(n, 0.2), rng.uniform(size=(n, 1, 3)))
-    arrays = [np.ascontiguousarray(a, np.float32) for a in parts]
-    # Rows in an order in which clusters are whole: those before are padded by absent splats.
-    pad = CLUSTER - front % CLUSTER
-    arrays = [
-        np.insert(a, np.full(pad, front), -1 if a.ndim == 1 else a[front], axis=0) for a in arrays
-    ]
-    model = SplatLayers(*arrays, np.zeros(len(arrays[0]), np.int32), (Stop("all", 1.0),))
+    monkeypatch.setattr(occlusion, "moved", lambda depths, before, now: np.full((5, 7), 2.4))
+    n, pad = front + CLUSTER, CLUSTER - front % CLUSTER  # rows that are absent: clusters are whole
+    means = np.zeros((n, 3))
+    means[:, 2] = np.where(np.arange(n) < front, 0, -1) - 0.01 * np.arange(n) / n
+    opacity = np.full(n, 1 - 0.9e-4 ** (1 / front))  # wide splats: alike in all pixels
+    opacity[front:] = 0.9
+    color = np.zeros((n, 1, 3))
+    color[front:] = 1.5
+    parts = (means, np.full((n, 3), 30.0), np.eye(4)[np.zeros(n, int)], opacity, color)
+    arrays = [np.insert(a, np.full(pad, front), a[0], axis=0).astype(np.float32) for a in parts]
+    arrays[3][front : front + pad] = -1
+    model = SplatLayers(*arrays, np.zeros(n + pad, np.int32), (Stop("all", 1.0),))
     scene = Scene((SceneObject("fog", model),))
     view = view_at((0, 0, 2), (0, 0, 0), wide=0.1)
     made = Film(renderer)
-    made.check([(scene, [view], RenderSettings()) for _ in range(4)])
+    made.check([(scene, [view], RenderSettings()) for _ in range(3)])
+    assert made.hidden == [0, CLUSTER, CLUSTER]
+    again = 0 if front % 32 == 0 else 35
+    assert made.redrawn == [0, again, again]
 
 
 def test_pictures_are_the_oracle_s(renderer, at_once):
@@ -351,6 +354,30 @@ def test_views_in_the_order_of_a_frame_that_left_out_something(at_once):
             assert renderer.draw(eyes).hidden == 0
     np.testing.assert_array_equal(pictures[0][:2], pictures[1][:2])
     np.testing.assert_array_equal(pictures[0][2:], pictures[1][2:])
+
+
+def test_rows_in_pages(at_once, tmp_path):
+    """Splats in levels of detail: rows that are drawn lie in pages of the arena, two objects share
+    them.
+    """
+    model = open_levels(write_levels(walls(4), tmp_path / "walls", 512), 10**6)
+    behind = Pose(np.array([0, 0, -3.0]), np.array([1.0, 0, 0, 0]))
+    scene = Scene((SceneObject("near", model), SceneObject("far", model, behind)))
+    hidden = []
+    with Renderer(None, "tiles") as renderer:
+        renderer.update(scene)
+        hiding = renderer.drawing.occlusion
+        for view in steps(6):
+            rest(renderer, view)
+            pictures = []
+            for hiding.allowed in (False, True, True):
+                stats = renderer.draw([view])
+                pictures.append(renderer.image(0).copy())
+            hidden.append(stats.hidden)
+            for picture in pictures[1:]:
+                np.testing.assert_array_equal(picture, pictures[0])
+        assert renderer.drawing.paged is not None
+    assert min(hidden) > 1000
 
 
 def test_where_nothing_hides_it_is_seldom_asked(renderer, at_once, monkeypatch):

@@ -109,9 +109,10 @@ def _counts(readings: FrameStatsView, ui_scale: float) -> None:
 
 
 def _splats(stats: FrameStats) -> None:
-    """Why splats were not drawn: the first gate that each one failed, in the gates' order."""
+    """Why splats were not drawn: the first gate that each failed; of hidden ones none was asked."""
     counts = [("in the scene", stats.splats), ("drawn", stats.drawn)]
     known = [why for why in CULL_REASONS if why in stats.culled]
     for why in known:
         counts.append((said("culled: {why}", why=said(REASON_TEXTS[why])), stats.culled[why]))
+    counts += [(said("hidden behind others"), stats.hidden)] if stats.hidden else []
     rows([(name, number(count)) for name, count in counts])
