@@ -1,6 +1,7 @@
 """A trained state as the AnchorModel that a package holds."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -27,11 +28,11 @@ ACTIVATION = {
 GATE = ((1, 1, -1, 0.5), (-1, 1, -1, -0.5), (1, 1, 0, 0.5), (1, -1, 0, -0.5))
 
 
-def notes_of(capture: Capture) -> dict[str, object]:
+def notes_of(capture: Capture) -> dict[str, Any]:
     """What a package says of its capture: its name, where its photos were taken, and where the
     package's zero lies in the capture's world, if elsewhere."""
     taken = [p.view.world_from_eye.position for p in capture.photos if p.split == "train"]
-    notes: dict[str, object] = {"capture": capture.folder.name, EYES: spread_eyes(np.array(taken))}
+    notes: dict[str, Any] = {"capture": capture.folder.name, EYES: spread_eyes(np.array(taken))}
     return notes | ({"origin_m": list(capture.origin)} if any(capture.origin) else {})
 
 

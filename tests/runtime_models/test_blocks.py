@@ -18,6 +18,7 @@ from shapeshift.runtime_models.blocks.read_blocks import (
 )
 from shapeshift.runtime_models.blocks.write_blocks import write_blocks
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
+from shapeshift.runtime_models.eyes import EYES
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
@@ -248,3 +249,15 @@ def test_joined_models_say_which_blocks_do_not_fit():
     with pytest.raises(ValueError, match="name the blocks 0 to 2"):
         whole = joined([one, other], ["a", "b"])
         replace(whole, block=np.minimum(np.arange(len(whole.anchors)), 2).astype(np.int32))
+
+
+def test_a_scene_in_blocks_has_the_eyes_of_all_blocks():
+    """Each block knows those that saw it alone; one without any changes nothing."""
+    one, other = halves().values()
+    here, there = [[0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], [[9.0, 1.0, 2.0]]
+    models = [replace(m, provenance={EYES: e}) for m, e in ((one, here), (other, there))]
+    whole = joined(models, ["a", "b"])
+    assert sorted(whole.provenance[EYES]) == here + there
+    assert sorted(one_network(whole).provenance[EYES]) == here + there
+    assert joined([models[0], other], ["a", "b"]).provenance[EYES][0] in here
+    assert EYES not in joined([one, other], ["a", "b"]).provenance

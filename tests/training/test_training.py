@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.eyes import eyes_of
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.read_scene import read_model
@@ -135,6 +136,9 @@ def test_the_package_draws_what_was_trained(trained, device, balls, tmp_path):
         np.testing.assert_allclose(exported.wxyz, wxyz, atol=2e-5)
     provenance = model.provenance
     assert provenance["settings"]["seed"] == 0 and provenance["iterations"] == 200
+    taken = [p.view.world_from_eye.position for p in balls.photos if p.split == "train"]
+    away = np.linalg.norm(eyes_of(model)[:, None] - taken, axis=2)  # (E, photos) metres
+    assert away.min(axis=1).max() < 1e-3 and away.min(axis=0).max() < 1e-3  # all, and no other
     own = trained.held_out_psnr(most=99)
     for name, score in evaluate_model(device, model, balls).items():
         assert score.psnr_db == pytest.approx(own[name], abs=0.02)

@@ -15,6 +15,7 @@ from shapeshift.runtime_models.package.write_package import EXACT
 from shapeshift.runtime_models.rotation import normalize
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.density.densify import NewAnchors
+from shapeshift.training.export import notes_of
 from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.gaussians import Gaussians
@@ -193,8 +194,8 @@ class UpdateTrainer(Trainer):
         }
         before = self.base.model.provenance
         if EYES in before:  # else the old photos' are not known, and all directions count
-            taken = [photo.view.world_from_eye.position for photo in self.capture.photos]
-            before = before | {EYES: spread_eyes(np.array([*before[EYES], *taken]))}
+            both = [*before[EYES], *notes_of(self.capture)[EYES]]
+            before = before | {EYES: spread_eyes(np.array(both))}
         return before | {"updates": [*before.get("updates", []), update]}
 
 

@@ -40,6 +40,8 @@ def test_the_command_writes_what_the_function_gives_and_says_what_it_did(
     assert np.array_equal(made.model.features, again.features)
     assert np.array_equal(made.model.frames.wxyz, again.frames.wxyz)
     assert again.provenance["updates"][0]["iterations"] == 6
+    before = ss.load(scene).model.provenance["eyes"]  # both captures' photos are from there
+    assert sorted(again.provenance["eyes"]) == sorted(before) and len(before) > 6
     assert cli.main(words) == 2 and "--overwrite replaces it" in capsys.readouterr().err
     assert cli.main([*words[:-1], "8", "--resume"]) == 0
     assert "8 steps" in capsys.readouterr().err
