@@ -28,6 +28,7 @@ KNOWN = (
 IN_FOLDERS = ("transforms.json", "transforms_multimodal.json", "cameras.json")
 SPLITS = ("train", "val", "test")
 BESIDE = 3  # folders that are searched: 3DGS puts its splats two below its cameras.json
+PEEK_BYTES = 4096  # of a file that is no text one is zero
 
 
 def read_cameras(path: str | Path, size: tuple[int, int] | None = None) -> list[View]:
@@ -44,6 +45,9 @@ def read_camera_list(path: str | Path, reading: CameraReading | None = None) -> 
         return read_folder(path, reading)
     if path.stem in COLMAP_TABLES and path.suffix in (".bin", ".txt"):
         return read_colmap_cameras(path.parent, path.suffix, reading)
+    with path.open("rb") as file:
+        if b"\0" in file.read(PEEK_BYTES):  # a scene, a picture: no broken text
+            raise BadFile(f"{path} holds no cameras; wanted is {KNOWN}.")
     data = read_json(path, most_bytes=MOST_BYTES)
     if isinstance(data, list):
         first = data[0] if data and isinstance(data[0], dict) else {}

@@ -3,6 +3,7 @@
 python3 tools/pictures/demo_picture.py [docs/demo.png]
 """
 
+import argparse
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +28,9 @@ BACKGROUND = (0.075, 0.078, 0.085)  # that of the viewer
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path, nargs="?", default=ROOT / "docs" / "demo.png")
+    path = parser.parse_args().out
     model = read_package(ROOT / "assets" / "workshop.shift")
     stops = [stop.x for stop in model.stops]
     xs = sorted([*stops, *((a + b) / 2 for a, b in pairwise(stops))])
@@ -41,7 +45,7 @@ def main() -> None:
                 renderer.draw([view])
                 row.append(renderer.resolved().copy())
             rows.append(np.hstack(row))
-    save_png(np.vstack(rows), Path(sys.argv[1] if len(sys.argv) > 1 else ROOT / "docs/demo.png"))
+    save_png(np.vstack(rows), path)
 
 
 if __name__ == "__main__":

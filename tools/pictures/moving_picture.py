@@ -3,6 +3,7 @@
 python3 tools/pictures/moving_picture.py [docs/shapeshift.webp]
 """
 
+import argparse
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -33,7 +34,9 @@ QUALITY = 78  # of WebP: below a megabyte
 
 
 def main() -> None:
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/shapeshift.webp"
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path, nargs="?", default=ROOT / "docs" / "shapeshift.webp")
+    path = parser.parse_args().out
     with ss.Renderer() as renderer:
         renderer.settings = replace(renderer.settings, background=BACKGROUND)
         pictures = [*slider_frames(renderer)]

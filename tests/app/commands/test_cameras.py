@@ -150,6 +150,10 @@ def test_what_is_no_file_of_cameras(tmp_path):
     for path, words in ((tmp_path / "no.json", "does not exist"), (tmp_path, "holds no cameras")):
         with pytest.raises(BadFile, match=words):
             read_cameras(path)
-    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n\xff")
-    with pytest.raises(BadFile, match="is not JSON"):
-        read_cameras(tmp_path / "a.png")
+    for data, words in (
+        (b"\x89PNG\r\n\x1a\n\xff", "is not JSON"),  # no zero byte: broken text
+        (b"PK\x03\x04\x14\0\0", "holds no cameras; wanted is a list of cameras"),
+    ):
+        (tmp_path / "a.png").write_bytes(data)
+        with pytest.raises(BadFile, match=words):
+            read_cameras(tmp_path / "a.png")
