@@ -45,9 +45,10 @@ def read_camera_list(path: str | Path, reading: CameraReading | None = None) -> 
         return read_folder(path, reading)
     if path.stem in COLMAP_TABLES and path.suffix in (".bin", ".txt"):
         return read_colmap_cameras(path.parent, path.suffix, reading)
-    with path.open("rb") as file:
-        if b"\0" in file.read(PEEK_BYTES):  # a scene, a picture: no broken text
-            raise BadFile(f"{path} holds no cameras; wanted is {KNOWN}.")
+    if path.is_file():  # a pipe would wait; read_json refuses it
+        with path.open("rb") as file:
+            if b"\0" in file.read(PEEK_BYTES):  # a scene, a picture: no broken text
+                raise BadFile(f"{path} holds no cameras; wanted is {KNOWN}.")
     data = read_json(path, most_bytes=MOST_BYTES)
     if isinstance(data, list):
         first = data[0] if data and isinstance(data[0], dict) else {}
