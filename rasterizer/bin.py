@@ -94,7 +94,6 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
     """The GPU form: everything in parallel, two radix sorts."""
     kernels = device.program(KERNELS / "bin_gpu.cl")
     count = projected.depth.shape[0]
-    tiles = grid[0] * grid[1]
     tile_bounds, first_slot = device.empty((count, 2), np.uint32), device.empty(count, np.int32)
     keys, splats = device.empty(count, np.uint32), device.empty(count, np.int32)
     device.launch(
@@ -112,15 +111,10 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
     prefix_sums(device, slots)
     shown, total = int(device.view(visible)[0]), int(device.view(offsets)[-1])
     slot_count = int(device.view(slots)[-1])
-    tile_of, intersections = device.empty(total, np.uint32), device.empty(total, np.int32)
-    device.launch(
-        kernels["write_intersections"], shown, 64,
-        shown, grid[0], tiles, None, order, projected.record, tile_bounds, offsets, slots, tile_of,
-        intersections, first_slot,
-    )  # fmt: skip
-    tile_of, intersections = sort_pairs(device, tile_of, intersections, (tiles - 1).bit_length())
-    starts = device.empty(tiles + 1, np.int32)
-    device.launch(kernels["find_starts"], total + 1, 64, total, tiles, tile_of, starts)
+    given = (order, projected.record, tile_bounds)
+    starts, intersections = _list_groups(
+        device, grid, shown, total, given, offsets, (slots, first_slot)
+    )
     return Tiles(grid, starts, intersections, tile_bounds, order[:shown], slot_count, first_slot)
 
 
@@ -142,24 +136,38 @@ def _bin_ordered_groups(
 ) -> Tiles:  # fmt: skip
     """The GPU form for an order that is there: one radix sort, by tiles."""
     kernels, scratch = device.program(KERNELS / "bin_gpu.cl"), _scratch_on(device, projected, grid)
-    shown, tiles = order.shape[0], grid[0] * grid[1]
+    shown = order.shape[0]
     offsets = device.empty(shown + 1, np.int32)
     at = (projected.record, scratch.tile_bounds)
     device.launch(kernels["count_ordered"], shown + 1, 64, shown, order, *at, offsets)
     prefix_sums(device, offsets)
     total = int(device.view(offsets)[-1])
+    given = (order, *at)
+    starts, intersections = _list_groups(device, grid, shown, total, given, offsets, hidden=hidden)
+    slots = int(device.view(scratch.status)[:, 1].sum(dtype=np.int64))
+    return Tiles(grid, starts, intersections, scratch.tile_bounds, order, slots)
+
+
+def _list_groups(
+    device: Device, grid: tuple[int, int], shown: int, total: int, given: tuple, offsets: "Array",
+    slots: tuple = (None, None), hidden: np.ndarray | None = None,
+) -> tuple:  # fmt: skip
+    """(tiles + 1,) starts and (total,) intersections, by one radix sort by tiles.
+
+    given: order, record, tile bounds; slots: where each splat's begin in that order, and by splat.
+    """
+    kernels, tiles = device.program(KERNELS / "bin_gpu.cl"), grid[0] * grid[1]
     tile_of, intersections = device.empty(total, np.uint32), device.empty(total, np.int32)
     covered = None if hidden is None else device.constants(hidden.astype(np.uint8).reshape(-1))
     device.launch(
         kernels["write_intersections"], shown, 64,
-        shown, grid[0], tiles, covered, order, *at, offsets, None, tile_of, intersections, None,
+        shown, grid[0], tiles, covered, *given, offsets, slots[0], tile_of, intersections, slots[1],
     )  # fmt: skip
     last = tiles - 1 if hidden is None else tiles
     tile_of, intersections = sort_pairs(device, tile_of, intersections, last.bit_length())
     starts = device.empty(tiles + 1, np.int32)
     device.launch(kernels["find_starts"], total + 1, 64, total, tiles, tile_of, starts)
-    slots = int(device.view(scratch.status)[:, 1].sum(dtype=np.int64))
-    return Tiles(grid, starts, intersections, scratch.tile_bounds, order, slots)
+    return starts, intersections
 
 
 def _scratch_on(device: Device, projected: Projected, grid: tuple[int, int]) -> TileScratch:
