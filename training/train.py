@@ -39,7 +39,6 @@ from shapeshift.training.supervision.backgrounds import (
     background_warning,
     choose_background,
     has_one_exposure,
-    still_warnings,
 )
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
@@ -83,15 +82,15 @@ class Trainer(Run):
             self.photos = TrainingPhotos(loaded["train"], loaded["test"])
         else:
             self.photos = loaded
+        self.leave_out_still(settings.background)
         self.held_out = self.photos.test
         photos, self.warnings = validate_views(self.photos.train, settings.masks)
-        self.warnings += self.photos.warnings()
+        self.warnings += self.photos.warnings() + self.still.warnings()
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         if empty := [name for name, found in by_modality.items() if not found]:
             raise BadFile(f"{capture.folder}: modality '{empty[0]}' has no training photos.")
         with self.counted_start():
             background = choose_background(settings.background, capture.background, photos)
-            self.warnings += [] if background else still_warnings(photos)
         if settings.background == "auto" and background and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
             self.warnings.append(background_warning(background))
@@ -389,6 +388,7 @@ class Trainer(Run):
             "first_anchors": self.origin,
             "downscale": self.factor,
             "background": self.schedule.background,
+            "still_background": bool(self.still.pictures),
             "rate_scale": self.rate_scale,
         }
         state = self.adam.state()
