@@ -1,6 +1,6 @@
 // layers: the two layers of a head and its activation, for a block of WIDTH anchors at a time.
-// Reads:   WIDTH, TILE, ROWS, UNITS.
-// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL, LIGHTS; Head, wake, first_layer,
+// Reads:   WIDTH, TILE, ROWS, UNITS, LIGHTS (numbers of a channel of light by direction).
+// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL; Head, wake, first_layer,
 //          light_along, second_layer, exp2n.
 // Units:   none; a head's gain gives metres or display values.
 // A comparison of floatn gives intn: 0 or 1 of a scalar, 0 or -1 a lane; select() takes both.
@@ -24,7 +24,7 @@ typedef int16 intn;
 #define ALL(lanes) all(lanes)
 #endif
 #define UNROLL _Pragma("unroll")
-#define LIGHTS 8  // numbers of an anchor's light by direction
+#define DIRECTION 3  // inputs
 #define LOG2E 1.44269504f  // log2(e): e^z = 2^(z log2(e))
 #define MOST 126.0f  // the largest exponent of 2
 // Activations, numbered as decode_heads.py has them.
@@ -143,7 +143,7 @@ inline void first_layer(int n, int* live, int features, int looks, __global cons
       const floatn f = LOADN(feature + i * WIDTH);
       UNROLL for (int u = 0; u < ROWS; u++) sum[u] = fma(f, TO_FLOATN w[u][i], sum[u]);
     }
-    // Only the colour looks at the direction: none, three, or four with light along it.
+    // Only the colour looks at the direction: none, three, or four or six with light along it.
     for (int i = 0; i < looks; i++) {
       UNROLL for (int u = 0; u < ROWS; u++)
         sum[u] = fma(look[i], TO_FLOATN w[u][features + i], sum[u]);
@@ -154,17 +154,21 @@ inline void first_layer(int n, int* live, int features, int looks, __global cons
   }
 }
 
-// What the block's light by direction (LIGHTS, WIDTH) gives along unit directions, or along none:
-// spherical harmonics of degree 1 and 2 in units of those of degree 1, light_harmonics.py.
-inline floatn light_along(__global const float* light, const floatn* d) {
+// What the block's light by direction (channels, LIGHTS, WIDTH) gives along unit directions d, or
+// along none, written behind them: spherical harmonics of degree 1 and 2 in units of those of
+// degree 1, light_harmonics.py.
+inline void light_along(__global const float* light, int channels, floatn* d) {
   const floatn xx = d[0] * d[0], yy = d[1] * d[1], zz = d[2] * d[2];
   const floatn value[LIGHTS] = {d[0], d[1], d[2],
                                 2.2360680f * d[0] * d[1], 2.2360680f * d[1] * d[2],
                                 2.2360680f * d[2] * d[0], 0.6454972f * (2 * zz - xx - yy),
                                 1.1180340f * (xx - yy)};
-  floatn sum = 0;
-  UNROLL for (int i = 0; i < LIGHTS; i++) sum = fma(LOADN(light + i * WIDTH), value[i], sum);
-  return sum;
+  for (int c = 0; c < channels; c++) {
+    floatn sum = 0;
+    UNROLL for (int i = 0; i < LIGHTS; i++)
+      sum = fma(LOADN(light + (c * LIGHTS + i) * WIDTH), value[i], sum);
+    d[DIRECTION + c] = sum;
+  }
 }
 
 // Outputs of a head out of its units first to end of those that are awake.  A call, not four copies
