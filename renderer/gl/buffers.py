@@ -32,7 +32,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
-from shapeshift.renderer.gl.paging.page_map import PageMap
+from shapeshift.renderer.gl.paging.mapped_pages import MappedPages
 from shapeshift.renderer.limits import too_many
 
 STAGED_SPLATS = 1 << 20  # decoded at a time; bounds the staging buffer to 46 MB
@@ -73,7 +73,7 @@ class Arena:
         splats lie in, None: as many.
         """
         self.count = sum(counts) + more
-        self.pages: PageMap | None = None
+        self.pages: MappedPages | None = None
         if not self.count <= fitting_splats(gpu):
             raise too_many(self.count, fitting_splats(gpu), limit_of(gpu), "tiles")
         self.gpu = gpu

@@ -73,14 +73,31 @@ class Projector:
         bind(color=mine[0])
         if own_colors := len(views) > 1 < len(mine):
             bind(second_color=mine[1])
-        pages = arena.pages
+        how = (views, len(frames) > len(views), settings, keep_outside, own_colors)
+        programs = self._programs(arena, *how)
+        for i, first, last in arena.runs:
+            program = programs[arena.antialiased[i], False]
+            set_uniforms(program, first=first, last=last)
+            program["frames"].write(rows[i])
+            program.run(groups_for(last - first, layout.WORKGROUP))
+        if (pages := arena.pages) is not None:
+            bind(pages=pages.upload(rows))
+            program = programs[bool(pages.antialiased.any()), True]
+            ends = {"first": pages.first, "last": arena.count, "first_entry": pages.first_entry}
+            set_uniforms(program, **ends)
+            program.run(groups_for(pages.rows, layout.WORKGROUP))
+        self._gpu.ctx.memory_barrier()
+
+    def _programs(
+        self, arena: Arena, views: list[View], own_frame: bool, settings: RenderSettings,
+        keep_outside: bool, own_colors: bool,
+    ) -> dict[tuple[bool, bool], moderngl.ComputeShader]:  # fmt: skip
+        """Those of what is antialiased or not, and in pages or not; what all objects share is set."""
         kinds = {(arena.antialiased[i], False) for i, _, _ in arena.runs}
-        if pages is not None:
-            kinds.add((bool(pages.antialiased.any()), True))
+        if arena.pages is not None:
+            kinds.add((bool(arena.pages.antialiased.any()), True))
         programs = {
-            (faint, paged): self._variant(
-                len(views), len(frames) > len(views), settings, faint, own_colors, paged
-            )
+            (faint, paged): self._variant(len(views), own_frame, settings, faint, own_colors, paged)
             for faint, paged in kinds
         }
         for program in programs.values():
@@ -92,18 +109,7 @@ class Projector:
             )  # fmt: skip
             if len(views) > 1:
                 set_uniforms(program, count=arena.count)
-        for i, first, last in arena.runs:
-            program = programs[arena.antialiased[i], False]
-            set_uniforms(program, first=first, last=last)
-            program["frames"].write(rows[i])
-            program.run(groups_for(last - first, layout.WORKGROUP))
-        if pages is not None:
-            bind(pages=pages.upload(rows))
-            program = programs[bool(pages.antialiased.any()), True]
-            ends = {"first": pages.first, "last": arena.count, "first_entry": pages.first_entry}
-            set_uniforms(program, **ends)
-            program.run(groups_for(pages.rows, layout.WORKGROUP))
-        self._gpu.ctx.memory_barrier()
+        return programs
 
     def counts(self, arena: Arena, i: int = 0) -> dict[str, int]:
         """Splats of view i at the last projection: drawn, then CULL_REASONS.

@@ -11,7 +11,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.gl.buffers import bind
 from shapeshift.renderer.gl.gpu import groups_for, overwrite
-from shapeshift.renderer.gl.paging.page_map import PageMap
+from shapeshift.renderer.gl.paging.mapped_pages import MappedPages
 from shapeshift.renderer.gl.quads import QuadsDrawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.runtime_models.leaf_levels import LeafSplats
@@ -26,7 +26,7 @@ class PagedQuads(QuadsDrawing):
     """QuadsDrawing, with pages where a scene has models that need them."""
 
     shares_pages = weighs_pages = True
-    paged: PageMap | None = None
+    paged: MappedPages | None = None
     _is_paged: tuple[bool, ...] = ()  # of each object
     _sh: moderngl.Buffer | None = None  # (stored pages, coefficients * 3, PAGE)
     _coefficients = 1
@@ -47,7 +47,7 @@ class PagedQuads(QuadsDrawing):
         faint = tuple(
             paged and is_antialiased(m) for m, paged in zip(models, self._is_paged, strict=True)
         )
-        self.paged = self.arena.pages = PageMap(self._gpu, first, pages, stored, faint)
+        self.paged = self.arena.pages = MappedPages(self._gpu, first, pages, stored, faint)
         self._coefficients, self._brightest_placed = coefficients, 1.0
         self._sh = self._gpu.reserve(self._bytes_of_sh(stored), "spherical harmonics")
 
@@ -55,7 +55,7 @@ class PagedQuads(QuadsDrawing):
         return 12 * self._coefficients * PAGE * stored
 
     @property
-    def _pages(self) -> PageMap:
+    def _pages(self) -> MappedPages:
         assert self.paged is not None, "allocate_pages has made them"
         return self.paged
 

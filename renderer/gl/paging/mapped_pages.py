@@ -12,7 +12,7 @@ NO_PAGE = 0xFFFFFFFF  # nothing is drawn
 POSE_VECS = 3 * (layout.MOST_VIEWS + 1)  # vec4 an object: of each view and of the order's frame
 
 
-class PageMap(DrawnPages):
+class MappedPages(DrawnPages):
     """The last rows of what is drawn, a page after the other, and the poses of all objects.
 
     Splats lie in stored pages, from the same row of the arena on; colours are of the pages that
