@@ -92,7 +92,7 @@ class Projector:
         self, arena: Arena, views: list[View], own_frame: bool, settings: RenderSettings,
         keep_outside: bool, own_colors: bool,
     ) -> dict[tuple[bool, bool], moderngl.ComputeShader]:  # fmt: skip
-        """Those of what is antialiased or not, and in pages or not; what all objects share is set."""
+        """Of what is antialiased or not, and in pages or not; what all objects share is set."""
         kinds = {(arena.antialiased[i], False) for i, _, _ in arena.runs}
         if arena.pages is not None:
             kinds.add((bool(arena.pages.antialiased.any()), True))
