@@ -1,7 +1,7 @@
 // pages: the last rows of a frame are drawn from pages of an arena, each for an object of its own;
 // several may show the same page.
-// Reads:   pages (mapped_pages.py), PAGE splats each: poses of all objects, and from first_entry on
-//          a uvec4 a page: arena row, or NO_PAGE; where its object's pose begins; part; antialiased.
+// Reads:   pages (mapped_pages.py): poses of all objects, and from first_entry on a uvec4 a page of
+//          PAGE splats: arena row, or NO_PAGE; where its object's pose begins; part; antialiased.
 // Defines: Page page_of(i): of splat i of the paged rows.
 // Units:   a part of a splat: 1 where all of it is drawn.
 layout(std430, binding = SLOT_PAGES) readonly buffer Pages { uvec4 pages[]; };
