@@ -16,8 +16,8 @@ KERNEL = Path(__file__).parents[1] / "kernels" / "decode" / "decode_heads.cl"
 WIDTH = {"cpu": 16, "gpu": 1}  # anchors at a time: a vector of AVX-512, a work-item of a GPU
 GROUP = {"cpu": 1, "gpu": 64}
 RUN = {"cpu": 16, "gpu": 1}  # blocks of WIDTH anchors a work-item
-TILE = 5  # outputs that are summed at once; divides those of 5 and of 10 splats an anchor
-ROWS = 5  # hidden units likewise
+TILE = 5  # outputs side by side in memory; divides those of 5 and of 10 splats an anchor
+ROWS = {"cpu": 8, "gpu": 5}  # hidden units that are summed at once
 UNITS = 16  # hidden units that are looked at at once: a head has a multiple of it
 MOST_HIDDEN = 128  # units of a head: they lie in private memory
 MOST_SPLATS = 16  # an anchor, likewise
@@ -79,7 +79,7 @@ class AnchorHeads:
         if (self._looks == DIRECTION + 1) != (light is not None):
             raise ValueError("light by direction and the colour head's columns for it go together.")
         self._kernels = device.program(
-            KERNEL, WIDTH=self._width, TILE=TILE, ROWS=ROWS, UNITS=UNITS,
+            KERNEL, WIDTH=self._width, TILE=TILE, ROWS=ROWS[device.kind], UNITS=UNITS,
             MAX_HIDDEN=MOST_HIDDEN, MAX_SPLATS=MOST_SPLATS,
         )  # fmt: skip
         table, weights = _flat(heads)

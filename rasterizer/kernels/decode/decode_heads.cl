@@ -55,15 +55,12 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
     __global const float* mine = feature + (size_t)block * features * WIDTH;
     // The block's first splat; those of an anchor lie side by side.
     const size_t row = start + (size_t)block * WIDTH * splats;
-    if (WIDTH > 1 && n == WIDTH && shapes) {
-      FETCH_TO_WRITE(mean_opacity + 4 * row, WIDTH * splats * 4)
-      FETCH_TO_WRITE(covariance + 8 * row, WIDTH * splats * 8)
-    }
-    if (WIDTH > 1 && block + 1 < end) {
-      // Of the next block; this one's came while the one before was worked on.
-      FETCH(woken + units, units)
-      FETCH(mine + features * WIDTH, features * WIDTH)
-    }
+    // Numbers of the next block (this one's came while the one before was worked on) and rows that
+    // are written at the end of this one, a few at a time: a processor that waits for more of them
+    // than it can count stands still.
+    const int ahead = WIDTH > 1 && block + 1 < end, whole = WIDTH > 1 && n == WIDTH && shapes;
+    const int half_rows = WIDTH * splats * 4;  // floats: half of the covariances
+    if (whole) FETCH_TO_WRITE(covariance + 8 * row, half_rows)
     // Units that are awake, head after head: those of head m are ends[m] to ends[m + 1].
     int live[4 * MAX_HIDDEN + ROWS], ends[5];
     floatn unit[4 * MAX_HIDDEN + ROWS];
@@ -78,8 +75,11 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
     }
     // Features are read once for the four heads.
     first_layer(ends[4], live, features, 0, weights, bias, mine, 0, unit);
+    if (whole) FETCH_TO_WRITE(covariance + 8 * row + half_rows, half_rows)
     second_layer(heads[3], ends[3], ends[4], live, unit, weights, opacity);
+    if (ahead) FETCH(woken + units, units)
     if (!shapes) {  // the rest does not follow x, and is there
+      if (ahead) FETCH(mine + features * WIDTH, features * WIDTH)
       for (int j = 0; j < splats; j++) {
         float lanes[WIDTH];
         STOREN(opacity[j], lanes);
@@ -90,7 +90,9 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
     }
     // Offset in metres, scale in metres and one sigma, rotation w x y z of any length.
     second_layer(heads[0], ends[0], ends[1], live, unit, weights, offset);
+    if (whole) FETCH_TO_WRITE(mean_opacity + 4 * row, WIDTH * splats * 4)
     second_layer(heads[1], ends[1], ends[2], live, unit, weights, scale);
+    if (ahead) FETCH(mine + features * WIDTH, features * WIDTH)
     second_layer(heads[2], ends[2], ends[3], live, unit, weights, rotation);
     __global const float* at = places + (size_t)block * 3 * WIDTH;
     const Triple place = {LOADN(at), LOADN(at + WIDTH), LOADN(at + 2 * WIDTH)};
