@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import channels_of
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.scene.cameras.framing import frame_points
@@ -171,9 +170,7 @@ class Trainer(Run):
         self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
         self.run_length, self.anchor_cap = notes["run_length"], notes["anchor_cap"]
         self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
-        if "light" in self.layout.own:  # of older runs: one channel
-            channels = channels_of(state["light.value"])
-            self.layout = replace(self.layout, light_channels=channels)
+        self.layout = self.layout.as_in(state)
         values = {n: state[f"{n}.value"] for n in ("weights", *self.layout.per_anchor)}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import WIDTHS
+from shapeshift.runtime_models.colors.light_harmonics import WIDTHS, channels_of
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT
 
 KERNELS = Path(__file__).parents[1] / "kernels"
@@ -81,6 +81,12 @@ class HeadLayout:
     def widths(self) -> dict[str, int]:
         """How many numbers an anchor has of each attribute, as the kernels call it."""
         return ATTRIBUTE_WIDTH | {"light": WIDTHS[self.light_channels]}
+
+    def as_in(self, state: dict[str, np.ndarray]) -> "HeadLayout":
+        """With light of as many channels as an optimiser's state has: older runs had one."""
+        if "light" not in self.own:
+            return self
+        return replace(self, light_channels=channels_of(state["light.value"]))
 
     @property
     def own_widths(self) -> dict[str, int]:
