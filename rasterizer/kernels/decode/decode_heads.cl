@@ -146,8 +146,8 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
   }
 }
 
-// The fifth -> colours towards an eye; looks: 3 where they follow it, 4 or 6 where anchors have light
-// by direction of one channel or three, too, else 0; of the blocks that are wanted, 0: all.
+// The fifth -> colours towards an eye; looks: 3 where they follow it, 4 or 6 where anchors have
+// light by direction of one channel or three, too, else 0; of the blocks that are wanted, 0: all.
 __kernel void decode_colors(int anchors, int start, int run, int splats, int features, int units,
                             int looks, float eye_x, float eye_y, float eye_z,
                             __global const Head* heads, __global const float* weights,
