@@ -1,8 +1,8 @@
 // Raw outputs of the heads -> Gaussians, forward and backward: the activations of each head.
 //
 // Defined by networks.py: SPLATS (k an anchor), RAW and OUT_AT0..4 in the order of the heads
-// offset, scale, rotation, opacity, colour; FRAMES and BASE_COLORS (1: anchors have such); LIGHT (channels of
-// theirs: 0, 1 or 3).
+// offset, scale, rotation, opacity, colour; FRAMES and BASE_COLORS (1: anchors have such); LIGHT
+// (channels of their light: 0, 1 or 3).
 // offset = reach * tanh(h) metres     (bounded: culling boxes can rely on it)
 // scale  = unit * exp(clip(h, -6, 3)) metres, one sigma
 // opacity = tanh(h), below zero absent; colour = sigmoid(h + c + l) with the anchor's base colour c
