@@ -169,6 +169,7 @@ class Trainer(Run):
         self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
         self.run_length, self.anchor_cap = notes["run_length"], notes["anchor_cap"]
         self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
+        self.layout = self.layout.as_in(state)
         values = {n: state[f"{n}.value"] for n in ("weights", *self.layout.per_anchor)}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
