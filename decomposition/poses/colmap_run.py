@@ -37,6 +37,9 @@ LADDER: tuple[dict[str, Any], ...] = (
      "mapper": "global"},
 )  # fmt: skip
 ENOUGH = 0.9  # of the photos
+# From so many photos on, poses are found by several threads, whose sums differ in the last bits
+# from run to run; below, adjustment is short and the same photos give the same bytes.
+THREADED = 100
 BLOCK = 8  # photos by photos whose matches are written at once: progress, and what a kill loses
 
 
@@ -94,6 +97,10 @@ def extract(pycolmap: Any, database: Path, job: dict) -> None:
         reader.camera_model = job["lens"]
         if job["masks"]:
             reader.mask_path = job["masks"]
+        # First all photos in their order: extraction numbers them as its threads end.
+        pycolmap.Database.open(str(database)).close()
+        reader.existing_camera_id = camera_of(pycolmap, database, group)
+        pycolmap.import_images(database, job["photos"], pycolmap.CameraMode.SINGLE, group, reader)
         reader.existing_camera_id = camera_of(pycolmap, database, group)
         pycolmap.extract_features(
             database, job["photos"], image_names=group, camera_mode=pycolmap.CameraMode.SINGLE,
@@ -117,19 +124,23 @@ def match(pycolmap: Any, database: Path, job: dict, guided: bool) -> None:
             base.clear_two_view_geometries()
     options = pycolmap.FeatureMatchingOptions()
     options.num_threads, options.use_gpu, options.guided_matching = job["threads"], False, guided
+    verify = pycolmap.TwoViewGeometryOptions()
+    verify.ransac.random_seed = 0  # else a pair's draws are those of the thread that takes it
     if job["neighbours"]:
         pairs = pycolmap.SequentialPairingOptions()
         pairs.overlap, pairs.quadratic_overlap = job["neighbours"], True
         pairs.loop_detection = False
         pycolmap.match_sequential(
-            database, matching_options=options, pairing_options=pairs, device=pycolmap.Device.cpu
-        )
+            database, matching_options=options, pairing_options=pairs,
+            verification_options=verify, device=pycolmap.Device.cpu,
+        )  # fmt: skip
     else:
         every = pycolmap.ExhaustivePairingOptions()
         every.block_size = BLOCK
         pycolmap.match_exhaustive(
-            database, matching_options=options, pairing_options=every, device=pycolmap.Device.cpu
-        )
+            database, matching_options=options, pairing_options=every,
+            verification_options=verify, device=pycolmap.Device.cpu,
+        )  # fmt: skip
 
 
 def solve(pycolmap: Any, database: Path, job: dict, rung: dict, count: int) -> list:
@@ -141,7 +152,8 @@ def solve(pycolmap: Any, database: Path, job: dict, rung: dict, count: int) -> l
         plan.num_threads, plan.random_seed = job["threads"], 0
         return list(pycolmap.global_mapping(database, job["photos"], folder, plan).values())
     plan = pycolmap.IncrementalPipelineOptions()
-    plan.num_threads, plan.random_seed = job["threads"], 0
+    plan.num_threads = 1 if count < THREADED else job["threads"]
+    plan.random_seed = 0
     plan.ba_global_max_num_iterations, plan.min_model_size = 30, 3
     plan.mapper.init_min_tri_angle = rung["angle"]
     plan.mapper.abs_pose_min_num_inliers = rung["inliers"]

@@ -21,18 +21,18 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from ways import Turn, asked, measure_ways, parser_of, settings_of  # noqa: E402
+from ways import Turn, Way, asked, measure_ways, parser_of, settings_of, without  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.rasterizer.project import LEAST_ALPHA  # noqa: E402
 from shapeshift.runtime_models.package.write_package import package_files, zip_files  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 
-WAYS = {
+WAYS: dict[str, Way] = {
     "default": {},
     "no growth": {"grow": False},
-    "no frames": {"anchor_attributes": "stop_color"},
-    "no base colours": {"anchor_attributes": "frame"},
+    "no frames": without("frame"),
+    "no base colours": without("color"),
     "features alone": {"anchor_attributes": ""},
 }
 LOOKS = (0.25, 0.5, 0.75, 1.0)  # shares of the run

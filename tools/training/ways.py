@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from shapeshift.app.charts.chart_rows import write_text
 from shapeshift.app.cluster.open_cluster import open_cluster
@@ -30,13 +31,14 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
-from shapeshift.training.settings import TrainSettings
+from shapeshift.training.settings import SIZES, TrainSettings, suited
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.synthetic.workshop import make_workshop
 
 ROOT = Path(__file__).resolve().parents[2]
 PLACES = ("--out", "--cluster", "--certificates", "--gpus")  # none of which changes a row
 Rows = Iterable[dict[str, object]]  # by column
+Way = dict[str, Any] | Callable[[TrainSettings], dict[str, Any]]  # what it changes of the settings
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,13 @@ class Turn:
     photos: dict[str, list[LoadedPhoto]]  # of the splits train and test
 
 
-def parser_of(doc: str, ways: dict[str, dict]) -> argparse.ArgumentParser:
+def parser_of(doc: str, ways: Mapping[str, Way]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("captures", nargs="+")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seconds", type=float, help="a run; or give --iterations")
     parser.add_argument("--iterations", type=int)
-    parser.add_argument("--max-anchors", type=int, default=12000)
+    parser.add_argument("--max-anchors", type=int, help="default: what suits the capture")
     parser.add_argument("--downscale", type=int)
     parser.add_argument("--ways", nargs="+", choices=list(ways), default=list(ways))
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
@@ -72,18 +74,32 @@ def asked(parser: argparse.ArgumentParser) -> argparse.Namespace:
 
 
 def settings_of(options: argparse.Namespace) -> TrainSettings:
-    """What every way of a table has in common."""
+    """What every way of a table has in common, before it is made to suit a capture."""
     return TrainSettings(
-        iterations=options.iterations, seconds=options.seconds, max_anchors=options.max_anchors,
-        downscale=options.downscale,
+        iterations=options.iterations, seconds=options.seconds, downscale=options.downscale,
+        max_anchors=options.max_anchors or TrainSettings().max_anchors,
     )  # fmt: skip
+
+
+def without(attribute: str) -> Way:
+    """Anchors that lack what they have of the capture's default: frame, color or light."""
+
+    def lacking(settings: TrainSettings) -> dict[str, Any]:
+        have = settings.anchor_attributes.split(",")
+        return {"anchor_attributes": ",".join(name for name in have if attribute not in name)}
+
+    return lacking
 
 
 def measure_ways(
     options: argparse.Namespace, columns: tuple[str, ...], settings: TrainSettings,
-    ways: dict[str, dict], rows_of: Callable[[Turn], Rows],
+    ways: Mapping[str, Way], rows_of: Callable[[Turn], Rows],
 ) -> None:  # fmt: skip
-    """Rows of every capture with every seed with every way into --out, by who --cluster says."""
+    """Rows of every capture with every seed with every way into --out, by who --cluster says.
+
+    settings: what all ways have in common.  They are made to suit each capture as `train` does it,
+    and then a way changes them.
+    """
     made = {
         "balls": partial(make_balls, size=options.size), "workshop": make_workshop,
         "rig": partial(make_balls, size=options.size, rig=True),
@@ -93,19 +109,22 @@ def measure_ways(
         for seed in options.seeds:
             for way in options.ways:
                 about = {"capture": folder.name, "way": way, "seed": seed}
-                changed = replace(settings, seed=seed, **ways[way])
+                seeded = replace(settings, seed=seed)
                 runs[" ".join(map(str, about.values()))] = partial(
-                    rows_of_turn, about, folder, options.downscale, changed, rows_of
+                    rows_of_turn, about, folder, options, seeded, ways[way], rows_of
                 )
     sweep(options, columns, runs, places)
 
 
 def rows_of_turn(
-    about: dict, folder: Path, downscale: int | None, settings: TrainSettings,
+    about: dict, folder: Path, options: argparse.Namespace, settings: TrainSettings, way: Way,
     rows_of: Callable[[Turn], Rows],
 ) -> Rows:  # fmt: skip
     capture = read_capture(folder)
-    factor = downscale or choose_downscale(capture.photos)
+    given = [name for name in SIZES if getattr(options, name, None) is not None]
+    settings = suited(settings, given, capture)
+    settings = replace(settings, **(way(settings) if callable(way) else way))
+    factor = options.downscale or choose_downscale(capture.photos)
     photos = {
         split: load_photos(capture, split, factor, settings.masks) for split in ("train", "test")
     }

@@ -107,9 +107,14 @@ def test_points_lie_on_the_walls_of_the_room(room, capture):
 
 
 def test_the_library_finds_the_same(room, capture, tmp_path):
-    """Bit for bit: the same seed, the same threads."""
+    """Bit for bit by the same seed, whatever the threads: eight have two cores to end in turn."""
     report = capture[1]
     found = ss.poses(room[0], tmp_path / "out", threads=2)
+    for threads in (1, 8):
+        ss.poses(room[0], tmp_path / f"{threads}", threads=threads)
+        for name in ("cameras.bin", "images.bin", "points3D.bin"):
+            first, other = ((tmp_path / of / "sparse/0" / name) for of in ("out", f"{threads}"))
+            assert first.read_bytes() == other.read_bytes(), (threads, name)
     assert (found.placed, found.points) == (report.placed, report.points)
     assert found.error_px == report.error_px and "arbitrary" in found.scale
     with pytest.raises(ss.UsageError, match="is not empty"):
