@@ -62,6 +62,7 @@ class Options(ClusterOptions, MachineOptions):
 
 
 TRIAL = 600  # steps
+FINAL = {"iterations": "final_iterations", "seconds": "final_seconds"}  # of the last run
 WRITTEN = "the fitted model of the first seed with this report in it"
 CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
 
@@ -90,15 +91,21 @@ def run(options: Options) -> int:
         return run_trial(options)
     if options.resume:
         raise UsageError("--resume goes on with one training; add --only, or leave it out.")
-    if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
-        raise UsageError("--seeds has to be 1 or more, and --tolerance-db 0 or more.")
+    if not options.seeds >= 1:
+        raise UsageError(f"--seeds is {options.seeds}; it has to be at least 1.")
+    if not 0 <= options.tolerance_db < float("inf"):
+        raise UsageError(f"--tolerance-db is {options.tolerance_db}; it has to be at least 0.")
     check_cluster(options)
     if options.cluster != NONE:
         check_places(options)
     refuse_foreign(options.out)  # now, not after the trials
     settings = settings_of(options.asked | budget(options.iterations, options.seconds))
     longer = options.final_iterations, options.final_seconds
-    last = None if longer == (None, None) else settings_of(options.asked | budget(*longer))
+    last = (
+        None
+        if longer == (None, None)
+        else settings_of(options.asked | budget(*longer), None, FINAL)
+    )
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     settings = suited(settings, options.asked, capture)
     if options.calibrate is not None:
