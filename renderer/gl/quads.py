@@ -76,14 +76,14 @@ class QuadsDrawing(Drawing):
         """How many buffers and textures were ever made."""
         return self._gpu.allocations
 
-    def allocate(self, models: list[Model], more: int = 0) -> None:
-        """more: rows behind those of the objects."""
+    def allocate(self, models: list[Model], more: int = 0, stored: int | None = None) -> None:
+        """more: rows behind those of the objects; stored: rows that splats of these lie in."""
         self._release_arena()
         self._changed = True
         self._models, self._most = models, []
         self._grades = {}
         counts, antialiased = list(map(arena_rows, models)), tuple(map(is_antialiased, models))
-        self.arena = Arena(self._gpu, counts, antialiased, more)
+        self.arena = Arena(self._gpu, counts, antialiased, more, stored)
         self._decoder = Decoder(self._gpu, self.arena, models, self._mlps)
         self._allocated = [self.arena, self._decoder]
         if any(map(has_heat, models)):
@@ -252,9 +252,11 @@ class QuadsDrawing(Drawing):
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         arena = self.arena
         owner = np.repeat(np.arange(len(arena.starts) - 1), np.diff(arena.starts))
-        rows = [np.frombuffer(b.read(), np.float32) for b in (arena.mean_opacity, arena.covariance)]
-        n = arena.count
-        return rows[0][: 4 * n].reshape(n, 4), owner, rows[1][: 8 * n].reshape(n, 8)
+        n, read = arena.starts[-1], []
+        for buffer, width in ((arena.mean_opacity, 4), (arena.covariance, 8)):
+            data = buffer.read(4 * width * n) if n else b""
+            read.append(np.frombuffer(data, np.float32).reshape(n, width))
+        return read[0], owner, read[1]
 
     def write_colors(self, color: np.ndarray) -> None:
         sets = len(self.arena.colors)

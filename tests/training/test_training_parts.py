@@ -195,6 +195,10 @@ def test_budget_follows_whichever_ends_first():
         ({"blended_shapes": -0.1}, "blended_shapes is -0.1"), ({"seed": -1}, "seed"),
         ({"hidden": -3}, "at least 1"), ({"anchor_attributes": "size"}, "no attribute 'size'"),
         ({"depth_share": float("inf")}, "depth_share is inf"),
+        ({"seconds": "10"}, "seconds is '10'; a number"), ({"max_anchors": None}, "a number"),
+        ({"iterations": 1.5}, "iterations is 1.5; a whole number"), ({"downscale": 2.5}, "whole"),
+        ({"masks": "x"}, "masks is 'x'; choose auto, object, valid, ignore"),
+        ({"poses": ""}, "choose stated, refine"), ({"background": "pink"}, "auto, random, black"),
     ],
 )  # fmt: skip
 def test_settings_that_cannot_be_are_refused(changes, sentence):
