@@ -14,7 +14,6 @@ from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.train_options import Asked, Options
-from shapeshift.training.settings import TrainSettings, adjusted
 
 if TYPE_CHECKING:
     from shapeshift.app.cluster.board import Shown
@@ -79,6 +78,8 @@ def wanted_of(text: str, said: str = "--") -> "Wanted":
 
 def refuse_options(options: Options, said: str) -> None:
     """Raises UsageError for what cannot go with --blocks."""
+    from shapeshift.training.settings import TrainSettings, adjusted
+
     if options.out.suffix != ENDING:
         raise UsageError(
             f"{said}out is {options.out.name}; {said}blocks writes a folder, name it "
