@@ -322,10 +322,7 @@ def choose_paths(
     views = views or (options.frames if options.camera == "orbit" else 1)
     count = len(labels) * views
     if count > MOST_VALUES:
-        raise UsageError(
-            f"--x, --camera and --frames ask for {count} pictures; one run draws at most "
-            f"{MOST_VALUES}."
-        )
+        raise UsageError(f"--x and --frames ask for {count} pictures, over {MOST_VALUES}.")
     rows = [(c, i) for c in range(len(labels)) for i in range(views)]
     paths = [options.out / f"{n:04d}_{labels[c]}.png" for n, (c, _) in enumerate(rows)]
     beside = [p.with_suffix(".npy") for p in paths] + [options.out / LEGEND]
