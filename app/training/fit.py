@@ -68,9 +68,7 @@ CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.commands.bench import write_json
-    from shapeshift.app.errors import UsageError
     from shapeshift.app.opening import open_capture
     from shapeshift.app.pace import with_pace
     from shapeshift.app.paths import full
@@ -79,26 +77,16 @@ def run(options: Options) -> int:
     from shapeshift.app.training.trials.run_trial import run_trial
     from shapeshift.app.training.trials.run_trials import (
         calibrated_once,
-        check_places,
         say_of_clock,
     )
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
+    from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.fit.fit import Fit
 
     if options.only is not None:
         return run_trial(options)
-    if options.resume:
-        raise UsageError("--resume goes on with one training; add --only, or leave it out.")
-    if not options.seeds >= 1:
-        raise UsageError(f"--seeds is {options.seeds}; it has to be at least 1.")
-    if not 0 <= options.tolerance_db < float("inf"):
-        raise UsageError(f"--tolerance-db is {options.tolerance_db}; it has to be at least 0.")
-    check_cluster(options)
-    if options.cluster != NONE:
-        check_places(options)
-    refuse_foreign(options.out)  # now, not after the trials
+    refuse_options(options)
     settings = settings_of(options.asked | budget(options.iterations, options.seconds))
     longer = options.final_iterations, options.final_seconds
     last = (
@@ -153,6 +141,25 @@ def trainings(options: Options) -> "Iterator[tuple[ReportProgress, TrainSeeds | 
             bar.update(task, description=what, completed=done)
 
         yield show_progress, None
+
+
+def refuse_options(options: Options) -> None:
+    """Raises UsageError, BadFile for what cannot be done: now, not after the trials."""
+    from shapeshift.app.cluster.open_cluster import check_cluster
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.trials.run_trials import check_places
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
+
+    if options.resume:
+        raise UsageError("--resume goes on with one training; add --only, or leave it out.")
+    if not options.seeds >= 1:
+        raise UsageError(f"--seeds is {options.seeds}; it has to be at least 1.")
+    if not 0 <= options.tolerance_db < float("inf"):
+        raise UsageError(f"--tolerance-db is {options.tolerance_db}; it has to be at least 0.")
+    check_cluster(options)
+    if options.cluster != NONE:
+        check_places(options)
+    refuse_foreign(options.out)
 
 
 def budget(iterations: int | None, seconds: float | None) -> Asked:
