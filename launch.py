@@ -8,6 +8,7 @@ runs the tests, `--help` lists all.
 """
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -41,6 +42,15 @@ def stop(sentence):
     raise SystemExit(2)
 
 
+def hold_interrupts(held):
+    """Keep Ctrl-C waiting, or let it in.  While Python starts and imports it would be lost or end
+    in a traceback; app/cli.py lets it in when it can answer.
+    """
+    if hasattr(signal, "pthread_sigmask"):  # not on Windows
+        how = signal.SIG_BLOCK if held else signal.SIG_UNBLOCK
+        signal.pthread_sigmask(how, {signal.SIGINT})
+
+
 def hand_over(python, arguments):
     """Run in the environment; on POSIX this process becomes the program, so signals reach it."""
     # What lies in the current folder, perhaps one of downloads, is no module: -P leaves it out,
@@ -67,10 +77,12 @@ def main(arguments):
     if sys.version_info < OLDEST_PYTHON:
         found = ".".join(map(str, sys.version_info[:3]))
         stop(f"Shapeshift needs Python 3.11 or newer, this is {found}; start it with that.")
+    hold_interrupts(True)
     if ROOT not in sys.path:  # PYTHONSAFEPATH leaves a script's folder out
         sys.path.insert(0, ROOT)
     from shapeshift.app.first_start import (  # too new for the Pythons refused above
         PYTHON,
+        is_ready,
         make_environment,
     )
 
@@ -81,7 +93,9 @@ def main(arguments):
     if arguments and arguments[0] in ASKING and len(arguments) == 1:
         return hand_over(sys.executable, [CLI, *arguments])
     try:
-        make_environment(testing)
+        if testing or not is_ready(testing):
+            hold_interrupts(False)
+            make_environment(testing)
     except KeyboardInterrupt:
         stop("Interrupted; the next start makes the environment.")
     except OSError as error:
@@ -89,6 +103,7 @@ def main(arguments):
     if testing:
         os.chdir(ROOT)
         return hand_over(str(PYTHON), pytest_words(arguments[1:]))
+    hold_interrupts(True)
     return hand_over(str(PYTHON), [CLI, *arguments])
 
 

@@ -3,7 +3,9 @@
 import contextlib
 import importlib
 import os
+import signal
 import sys
+from collections.abc import Iterator
 
 from shapeshift.app.paths import leave_current_folder
 from shapeshift.app.terminal import clean_streams, drop_output, print_text, say
@@ -185,6 +187,21 @@ def report_fault(command: str, error: Exception) -> int:
     return FAULT
 
 
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ctrl-C waits until the end of this: numpy takes one while it is imported for a broken
+    installation.  launch.py has held it back since Python started.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
 def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.caches import settle_caches_for
     from shapeshift.app.command_line import parse, wants_help
@@ -192,10 +209,9 @@ def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.program import program
     from shapeshift.app.progress import lines
 
-    module, prog = (
-        importlib.import_module(f"shapeshift.app.{COMMANDS[command][0]}"),
-        f"{program()} {command}",
-    )
+    with uninterrupted():
+        module = importlib.import_module(f"shapeshift.app.{COMMANDS[command][0]}")
+    prog = f"{program()} {command}"
     if wants_help(arguments):
         from shapeshift.app.command_help import help_text
 

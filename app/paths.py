@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from urllib.parse import unquote
 
+from shapeshift.app.errors import UsageError
+
 SCHEME = "file:"
 ASSETS = Path(__file__).resolve().parents[1] / "assets"  # what the program brought along
 DEMO, TOUCH = ASSETS / "workshop.shift", ASSETS / "touch.scene.json"
@@ -33,12 +35,15 @@ def plain_path(text: str, windows: bool = sys.platform == "win32") -> str:
     return text
 
 
-def plain(path: Path | str) -> Path:
+def plain(path: str | os.PathLike[str]) -> Path:
     """The same as a Path that begins where the program was started.
 
-    A Path of an address has lost one of its slashes.
+    A Path of an address has lost one of its slashes.  Raises UsageError of what is no path.
     """
-    path = Path(plain_path(str(path)))
+    text = os.fspath(path) if isinstance(path, str | os.PathLike) else None
+    if not isinstance(text, str):
+        raise UsageError(f"{path!r} is no path; a text or a pathlib.Path is wanted.")
+    path = Path(plain_path(text))
     return path if _started_in is None or str(path) == STANDARD_STREAM else _started_in / path
 
 

@@ -22,6 +22,7 @@ SLOTS = {
     "COVARIANCE": 1,  # vec4 (N, 2)    m^2, in the object
     "COLOR": 2,  # vec4 (N,)      display sRGB
     "SECOND_COLOR": 3,  # vec4 (N,)      of the second of two views, where it has its own
+    "PAGES": 4,  # uvec4          poses, then where the last rows lie: see common/pages.glsl
     "RECORDS": 5,  # uvec4 (V, N, 2)   screen ellipses
     "KEYS": 6,  # uint (N,)      depth or distance as float bits, or CULLED_KEY
     "COUNTS": 7,  # uint (20,)     as COUNTS below
@@ -35,7 +36,7 @@ SLOTS = {
     # splat
     "ORDER": 1,  # uint (N,)      indices, near to far
     # surface
-    "SURFACES": 4,  # vec4 (N, 3)    depth around the mean, and a normal
+    "SURFACES": 3,  # vec4 (N, 3)    depth around the mean, and a normal
     # decode
     "ANCHORS": 2,  # vec4 (A,)      metres in the object
     "FRAMES": 3,  # vec4 (A, 2)    factors along an anchor's axes, and its unit quaternion wxyz
@@ -44,11 +45,12 @@ SLOTS = {
     "WEIGHTS": 5,  # vec4           of a head that does not fit a uniform block
     "STAGING": 4,  # float          means or offsets, scales, rotations, opacities
     "SH": 3,  # float (M * 3, n)
+    "LISTED": 1,  # uint (n,)      pages of which colours are made
     "LAYER": 4,  # uint (n,)      which layer a plain splat is of
     "LAYER_WEIGHTS": 5,  # float          how much of each layer there is
     "OWN_OPACITY": 6,  # float (n,)     before the weight
     "CONTROL": 6,  # vec4 (A, d / 4)  Psi of a control an anchor
-    "LIGHT": 7,  # vec4 (A, 2)    light by direction: harmonics of degree 1 and 2
+    "LIGHT": 7,  # vec4 (A, 2 C)  light by direction: harmonics of degree 1 and 2
     "PALETTE": 3,  # vec4 (256,)    display sRGB
     "TINT": 4,  # float (A,)     weight of a thermal stop
     "HEAT": 0,  # vec4 (N,)      value times weight 0 0 weight: what is thermal of a splat

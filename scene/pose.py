@@ -188,10 +188,18 @@ class View:
 
 
 def look_at(eye: np.ndarray, target: np.ndarray, up: tuple = (0.0, 1.0, 0.0)) -> Pose:
-    """The pose of an eye at `eye` (3,) that looks at `target` (3,), metres in the world."""
+    """The pose of an eye at `eye` (3,) that looks at `target` (3,), metres in the world.
+
+    Raises ValueError where these and `up` say no direction.
+    """
     back = np.asarray(eye, np.float64) - np.asarray(target, np.float64)
-    back /= np.linalg.norm(back)
     right = np.cross(np.asarray(up, np.float64), back)
+    if not np.linalg.norm(right) > 0:
+        raise ValueError(
+            f"an eye at {eye} that looks at {target} has no direction, or that of up, {up}; "
+            "move one of them, or give another up."
+        )
+    back /= np.linalg.norm(back)
     right /= np.linalg.norm(right)
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)

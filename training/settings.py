@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -55,11 +55,24 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
 
 
 def check_numbers(settings: object, least: dict[str, float], shares: tuple[str, ...]) -> None:
-    """Raises ValueError naming the first number below its least, not finite, or no share."""
+    """Raises ValueError naming the first number below its least, not finite, or no share; and the
+    first word that is none of its field's.
+    """
+    hints = get_type_hints(type(settings))
     for name, low in least.items():
         value = getattr(settings, name)
-        if value is not None and not low <= value < float("inf"):
+        if value is None and type(None) in get_args(hints[name]):
+            continue
+        if not isinstance(value, int | float | np.number):
+            raise ValueError(f"{name} is {value!r}; a number is wanted.")
+        if not low <= value < float("inf"):
             raise ValueError(f"{name} is {value}; it has to be at least {low}.")
+        if float not in (hints[name], *get_args(hints[name])) and value != int(value):
+            raise ValueError(f"{name} is {value}; a whole number is wanted.")
+    for name, hint in hints.items():
+        if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
+            words = ", ".join(map(str, get_args(hint)))
+            raise ValueError(f"{name} is {getattr(settings, name)!r}; choose {words}.")
     for name in shares:
         if not getattr(settings, name) <= 1:
             raise ValueError(f"{name} is {getattr(settings, name)}; it is a share, 0 to 1.")

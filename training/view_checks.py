@@ -29,9 +29,10 @@ def validate_views(photos: list[LoadedPhoto], masks: str) -> tuple[list[LoadedPh
         if len(mine) <= FEW:
             more = [p.modality for p in photos if p.modality != name]
             shared = max(set(more), key=more.count, default=name)
+            plural = "s" if len(mine) > 1 else ""
             warnings.append(
-                f"{name} has {len(mine)} training photos only: seen from elsewhere it will be a "
-                "guess; 30 and more from all around are a good capture."
+                f"{name} has {len(mine)} training photo{plural} only: seen from elsewhere it "
+                "will be a guess; 30 and more from all around are a good capture."
                 + (
                     f"  If it shows the shapes of {shared}, it can share them: "
                     "--fixed offset,scale,rotation,opacity."

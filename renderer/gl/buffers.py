@@ -32,6 +32,7 @@ import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
+from shapeshift.renderer.gl.paging.mapped_pages import MappedPages
 from shapeshift.renderer.limits import too_many
 
 STAGED_SPLATS = 1 << 20  # decoded at a time; bounds the staging buffer to 46 MB
@@ -64,22 +65,24 @@ class Arena:
 
     def __init__(
         self, gpu: Gpu, counts: list[int], antialiased: tuple[bool, ...] | None = None,
-        more: int = 0,
+        more: int = 0, stored: int | None = None,
     ) -> None:  # fmt: skip
         """Room for objects of so many splats; antialiased: one an object, None: no object is.
 
-        more: rows behind those of the objects, whose owners `paged` tells.
+        more: rows drawn behind those of the objects, which `pages` tells; stored: rows that their
+        splats lie in, None: as many.
         """
         self.count = sum(counts) + more
-        self.paged: list[tuple[int, int, int]] = []  # object, first row, last row + 1, of those
+        self.pages: MappedPages | None = None
         if not self.count <= fitting_splats(gpu):
             raise too_many(self.count, fitting_splats(gpu), limit_of(gpu), "tiles")
         self.gpu = gpu
         self.antialiased = antialiased or (False,) * len(counts)
         self.starts = [0, *np.cumsum(counts, dtype=int).tolist()]  # rows of object i: [i], [i + 1]
         n = self.count
-        self.mean_opacity = gpu.reserve(16 * n)
-        self.covariance = gpu.reserve(16 * layout.COVARIANCE_VECS * n)
+        rows = n if stored is None else sum(counts) + stored
+        self.mean_opacity = gpu.reserve(16 * rows)
+        self.covariance = gpu.reserve(16 * layout.COVARIANCE_VECS * rows)
         self.colors = [gpu.reserve(16 * n)]  # for all views, or one a view
         self.color, self.set = self.colors[0], 0  # that decoding writes into
         self.records = gpu.reserve(16 * layout.RECORD_VECS * n)
@@ -100,9 +103,18 @@ class Arena:
 
     @property
     def runs(self) -> list[tuple[int, int, int]]:
-        """(object, first row, last row + 1) of all rows."""
+        """(object, first row, last row + 1) of the objects that have rows of their own."""
         own = ((i, *ends) for i, ends in enumerate(pairwise(self.starts)))
-        return [*(run for run in own if run[2] > run[1]), *self.paged]
+        return [run for run in own if run[2] > run[1]]
+
+    def grow(self, stored: int) -> None:
+        """Room for the splats of so many rows behind those of the objects."""
+        rows = self.starts[-1] + stored
+        for name, width in (("mean_opacity", 16), ("covariance", 16 * layout.COVARIANCE_VECS)):
+            before, made = getattr(self, name), self.gpu.reserve(width * rows)
+            self.gpu.ctx.copy_buffer(made, before, before.size)
+            setattr(self, name, made)
+            before.release()
 
     def heat_of(self, which: int) -> moderngl.Buffer:
         """What thermal stops have in a set of colours; made, all zero, when first asked for."""
@@ -266,6 +278,8 @@ class Arena:
             buffer.release()
         for buffer in self._heats.values():
             buffer.release()
+        if self.pages is not None:
+            self.pages.release()
 
     def __enter__(self) -> "Arena":
         return self

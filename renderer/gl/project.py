@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
+from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
@@ -24,12 +25,12 @@ class Projector:
 
     def _variant(
         self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False,
-        own_colors: bool = False,
+        own_colors: bool = False, paged: bool = False,
     ) -> moderngl.ComputeShader:  # fmt: skip
         return self._gpu.compute(
             "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
             KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
-            ANTIALIASED=int(antialiased), OWN_COLORS=int(own_colors),
+            ANTIALIASED=int(antialiased), OWN_COLORS=int(own_colors), PAGED=int(paged), PAGE=PAGE,
         )  # fmt: skip
 
     def project(
@@ -72,9 +73,32 @@ class Projector:
         bind(color=mine[0])
         if own_colors := len(views) > 1 < len(mine):
             bind(second_color=mine[1])
+        how = (views, len(frames) > len(views), settings, keep_outside, own_colors)
+        programs = self._programs(arena, *how)
+        for i, first, last in arena.runs:
+            program = programs[arena.antialiased[i], False]
+            set_uniforms(program, first=first, last=last)
+            program["frames"].write(rows[i])
+            program.run(groups_for(last - first, layout.WORKGROUP))
+        if (pages := arena.pages) is not None:
+            bind(pages=pages.upload(rows))
+            program = programs[bool(pages.antialiased.any()), True]
+            ends = {"first": pages.first, "last": arena.count, "first_entry": pages.first_entry}
+            set_uniforms(program, **ends)
+            program.run(groups_for(pages.rows, layout.WORKGROUP))
+        self._gpu.ctx.memory_barrier()
+
+    def _programs(
+        self, arena: Arena, views: list[View], own_frame: bool, settings: RenderSettings,
+        keep_outside: bool, own_colors: bool,
+    ) -> dict[tuple[bool, bool], moderngl.ComputeShader]:  # fmt: skip
+        """Of what is antialiased or not, and in pages or not; what all objects share is set."""
+        kinds = {(arena.antialiased[i], False) for i, _, _ in arena.runs}
+        if arena.pages is not None:
+            kinds.add((bool(arena.pages.antialiased.any()), True))
         programs = {
-            kind: self._variant(len(views), len(frames) > len(views), settings, kind, own_colors)
-            for kind in set(arena.antialiased)
+            (faint, paged): self._variant(len(views), own_frame, settings, faint, own_colors, paged)
+            for faint, paged in kinds
         }
         for program in programs.values():
             set_uniforms(
@@ -85,12 +109,7 @@ class Projector:
             )  # fmt: skip
             if len(views) > 1:
                 set_uniforms(program, count=arena.count)
-        for i, first, last in arena.runs:
-            program = programs[arena.antialiased[i]]
-            set_uniforms(program, first=first, last=last)
-            program["frames"].write(rows[i])
-            program.run(groups_for(last - first, layout.WORKGROUP))
-        self._gpu.ctx.memory_barrier()
+        return programs
 
     def counts(self, arena: Arena, i: int = 0) -> dict[str, int]:
         """Splats of view i at the last projection: drawn, then CULL_REASONS.

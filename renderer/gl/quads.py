@@ -76,14 +76,14 @@ class QuadsDrawing(Drawing):
         """How many buffers and textures were ever made."""
         return self._gpu.allocations
 
-    def allocate(self, models: list[Model], more: int = 0) -> None:
-        """more: rows behind those of the objects."""
+    def allocate(self, models: list[Model], more: int = 0, stored: int | None = None) -> None:
+        """more: rows behind those of the objects; stored: rows that splats of these lie in."""
         self._release_arena()
         self._changed = True
         self._models, self._most = models, []
         self._grades = {}
         counts, antialiased = list(map(arena_rows, models)), tuple(map(is_antialiased, models))
-        self.arena = Arena(self._gpu, counts, antialiased, more)
+        self.arena = Arena(self._gpu, counts, antialiased, more, stored)
         self._decoder = Decoder(self._gpu, self.arena, models, self._mlps)
         self._allocated = [self.arena, self._decoder]
         if any(map(has_heat, models)):
@@ -165,7 +165,8 @@ class QuadsDrawing(Drawing):
                 with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
                     self._sorter.sort(arena, settings.key_bits)
             with timer.time("splat"):
-                self._splat(group, first + i, settings, sets[i : i + len(group)])
+                in_order = frame is not None and self._sorter.backend == "gl"  # the keys, too
+                self._splat(group, first + i, settings, sets[i : i + len(group)], in_order)
             if settings.depth_scale > 0:
                 with timer.time("depth"):
                     for row, view in enumerate(group):
@@ -174,8 +175,9 @@ class QuadsDrawing(Drawing):
         self._last = len(groups[-1]) - 1
 
     def _splat(
-        self, group: list[View], i: int, settings: RenderSettings, sets: Sequence[int] = ()
-    ) -> None:
+        self, group: list[View], i: int, settings: RenderSettings, sets: Sequence[int] = (),
+        keys_sorted: bool = False,
+    ) -> None:  # fmt: skip
         """Draws views that were projected together, from image i on; two at once where it pays."""
         arena, pair, disparity = self.arena, self.stereo_pair, None
         foveas = foveas_of(group, settings)
@@ -185,7 +187,7 @@ class QuadsDrawing(Drawing):
         alike = len(group) == 2 and not foveas and group[0].size == group[1].size and arena.count
         if pair is not None and alike and not self.draws_heat:
             if settings.low_pass >= LEAST_LOW_PASS:
-                disparity = pair.disparity(arena, group[0].size[0])
+                disparity = pair.disparity(arena, group[0].size[0], keys_sorted)
         if pair is not None and disparity is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
             pair.draw(arena, pictures, disparity, settings.min_alpha, self._splatter.unit)
@@ -252,9 +254,11 @@ class QuadsDrawing(Drawing):
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         arena = self.arena
         owner = np.repeat(np.arange(len(arena.starts) - 1), np.diff(arena.starts))
-        rows = [np.frombuffer(b.read(), np.float32) for b in (arena.mean_opacity, arena.covariance)]
-        n = arena.count
-        return rows[0][: 4 * n].reshape(n, 4), owner, rows[1][: 8 * n].reshape(n, 8)
+        n, read = arena.starts[-1], []
+        for buffer, width in ((arena.mean_opacity, 4), (arena.covariance, 8)):
+            data = buffer.read(4 * width * n) if n else b""
+            read.append(np.frombuffer(data, np.float32).reshape(n, width))
+        return read[0], owner, read[1]
 
     def write_colors(self, color: np.ndarray) -> None:
         sets = len(self.arena.colors)

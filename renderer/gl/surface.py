@@ -3,11 +3,10 @@
 Of a frame's views depth alone, beside their colours, into smaller targets (DepthPictures).
 """
 
-from itertools import pairwise
-
 import moderngl
 import numpy as np
 
+from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for, release_framebuffer
@@ -88,18 +87,23 @@ def draw_surface(gpu: Gpu, arena: Arena, view: View, settings: RenderSettings) -
 
 def _measure(gpu: Gpu, arena: Arena, view: View, surfaces: moderngl.Buffer) -> None:
     """Fills `surfaces`, object by object."""
-    program = gpu.compute("surface.comp")
     bind(mean_opacity=arena.mean_opacity, covariance=arena.covariance, surfaces=surfaces)
     left, right, down, up = view.tangents
-    program["focal"].value = (view.size[0] / (right - left), view.size[1] / (up - down))
-    program["near"].value = view.near
-    for i, (first, last) in enumerate(pairwise(arena.starts)):
-        if last > first:
-            rows = (view.eye_from_world() @ arena.world_from_object[i])[:3]
-            program["first"].value, program["last"].value = first, last
-            program["rows"].write(np.ascontiguousarray(rows, np.float32))
-            program.run(groups_for(last - first, layout.WORKGROUP))
-    gpu.ctx.memory_barrier()
+    focal = (view.size[0] / (right - left), view.size[1] / (up - down))
+    each = (view.eye_from_world() @ arena.world_from_object)[:, :3]  # (O, 3, 4)
+    each = np.ascontiguousarray(each, np.float32)
+    for i, first, last in arena.runs:
+        program = gpu.compute("surface.comp")
+        program["rows"].write(each[i])
+        count = groups_for(last - first, layout.WORKGROUP)
+        gpu.run(program, count, first=first, last=last, focal=focal, near=view.near)
+    if (pages := arena.pages) is not None:
+        bind(pages=pages.upload(each[:, None]))
+        gpu.run(
+            gpu.compute("surface.comp", PAGED=1, PAGE=PAGE),
+            groups_for(pages.rows, layout.WORKGROUP), first=pages.first, last=arena.count,
+            focal=focal, near=view.near, first_entry=pages.first_entry,
+        )  # fmt: skip
 
 
 def _draw(

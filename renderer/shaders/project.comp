@@ -2,7 +2,8 @@
 // culling gate.  One invocation a splat, for VIEWS (1 or 2) views at once.
 //  Sigma' = J W Sigma W^T J^T + low_pass I   (EWA splatting, Zwicker et al. 2001; 3DGS, eq. 5)
 // No early returns: on llvmpipe each would mask all that follows (see docs/bench/ideas.md).
-// Reads:   mean_opacity, covariance, color of the object's splats; its pose, the views, the limits.
+// Reads:   mean_opacity, covariance, color of the object's splats; its pose, the views, the limits;
+//          pages, and with them splats of all objects that have any.
 // Writes:  records (two a splat where there are two views), keys, counts of what was culled and
 //          why.
 // Units:   metres in the object and the eye, which has y up and looks along -z; pixels from lower
@@ -15,9 +16,13 @@
 #define ANTIALIASED 0     // 1: what the low pass makes wider becomes fainter
 #define KEY_RANGE 0       // 1: the least and largest key are wanted
 #define OWN_COLORS 0      // 1: the second view has colours of its own
+#define PAGED 0           // 1: the rows are drawn from pages, each for an object of its own
 #endif
 #include "common/finite.glsl"
 #include "common/record.glsl"
+#if PAGED
+#include "common/pages.glsl"
+#endif
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };
@@ -30,10 +35,15 @@ layout(std430, binding = SLOT_RECORDS) writeonly buffer Records { uvec4 records[
 layout(std430, binding = SLOT_KEYS) writeonly buffer Keys { uint keys[]; };
 layout(std430, binding = SLOT_COUNTS) buffer Counts { uint counts[]; };
 
-uniform uint first;            // splats of this object: rows first to last - 1
+uniform uint first;            // splats of this object, or in pages: rows first to last - 1
 uniform uint last;
 // Rows of eye_from_object of each view, then of the order's frame.
+#if PAGED
+vec4 frames[3 * (VIEWS + SORT_FRAME)];
+bool is_antialiased;
+#else
 uniform vec4 frames[3 * (VIEWS + SORT_FRAME)];
+#endif
 uniform vec4 tangents[VIEWS];  // left, right, down, up of the view; left and down negative
 uniform vec2 clamps[VIEWS];    // largest tangents that the Jacobian sees, either side of the axis
 uniform vec2 size[VIEWS];      // pixels
@@ -104,6 +114,9 @@ Projected project(Splat splat, const uint view) {
     float determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;  // px^4
 #if ANTIALIASED
     float kept = sqrt(bare / determinant);  // Mip-Splatting's 2D filter: the same light in all
+#if PAGED
+    kept = is_antialiased ? kept : 1.0;
+#endif
     opacity *= kept < 1.0 ? kept : 1.0;     // not a number where the splat is too large to draw
     cutoff_sigmas = sqrt(max(2.0 * log(opacity / min_alpha), 0.0));
 #endif
@@ -170,16 +183,28 @@ float sort_value(vec3 mean) {
     return value > BEHIND ? value : BEHIND / (1.0 + BEHIND - value);
 }
 
+#if PAGED
 // The opacity of a part of a splat: why it is this one, project_arena.cl says.
 float weighed(float opacity, float part) {
     return opacity > 0.0 ? mix(opacity * part, opacity * pow(part, 0.69), opacity) : opacity;
 }
+#endif
 
 // Once for all views.
 Splat load_splat(uint i) {
-    vec4 s0 = covariance[2u * i], s1 = covariance[2u * i + 1u];  // xx xy xz yy | yz zz, left out
-    vec4 mean = mean_opacity[i];
-    if (s1.z > 0.0) mean.w = weighed(mean.w, 1.0 - s1.z);
+    uint row = i;
+#if PAGED
+    Page page = page_of(i - first);
+    row = page.row;
+    for (uint k = 0u; k < 3u * uint(VIEWS + SORT_FRAME); k++) frames[k] = pose_row(page.pose + k);
+    is_antialiased = page.antialiased;
+#endif
+    vec4 s0 = covariance[2u * row], s1 = covariance[2u * row + 1u];  // xx xy xz yy | yz zz
+    vec4 mean = mean_opacity[row];
+#if PAGED
+    if (!page.there) mean.w = 0.0;
+    if (page.part != 1.0) mean.w = weighed(mean.w, page.part);
+#endif
     mat3 sigma = mat3(s0.x, s0.y, s0.z, s0.y, s0.w, s1.x, s0.z, s1.x, s1.y);
     // alpha = o exp(-r / 2) = min_alpha at r = 2 ln(o / min_alpha), the power threshold.
     float cutoff_sigmas = sqrt(max(2.0 * log(mean.w / min_alpha), 0.0));

@@ -4,18 +4,28 @@
 // with M the inverse of the covariance up to a factor, b = M p, beta = p . b:
 //  a = Z b.xy / (f beta),  q = Z^2 M / (f f beta).  The normal is b, towards the eye.
 // Same formula as in rasterizer/kernels/surface_arena.cl.
-// Reads:   mean_opacity, covariance; the object's pose, the lens.
+// Reads:   mean_opacity, covariance; the object's pose, the lens; pages, where rows are of these.
 // Writes:  surfaces, three vec4 a splat.
 // Units:   metres; x right, y up, z forward; slopes in 1/pixel; pixels count from lower left.
+#ifndef PAGED
+#define PAGED 0        // 1: the rows are drawn from pages, each for an object of its own
+#endif
+#if PAGED
+#include "common/pages.glsl"
+#endif
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };
 layout(std430, binding = SLOT_COVARIANCE) readonly buffer Covariance { vec4 covariance[]; };
 layout(std430, binding = SLOT_SURFACES) writeonly buffer Surfaces { vec4 surfaces[]; };
 
-uniform uint first;    // splats of this object: rows first to last - 1
+uniform uint first;    // splats of this object, or in pages: rows first to last - 1
 uniform uint last;
-uniform vec4 rows[3];  // eye_from_object
+#if PAGED
+vec4 rows[3];          // eye_from_object
+#else
+uniform vec4 rows[3];
+#endif
 uniform vec2 focal;    // pixels
 uniform float near;    // metres
 
@@ -24,8 +34,14 @@ const float REACH = 6.0;  // sigmas along the view within which depth is held
 void main() {
     uint i = first + gl_GlobalInvocationID.x;
     if (!(i < last)) return;
-    vec4 s0 = covariance[2u * i], s1 = covariance[2u * i + 1u];  // xx xy xz yy | yz zz
-    vec4 mean = vec4(mean_opacity[i].xyz, 1.0);
+    uint at = i;
+#if PAGED
+    Page page = page_of(i - first);
+    at = page.row;
+    for (uint k = 0u; k < 3u; k++) rows[k] = pose_row(page.pose + k);
+#endif
+    vec4 s0 = covariance[2u * at], s1 = covariance[2u * at + 1u];  // xx xy xz yy | yz zz
+    vec4 mean = vec4(mean_opacity[at].xyz, 1.0);
     mat3 sigma = mat3(s0.x, s0.y, s0.z, s0.y, s0.w, s1.x, s0.z, s1.x, s1.y);
     mat3 w = transpose(mat3(rows[0].xyz, rows[1].xyz, -rows[2].xyz));  // columns by columns
     vec3 p = vec3(dot(rows[0], mean), dot(rows[1], mean), -dot(rows[2], mean));

@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.pack import pack
+from shapeshift.rasterizer.paging.drawn_pages import DrawnPages
 from shapeshift.rasterizer.paging.pages import PAGE, PageMap, gather_pages, scatter_pages
 from shapeshift.rasterizer.shade_sh import shade_pages, upload_sh
 from shapeshift.runtime_models.leaf_levels import LeafSplats
@@ -18,25 +19,20 @@ if TYPE_CHECKING:
 
     from shapeshift.rasterizer.paging.pages import Arena
 
-GROWTH = 1.5  # times the pages that are stored, where there are too few
 
-
-class PagedRows:
+class PagedRows(DrawnPages):
     """The last rows of a frame: pages that are drawn, each for one object or for none.
 
-    Their splats lie in stored pages, the last of the arena; copies of an object draw the same ones,
-    until one of them is changed.  Colours are of the pages that are drawn.
+    Their splats lie in stored pages, the last of the arena.  Colours are of the pages that are
+    drawn.
     """
 
     def __init__(
         self, device: Device, first: int, pages: int, stored: int, coefficients: int
     ) -> None:
         """first: the row where both begin, a whole number of pages."""
-        self._device, self.first, self.pages = device, first, pages
-        self.owner = np.full(pages, -1, np.int32)  # object of each page that is drawn
-        self.stored = np.full(pages, -1)  # where its splats are
-        self.weight = np.ones(pages, np.float32)  # the part of each that is drawn
-        self.uses = np.zeros(stored, int)  # of each stored page: how many are drawn from it
+        super().__init__(pages, stored)
+        self._device, self.first = device, first
         self._sh = device.zeros((PAGE // 8 * stored, 3 * coefficients, 8))
         self._coefficients = coefficients
 
@@ -52,18 +48,12 @@ class PagedRows:
     def _remap(self) -> None:
         self.__dict__.pop("map", None)
 
-    def lacking(self, count: int) -> int:
-        """Stored pages to grow to where `count` more are wanted; 0: there are enough."""
-        used = int(np.count_nonzero(self.uses))
-        if used + count <= len(self.uses):
-            return 0
-        return max(used + count, min(int(GROWTH * len(self.uses)), self.pages))
-
     def grow(self, stored: int) -> None:
         """To so many stored pages; the arena has grown already."""
+        super().grow(stored)
         sh = self._device.zeros((PAGE // 8 * stored, *self._sh.shape[1:]))
         self._device.copy_rows(self._sh, sh, 0)
-        self._sh, self.uses = sh, np.pad(self.uses, (0, stored - len(self.uses)))
+        self._sh = sh
 
     def place(
         self, pages: np.ndarray, owner: np.ndarray, given: LeafSplats, arena: "Arena"
@@ -75,7 +65,7 @@ class PagedRows:
             device, (given.means, given.scales, given.wxyz, given.opacity), 0, mean_opacity,
             covariance,
         )  # fmt: skip
-        stored = np.flatnonzero(self.uses == 0)[: len(pages)]
+        stored = self.free(len(pages))
         at = stored + self.first // PAGE
         scatter_pages(device, mean_opacity, at, arena[0])
         scatter_pages(device, covariance, at, arena[1])
@@ -97,37 +87,25 @@ class PagedRows:
     ) -> None:
         index = self._device.upload(np.repeat(owner.astype(np.int32), PAGE))
         scatter_pages(self._device, index, pages + self.first // PAGE, object_index)
-        self.owner[pages], self.stored[pages], self.weight[pages] = owner, stored, 1
-        np.add.at(self.uses, stored, 1)
+        self.draw(pages, owner, stored)
         self._remap()
 
     def clear(self, pages: np.ndarray) -> None:
-        """Nothing is drawn in these pages (n,)."""
-        there = self.stored[pages]
-        np.subtract.at(self.uses, there[there >= 0], 1)
-        self.owner[pages] = self.stored[pages] = -1
+        super().clear(pages)
         self._remap()
 
     def weigh(self, pages: np.ndarray, weight: float) -> None:
-        """Pages (n,) are drawn as a part of themselves, until they are cleared."""
-        self.weight[pages] = weight
+        super().weigh(pages, weight)
         self._remap()
-
-    def shared(self, i: int) -> np.ndarray:
-        """The pages of object i whose splats others draw as well."""
-        pages = self.pages_of(i)
-        return pages[self.uses[self.stored[pages]] > 1]
 
     def own(self, pages: np.ndarray, arena: "Arena") -> None:
         """Gives pages (n,) splats of their own, which may be changed."""
         if not len(pages):
             return
-        fixed, before = self.first // PAGE, self.stored[pages]
-        stored = np.flatnonzero(self.uses == 0)[: len(pages)]
+        fixed = self.first // PAGE
+        before, stored = self.part(pages)
         for array, start in ((arena[0], fixed), (arena[1], fixed), (self._sh, 0)):
             self._move(before + start, stored + start, array)
-        np.subtract.at(self.uses, before, 1)
-        self.stored[pages], self.uses[stored] = stored, 1
         self._remap()
 
     def _move(self, before: np.ndarray, after: np.ndarray, array: "Array") -> None:
@@ -151,10 +129,6 @@ class PagedRows:
             rows = slice(0, PAGE * len(pages))
             grade_color(self._device, rows, runs, grade.gain, grade.power)
             scatter_pages(self._device, runs, pages + self.first // PAGE, color)
-
-    def pages_of(self, i: int) -> np.ndarray:
-        """The pages that are drawn of object i, rising."""
-        return np.flatnonzero(self.owner == i)
 
     def read(self, pages: np.ndarray, array: "Array") -> "Array":
         """(n PAGE, w) rows of pages (n,), a copy on the device.

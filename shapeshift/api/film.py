@@ -69,7 +69,7 @@ def film(
         raise UsageError(f"size is {size}; (width, height) in pixels is wanted.")
     up, flip = scene.turned
     options = Options(
-        scene=scene.path or Path("scene"), out=plain(str(out)), up=up, flip=flip,  # type: ignore[arg-type]
+        scene=scene.path or Path("scene"), out=plain(out), up=up, flip=flip,  # type: ignore[arg-type]
         style_path=style_path, seconds=clock[0], fps=clock[1],
         size=f"{size[0]}x{size[1]}" if size is not None else "",
         cameras=str(cameras) if isinstance(cameras, str | PathLike) else "auto", **how,

@@ -138,7 +138,7 @@ class InspectedScene(OpenedScene):
         if marks is None and self.path is None:
             raise UsageError("this scene lies in no file, so no marks lie beside it; give them.")
         if marks is None or not isinstance(marks, Iterable) or isinstance(marks, str):
-            path = marks_path(self.path) if marks is None and self.path else plain(str(marks))
+            path = marks_path(self.path) if marks is None and self.path else plain(marks)
             file = moved_marks(read_marks_file(path), -self.origin)
             marks, emission = file.marks, file.emission
         picture = self.values(camera, size, **choice)  # type: ignore[arg-type]  # as above
@@ -254,7 +254,7 @@ def change(
 
     choice = ChangeChoice(0.0, millimetres / 1000, degrees, size=size)
     choice.settings(1.0)  # refused before anything is read
-    folder = None if out is None else plain(str(out))
+    folder = None if out is None else plain(out)
     if folder is not None:
         check_folder(folder, overwrite)
     scenes = opened(before), opened(after)

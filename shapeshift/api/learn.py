@@ -86,7 +86,7 @@ def train(
         model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
-    path = None if out is None else plain(str(out))
+    path = None if out is None else plain(out)
     settings |= {"iterations": iterations, "seconds": seconds}
     if str(blocks).strip() != "1":
         more = {"device": device, "calibrate": calibrate, "photo_mb": photo_mb}
@@ -111,12 +111,12 @@ def train_in_blocks(
     given = {name: value for name, value in settings.items() if value is not None}
     more |= {name: given.pop(name) for name in OF_BLOCKS if name in given}
     if "certificates" in more:
-        more["certificates"] = plain(str(more["certificates"]))
+        more["certificates"] = plain(more["certificates"])
     settings_of(given, None)  # refused now, not after the run of the whole
     for name in given:
         if name not in (*USUAL, *EXPERTS):
             raise UsageError(f"{name}: blocks are trained by commands, which have no such option.")
-    options = Options(plain(str(capture)), out, given, blocks=blocks, **more)
+    options = Options(plain(capture), out, given, blocks=blocks, **more)
     return TrainedScene(*train_quietly(options, pace, progress))
 
 
@@ -143,7 +143,7 @@ def trainer_of(
     room = room_of(path, photo_mb, "photo_mb")
     before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
     wished = settings_of(settings, before[1]["settings"] if before else None)
-    found, on = read_capture(plain(str(capture))), open_device(device)
+    found, on = read_capture(plain(capture)), open_device(device)
     if before is None:
         given = [name for name, value in settings.items() if value is not None]
         wished = suited(wished, given, found)
@@ -272,7 +272,7 @@ def update(
     from shapeshift.training.update.regions import moved_capture
 
     given = opened(scene)
-    path = None if out is None else plain(str(out))
+    path = None if out is None else plain(out)
     if path is not None:
         check_output(path, [given.path] if given.path else [], overwrite or resume, "")
         check_writable(path)
@@ -280,11 +280,11 @@ def update(
     elif resume:
         raise UsageError(NO_OUT)
     boxes = (where,) if isinstance(where, str) else tuple(where)
-    region, a_from_b = region_of(boxes, None if change is None else plain(str(change)), "")
+    region, a_from_b = region_of(boxes, None if change is None else plain(change), "")
     before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
     asked = settings | {"iterations": iterations, "seconds": seconds}
     wished = settings_of(asked, before[1]["settings"] if before else None)
-    photos = read_capture(plain(str(capture)))
+    photos = read_capture(plain(capture))
     photos = photos if a_from_b is None else moved_capture(photos, a_from_b)
     with memory_for_training():
         base = base_of(given.model, region)
@@ -327,8 +327,8 @@ def evaluate(
     if scene.subject.file is not None:
         raise BadFile("photos are of one scene as it was trained; name the model of one object.")
     model = scene.model
-    distance = None if vgg is None else VggDistance(plain(str(vgg)))
-    photos = read_capture(plain(str(capture)))
+    distance = None if vgg is None else VggDistance(plain(vgg))
+    photos = read_capture(plain(capture))
     photos = photos if modality is None else only(photos, modality)
     photos = with_extrinsics(photos, rig_of(model.provenance))
     factor = downscale or trained_downscale(model.provenance)
@@ -368,13 +368,11 @@ def poses(
     if not every >= 1:
         raise UsageError(f"every is {every}; give 1 or more.")
     try:
-        wished = replace(
-            PoseSettings(masks=None if masks is None else plain(str(masks))), **settings
-        )
+        wished = replace(PoseSettings(masks=None if masks is None else plain(masks)), **settings)
     except (TypeError, ValueError) as error:
         raise UsageError(f"{error}.") from None
-    folder = plain(str(out))
+    folder = plain(out)
     if folder.is_dir() and any(path.name != WORK for path in Path(folder).iterdir()):
         raise UsageError(f"{folder} is not empty; name a new folder.")
-    listed = list_photos(plain(str(photos)), every)
+    listed = list_photos(plain(photos), every)
     return find_poses(listed, folder, wished, progress or (lambda what, done, of: None))

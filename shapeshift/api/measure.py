@@ -58,7 +58,7 @@ def compare(
     else:
         views = choose_views(a if isinstance(a, OpenedScene) else scene, cameras, 1, size)
     options = Options(
-        first.name, second.name, out=None if out is None else plain(str(out)),
+        first.name, second.name, out=None if out is None else plain(out),
         background=background, overwrite=overwrite, drawing=drawing, context=context,
     )  # fmt: skip
     pairs = drawn_views(options, views, first, second)
@@ -72,7 +72,7 @@ def side_of(scene: PathText | OpenedScene):
 
     at = ""
     if not isinstance(scene, OpenedScene):
-        path, at = split_stop(str(scene))
+        path, at = split_stop(str(plain(scene)))
         scene = opened(path).at(at or None)
     stops = {stop.x: stop.name for stop in scene.stops}
     if not at and scene.x is not None:
@@ -166,7 +166,7 @@ def chart(
             rows.append(pricing.row(each, not quick))
         on_cpu = draws_on_cpu(pricing.drawing, ctx)
     if out is not None:
-        draw(rows, scene, size, pricing.drawing, plain(str(out)), on_cpu)
+        draw(rows, scene, size, pricing.drawing, plain(out), on_cpu)
     return rows
 
 

@@ -73,7 +73,7 @@ def simulate(
         raise UsageError(
             "this is one model; simulate moves the objects of a NAME.scene.json (docs/scene.md)."
         )
-    acts = read_script(plain(str(script)), file.all_items) if script is not None else ()
+    acts = read_script(plain(script), file.all_items) if script is not None else ()
     if seconds is None:
         seconds = (acts[-1].t if acts else 0.0) + AFTER_S
     if not 0 < seconds <= LONGEST_S:
@@ -131,10 +131,10 @@ def cameras(
 
     if not (fov_y == 0 or 0 < fov_y < math.pi):
         raise UsageError(f"fov_y is {fov_y}, expected radians between 0 and pi.")
-    found = read_camera_list(plain(str(path)), CameraReading(size, fov_y, up, flip))
+    found = read_camera_list(plain(path), CameraReading(size, fov_y, up, flip))
     if out is not None:
-        for file in paths_of(plain(str(out)), to):
+        for file in paths_of(plain(out), to):
             if file.exists():
                 raise UsageError(f"{file} exists; choose another place.")
-        write_cameras(found, plain(str(out)), to)
+        write_cameras(found, plain(out), to)
     return found

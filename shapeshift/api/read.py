@@ -23,7 +23,7 @@ def read_document(path: PathText, reading: Reading) -> tuple[Document, Path]:
     from shapeshift.scene.document.read_scene_file import read_scene_file
     from shapeshift.scene.document.scene_file import read_models, scene_of
 
-    path = plain(str(path))
+    path = plain(path)
     if not is_scene_file(path):
         return Document.of(read_model(path, reading)), path
     for name in OF_OBJECTS:

@@ -46,15 +46,15 @@ def segment(
         raise UsageError("masks has the label maps already; leave out segmenter.")
 
     def path(text: PathText | None) -> Path | None:
-        return None if text is None else plain(str(text))
+        return None if text is None else plain(text)
 
     specs: ObjectSpecs | None = None
     if isinstance(objects, str | PathLike):
-        specs = read_specs(plain(str(objects)))
+        specs = read_specs(plain(objects))
     elif objects is not None:
         specs = checked(objects, Path())
     options = Options(
-        scene=scene.path or Path("scene"), capture=plain(str(capture)), out=plain(str(out)),
+        scene=scene.path or Path("scene"), capture=plain(capture), out=plain(out),
         masks=path(masks), objects=None if specs is None else specs.folder,
         segmenter=path(segmenter), photos=photos, complete=complete, overwrite=overwrite,
     )  # fmt: skip

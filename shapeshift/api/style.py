@@ -82,7 +82,7 @@ def add_style(
 
 
 def path_of(text: PathText | None) -> Path | None:
-    return None if text is None else plain(str(text))
+    return None if text is None else plain(text)
 
 
 def without_stop(scene: OpenedScene, name: str) -> AnchorModel:

@@ -1,5 +1,6 @@
 """From where a scene is drawn, and the pictures that come of it."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.appearance import Background
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, moved
 from shapeshift.scene.cameras.framing import orbit_path
-from shapeshift.scene.pose import View
+from shapeshift.scene.pose import MOST_SIDE, View
 from shapeshift.scene.stereo import stereo_pair
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def choose_views(scene: "OpenedScene", camera: Any, count: int, size: Size | Non
     """What Scene.views gives."""
     if not (isinstance(count, int | np.integer) and count >= 1):
         raise UsageError(f"count is {count}; 1 view or more are wanted.")
+    size = None if size is None else pixels_of(size)
     if isinstance(camera, View):
         return [camera.resized(size) if size else camera]
     subject = scene.subject
@@ -43,12 +45,23 @@ def choose_views(scene: "OpenedScene", camera: Any, count: int, size: Size | Non
         camera = read_cameras(scene, str(camera), size)
     if isinstance(camera, CameraList):  # of the file's world
         camera = moved(camera.views, tuple(-scene.origin))
-    views = list(camera)
+    views = list(camera) if isinstance(camera, Iterable) else []
     if not views or not all(isinstance(view, View) for view in views):
         raise UsageError(
             "a camera is 'orbit', 'front', 'auto', a file or folder of cameras, a View or several."
         )
     return [view.resized(size) if size else view for view in views]
+
+
+def pixels_of(size: Any) -> Size:
+    """Width and height.  Raises UsageError of what is no number of pixels."""
+    sides = list(size) if isinstance(size, Sequence | np.ndarray) else []
+    whole = all(isinstance(side, int | np.integer) for side in sides)
+    if not (len(sides) == 2 and whole and all(1 <= side <= MOST_SIDE for side in sides)):
+        raise UsageError(
+            f"size is {size!r}; (width, height) in whole pixels, 1 to {MOST_SIDE}, is wanted."
+        )
+    return int(sides[0]), int(sides[1])
 
 
 def read_cameras(scene: "OpenedScene", camera: str, size: Size | None) -> CameraList:

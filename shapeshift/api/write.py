@@ -66,7 +66,7 @@ def export(
         ss.export("workshop.shift", "heat.spz", x="Thermal")
         ss.export(scene, "part.ply", only=[ss.Sphere(centre=(0, 1, 0), radius=0.5, x=0)])
     """
-    scene, out = opened(scene), plain(str(out))
+    scene, out = opened(scene), plain(out)
     if is_folder(out) or out.suffix.lower() == PACKAGE:
         if x is not None or only or object is not None or eye is not None:
             raise UsageError("a package holds every x and every part; give out= another ending.")
@@ -99,7 +99,7 @@ def save(
     from shapeshift.runtime_models.package.write_package import EXACT, write_package
     from shapeshift.runtime_models.parts import labelled_anchors
 
-    path = plain(str(path))
+    path = plain(path)
     subject = scene.subject
     if subject.file is not None or not isinstance(subject.scene.objects[0].model, AnchorModel):
         what = "objects of a scene file" if subject.file is not None else "plain splats"

@@ -195,6 +195,10 @@ def test_budget_follows_whichever_ends_first():
         ({"blended_shapes": -0.1}, "blended_shapes is -0.1"), ({"seed": -1}, "seed"),
         ({"hidden": -3}, "at least 1"), ({"anchor_attributes": "size"}, "no attribute 'size'"),
         ({"depth_share": float("inf")}, "depth_share is inf"),
+        ({"seconds": "10"}, "seconds is '10'; a number"), ({"max_anchors": None}, "a number"),
+        ({"iterations": 1.5}, "iterations is 1.5; a whole number"), ({"downscale": 2.5}, "whole"),
+        ({"masks": "x"}, "masks is 'x'; choose auto, object, valid, ignore"),
+        ({"poses": ""}, "choose stated, refine"), ({"background": "pink"}, "auto, random, black"),
     ],
 )  # fmt: skip
 def test_settings_that_cannot_be_are_refused(changes, sentence):
@@ -325,7 +329,7 @@ def test_adam_equals_its_definition():
             mean[n] = 0.9 * mean[n] + 0.1 * g
             square[n] = 0.999 * square[n] + 0.001 * g.astype(np.float64) ** 2
             root = np.sqrt(square[n] / (1 - 0.999**t)) + 1e-15
-            pull = 0.5 * value[n] * (g != 0) if n == "light" else 0  # AdamW: not over the root
+            pull = 0.25 * value[n] * (g != 0) if n == "light" else 0  # AdamW: not over the root
             value[n] -= 0.5 * rates[n] * (mean[n] / (1 - 0.9**t) / root + pull)
     for n in value:
         np.testing.assert_allclose(device.download(adam[n]), value[n], atol=1e-5)

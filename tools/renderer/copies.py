@@ -1,6 +1,6 @@
 """What copies of one model cost under a budget: their pages, memory and frames.
 
-python tools/renderer/copies.py FOLDER --out docs/bench/copies.csv
+python tools/renderer/copies.py FOLDER [--drawing tiles quads] --out docs/bench/copies.csv
 
 FOLDER is streamed SOG, as launch.py lod writes it.  Copies stand in a square, a model's width and a
 half apart, each turned otherwise, seen from a corner.  Each row is measured in a process of its
@@ -19,12 +19,16 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from shapeshift.renderer.gl.context import open_context
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.files.part_cache import PartCache
 from shapeshift.runtime_models.model import SplatLayers
@@ -35,12 +39,13 @@ from shapeshift.scene.scene import Scene, SceneObject
 
 SIZE = (1280, 720)
 STILL, WALK = 5, 60  # frames
+WALK_QUADS = 6  # of software GL, which takes ten times as long
 WAYS = (("apart", 1), ("shared", 1), ("apart", 10), ("shared", 10), ("apart", 100),
         ("shared", 100), ("shared", 1000))  # fmt: skip
 SMALL = (200_000, 60_000, 20_000)  # budgets of the last of these besides
 COLUMNS = (
-    "scene", "way", "copies", "budget", "splats", "copies_drawn", "pages_drawn", "pages_stored",
-    "arena_mb", "first_cpu_ms", "frame_cpu_ms", "walk_cpu_ms", "peak_mb", "same",
+    "scene", "drawing", "way", "copies", "budget", "splats", "copies_drawn", "pages_drawn",
+    "pages_stored", "arena_mb", "first_cpu_ms", "frame_cpu_ms", "walk_cpu_ms", "peak_mb", "same",
 )  # fmt: skip
 
 
@@ -49,19 +54,22 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--budget", type=int, default=2_000_000)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--drawing", nargs="*", default=["tiles", "quads"])
     parser.add_argument("--child", nargs=3, metavar=("WAY", "COPIES", "PICTURES"))
     given = parser.parse_args()
     if given.child:
         way, copies, pictures = given.child
-        row = measure(given.folder, way, int(copies), given.budget, Path(pictures))
+        with open_renderer(given.drawing[0]) as renderer:
+            row = measure(renderer, given.folder, way, int(copies), given.budget, Path(pictures))
         sys.stdout.write(json.dumps(row) + "\n")
         return
     rows = []
     with tempfile.TemporaryDirectory() as pictures:
         every = [(*way, given.budget) for way in WAYS]
-        for way, copies, budget in [*every, *((*WAYS[-1], small) for small in SMALL)]:
+        every += [(*WAYS[-1], small) for small in SMALL]
+        for drawing, (way, copies, budget) in product(given.drawing, every):
             words = [sys.executable, __file__, str(given.folder), "--budget", str(budget)]
-            words += ["--child", way, str(copies), pictures]
+            words += ["--drawing", drawing, "--child", way, str(copies), pictures]
             done = subprocess.run(words, stdout=subprocess.PIPE, check=True)
             rows.append(json.loads(done.stdout.splitlines()[-1]))
             sys.stderr.write(f"{rows[-1]}\n")
@@ -71,6 +79,14 @@ def main() -> None:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
+
+
+@contextmanager
+def open_renderer(drawing: str) -> Iterator[Renderer]:
+    """Tiles need no GL."""
+    with ExitStack() as opened:
+        ctx = opened.enter_context(open_context()) if drawing == "quads" else None
+        yield opened.enter_context(Renderer(ctx, drawing))
 
 
 def open_leaves(folder: Path, budget: int) -> SplatLayers:
@@ -98,29 +114,32 @@ def view_of(step: float, part: float) -> View:
     return View(pose, perspective(np.deg2rad(60), SIZE), 0.02 * step, 1000 * step, SIZE)
 
 
-def measure(folder: Path, way: str, copies: int, budget: int, pictures: Path) -> dict:
-    first = open_leaves(folder, budget)
+def measure(
+    renderer: Renderer, folder: Path, way: str, copies: int, budget: int, pictures: Path
+) -> dict:
+    first, name = open_leaves(folder, budget), renderer.backends["drawing"].split()[0]
     apart = way == "apart"
     models = [first, *(open_leaves(folder, budget) if apart else first for _ in range(copies - 1))]
     scene, step = square_of(models)
-    row: dict = {"scene": folder.name, "way": way, "copies": copies, "budget": budget}
-    with Renderer(None, "tiles") as renderer:
-        begun = time.process_time()
-        renderer.update(scene)
-        stats = renderer.draw([view_of(step, 0)])
-        row["first_cpu_ms"] = round(1e3 * (time.process_time() - begun))
-        image, file = renderer.image(0).copy(), pictures / f"{copies}.npy"
-        if apart:
-            np.save(file, image)
-        elif file.exists():
-            row["same"] = float(np.abs(image - np.load(file)).max())
-        row |= memory_of(renderer)
-        assert stats.streaming is not None
-        row["splats"] = stats.streaming.shown
-        row["copies_drawn"] = len(np.unique(renderer.drawing.paged.owner)) - 1  # -1: free pages
-        row["frame_cpu_ms"] = frames(renderer, scene, step, np.zeros(STILL))
-        renderer.streaming.converges = False
-        row["walk_cpu_ms"] = frames(renderer, scene, step, np.linspace(0, 1, WALK))
+    row: dict = {"scene": folder.name, "drawing": name, "way": way, "copies": copies}
+    row["budget"] = budget
+    begun = time.process_time()
+    renderer.update(scene)
+    stats = renderer.draw([view_of(step, 0)])
+    row["first_cpu_ms"] = round(1e3 * (time.process_time() - begun))
+    image, file = renderer.image(0).copy(), pictures / f"{name}_{copies}.npy"
+    if apart:
+        np.save(file, image)
+    elif file.exists():
+        row["same"] = float(np.abs(image - np.load(file)).max())
+    row |= memory_of(renderer)
+    assert stats.streaming is not None
+    row["splats"] = stats.streaming.shown
+    row["copies_drawn"] = len(np.unique(renderer.drawing.paged.owner)) - 1  # -1: free pages
+    row["frame_cpu_ms"] = frames(renderer, scene, step, np.zeros(STILL))
+    renderer.streaming.converges = False
+    walk = WALK_QUADS if name == "quads" else WALK
+    row["walk_cpu_ms"] = frames(renderer, scene, step, np.linspace(0, 1, WALK)[:walk])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return row | {"peak_mb": round(peak / 1e3)}
 
@@ -139,11 +158,17 @@ def frames(renderer: Renderer, scene: Scene, step: float, parts: np.ndarray) -> 
 def memory_of(renderer: Renderer) -> dict:
     drawing = renderer.drawing
     pages = drawing.paged
-    arrays = (drawing._mean_opacity, drawing._covariance, pages._sh, *drawing._colors)
+    if renderer.backends["drawing"].startswith("quads"):
+        arena = drawing.arena
+        arrays = (arena.mean_opacity, arena.covariance, drawing._sh, *arena.colors)
+        taken = sum(buffer.size for buffer in arrays)
+    else:
+        arrays = (drawing._mean_opacity, drawing._covariance, pages._sh, *drawing._colors)
+        taken = sum(array.nbytes for array in arrays)
     return {
         "pages_drawn": int(np.count_nonzero(pages.stored >= 0)),
         "pages_stored": int(np.count_nonzero(pages.uses)),
-        "arena_mb": round(sum(array.nbytes for array in arrays) / 1e6, 1),
+        "arena_mb": round(taken / 1e6, 1),
     }
 
 

@@ -55,15 +55,12 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
     __global const float* mine = feature + (size_t)block * features * WIDTH;
     // The block's first splat; those of an anchor lie side by side.
     const size_t row = start + (size_t)block * WIDTH * splats;
-    if (WIDTH > 1 && n == WIDTH && shapes) {
-      FETCH_TO_WRITE(mean_opacity + 4 * row, WIDTH * splats * 4)
-      FETCH_TO_WRITE(covariance + 8 * row, WIDTH * splats * 8)
-    }
-    if (WIDTH > 1 && block + 1 < end) {
-      // Of the next block; this one's came while the one before was worked on.
-      FETCH(woken + units, units)
-      FETCH(mine + features * WIDTH, features * WIDTH)
-    }
+    // Numbers of the next block (this one's came while the one before was worked on) and rows that
+    // are written at the end of this one, a few at a time: a processor that waits for more of them
+    // than it can count stands still.
+    const int ahead = WIDTH > 1 && block + 1 < end, whole = WIDTH > 1 && n == WIDTH && shapes;
+    const int half_rows = WIDTH * splats * 4;  // floats: half of the covariances
+    if (whole) FETCH_TO_WRITE(covariance + 8 * row, half_rows)
     // Units that are awake, head after head: those of head m are ends[m] to ends[m + 1].
     int live[4 * MAX_HIDDEN + ROWS], ends[5];
     floatn unit[4 * MAX_HIDDEN + ROWS];
@@ -78,8 +75,11 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
     }
     // Features are read once for the four heads.
     first_layer(ends[4], live, features, 0, weights, bias, mine, 0, unit);
+    if (whole) FETCH_TO_WRITE(covariance + 8 * row + half_rows, half_rows)
     second_layer(heads[3], ends[3], ends[4], live, unit, weights, opacity);
+    if (ahead) FETCH(woken + units, units)
     if (!shapes) {  // the rest does not follow x, and is there
+      if (ahead) FETCH(mine + features * WIDTH, features * WIDTH)
       for (int j = 0; j < splats; j++) {
         float lanes[WIDTH];
         STOREN(opacity[j], lanes);
@@ -90,7 +90,9 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
     }
     // Offset in metres, scale in metres and one sigma, rotation w x y z of any length.
     second_layer(heads[0], ends[0], ends[1], live, unit, weights, offset);
+    if (whole) FETCH_TO_WRITE(mean_opacity + 4 * row, WIDTH * splats * 4)
     second_layer(heads[1], ends[1], ends[2], live, unit, weights, scale);
+    if (ahead) FETCH(mine + features * WIDTH, features * WIDTH)
     second_layer(heads[2], ends[2], ends[3], live, unit, weights, rotation);
     __global const float* at = places + (size_t)block * 3 * WIDTH;
     const Triple place = {LOADN(at), LOADN(at + WIDTH), LOADN(at + 2 * WIDTH)};
@@ -144,8 +146,8 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
   }
 }
 
-// The fifth -> colours towards an eye; looks: 3 where they follow it, 4 where anchors have light by
-// direction, too, else 0; of the blocks that are wanted, 0: all.
+// The fifth -> colours towards an eye; looks: 3 where they follow it, 4 or 6 where anchors have
+// light by direction of one channel or three, too, else 0; of the blocks that are wanted, 0: all.
 __kernel void decode_colors(int anchors, int start, int run, int splats, int features, int units,
                             int looks, float eye_x, float eye_y, float eye_z,
                             __global const Head* heads, __global const float* weights,
@@ -156,6 +158,7 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
   const Head head = heads[COLOR_HEAD];
   // Its first row as if units were counted from its own.
   const int first_at = head.first_at - head.unit_at * (features + looks);
+  const int channels = looks ? looks - DIRECTION : 0;  // of light
   const int from = get_global_id(0) * run, end = min((anchors + WIDTH - 1) / WIDTH, from + run);
   for (int block = from; block < end; block++) {
     if (wanted && !wanted[block]) continue;  // nobody sees any anchor of it
@@ -163,7 +166,7 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
     __global const float* woken = bounds + (size_t)block * units;
     __global const float* mine = feature + (size_t)block * features * WIDTH;
     __global const float* place = places + (size_t)block * 3 * WIDTH;
-    __global const float* own = light + (looks > 3 ? (size_t)block * LIGHTS * WIDTH : 0);
+    __global const float* own = light + (size_t)block * channels * LIGHTS * WIDTH;
     __global float* rows = color + 4 * (start + (size_t)block * WIDTH * splats);
     if (WIDTH > 1 && n == WIDTH) FETCH_TO_WRITE(rows, WIDTH * splats * 4)
     if (WIDTH > 1 && block + 1 < end) {
@@ -171,10 +174,10 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
       FETCH(woken + units + head.unit_at, head.hidden)
       FETCH(mine + features * WIDTH, features * WIDTH)
       FETCH(place + 3 * WIDTH, 3 * WIDTH)
-      if (looks > 3) FETCH(own + LIGHTS * WIDTH, LIGHTS * WIDTH)
+      if (channels) FETCH(own + channels * LIGHTS * WIDTH, channels * LIGHTS * WIDTH)
     }
     int live[MAX_HIDDEN + ROWS];
-    floatn look[4], unit[MAX_HIDDEN + ROWS], out[3 * MAX_SPLATS + TILE];
+    floatn look[DIRECTION + 3], unit[MAX_HIDDEN + ROWS], out[3 * MAX_SPLATS + TILE];
     if (looks) {
       // delta of paper eq. 4, from the eye to the anchor, of length 1.
       look[0] = LOADN(place) - eye_x;
@@ -183,7 +186,7 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
       const floatn length = sqrt(look[0] * look[0] + look[1] * look[1] + look[2] * look[2]);
       const intn known = (length > 0.0f) & (length < INFINITY);  // else no direction: 0
       UNROLL for (int i = 0; i < 3; i++) look[i] = select(TO_FLOATN 0, look[i] / length, known);
-      if (looks > 3) look[3] = light_along(own, look);
+      light_along(own, channels, look);
     }
     // bound_units knows the features alone: `least` allows for any direction.
     const int awake = wake(head.unit_at, head.unit_at + head.hidden, woken, least, 0, live);

@@ -1,6 +1,6 @@
 // layers: the two layers of a head and its activation, for a block of WIDTH anchors at a time.
-// Reads:   WIDTH, TILE, ROWS, UNITS.
-// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL, LIGHTS; Head, wake, first_layer,
+// Reads:   WIDTH, TILE, ROWS, UNITS, LIGHTS (numbers of a channel of light by direction).
+// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL; Head, wake, first_layer,
 //          light_along, second_layer, exp2n.
 // Units:   none; a head's gain gives metres or display values.
 // A comparison of floatn gives intn: 0 or 1 of a scalar, 0 or -1 a lane; select() takes both.
@@ -21,10 +21,10 @@ typedef int16 intn;
 #define AS_FLOATN as_float16
 #define AS_INTN as_int16
 #define TO_FLOATN (float16)
-#define ALL(lanes) all(lanes)
+#define ALL(lanes) all_lanes(lanes)
 #endif
 #define UNROLL _Pragma("unroll")
-#define LIGHTS 8  // numbers of an anchor's light by direction
+#define DIRECTION 3  // inputs
 #define LOG2E 1.44269504f  // log2(e): e^z = 2^(z log2(e))
 #define MOST 126.0f  // the largest exponent of 2
 // Activations, numbered as decode_heads.py has them.
@@ -46,10 +46,18 @@ typedef struct {
   float gain;       // after it
 } Head;
 
-// Unlike clamp(), NaN stays NaN.
+// Whether a comparison holds in all lanes; all() asks one after the other, with a branch for each.
+inline int all_lanes(int16 a) {
+  const int8 b = a.lo & a.hi;
+  const int4 c = b.lo & b.hi;
+  const int2 d = c.lo & c.hi;
+  return d.x & d.y;
+}
+
+// Unlike clamp(), NaN stays NaN: an instruction each, which gives its second operand then.
 inline floatn within(floatn z, float low, float high) {
-  z = select(z, TO_FLOATN low, z < low);
-  return select(z, TO_FLOATN high, z > high);
+  z = TO_FLOATN low > z ? TO_FLOATN low : z;
+  return TO_FLOATN high < z ? TO_FLOATN high : z;
 }
 
 // 2^t, relative error 2e-7; beyond +-most, at most 126, it stays at what it is there.
@@ -114,15 +122,30 @@ inline int wake(int first, int end, __global const float* bounds, __global const
                 int from, int* live) {
   long n = from;  // int would be widened for each
   for (int u = first; u < end; u += UNITS) {
-    int awake[UNITS];  // 1 or 0
-    vstore16(-(vload16(0, bounds + u) > vload16(0, least + u)), 0, awake);
+    const int16 awake = vload16(0, bounds + u) > vload16(0, least + u);
+    if (all_lanes(awake)) {  // where weights are random, hardly ever anything else
+      UNROLL for (int k = 0; k < UNITS; k++) live[n + k] = u + k;
+      n += UNITS;
+      continue;
+    }
+    int one[UNITS];  // 1 or 0
+    vstore16(-awake, 0, one);
     UNROLL for (int k = 0; k < UNITS; k++) {
       live[n] = u + k;  // without a branch: nobody could guess it
-      n += awake[k];
+      n += one[k];
     }
   }
   return n;
 }
+
+// Inputs `from` to `end` of what looks at the eye; numbers known to the compiler stay in registers.
+#define LOOK(from, end)                                              \
+  {                                                                  \
+    UNROLL for (int i = from; i < (end); i++) {                      \
+      UNROLL for (int u = 0; u < ROWS; u++)                          \
+        sum[u] = fma(look[i], TO_FLOATN w[u][features + i], sum[u]); \
+    }                                                                \
+  }
 
 // The hidden units `live` of one block: ROWS of them share each load of a feature.
 inline void first_layer(int n, int* live, int features, int looks, __global const float* weights,
@@ -143,29 +166,55 @@ inline void first_layer(int n, int* live, int features, int looks, __global cons
       const floatn f = LOADN(feature + i * WIDTH);
       UNROLL for (int u = 0; u < ROWS; u++) sum[u] = fma(f, TO_FLOATN w[u][i], sum[u]);
     }
-    // Only the colour looks at the direction: none, three, or four with light along it.
-    for (int i = 0; i < looks; i++) {
-      UNROLL for (int u = 0; u < ROWS; u++)
-        sum[u] = fma(look[i], TO_FLOATN w[u][features + i], sum[u]);
-    }
+    // Only the colour looks at the direction: none, three, or four or six with light along it.
+    if (looks) LOOK(0, DIRECTION)
+    if (looks > DIRECTION) LOOK(DIRECTION, DIRECTION + 1)
+    if (looks > DIRECTION + 1) LOOK(DIRECTION + 1, DIRECTION + 3)
     // Not fmax: NaN has to stay NaN.
     UNROLL for (int u = 0; u < ROWS; u++)
       unit[t + u] = select(sum[u], TO_FLOATN 0.0f, sum[u] < 0.0f);
   }
 }
 
-// What the block's light by direction (LIGHTS, WIDTH) gives along unit directions, or along none:
-// spherical harmonics of degree 1 and 2 in units of those of degree 1, light_harmonics.py.
-inline floatn light_along(__global const float* light, const floatn* d) {
+inline floatn channel_along(__global const float* light, const floatn* value) {
+  floatn sum = 0;
+  UNROLL for (int i = 0; i < LIGHTS; i++) sum = fma(LOADN(light + i * WIDTH), value[i], sum);
+  return sum;
+}
+
+// What the block's light by direction (channels, LIGHTS, WIDTH) gives along unit directions d, or
+// along none, written behind them: spherical harmonics of degree 1 and 2 in units of those of
+// degree 1, light_harmonics.py.
+inline void light_along(__global const float* light, int channels, floatn* d) {
   const floatn xx = d[0] * d[0], yy = d[1] * d[1], zz = d[2] * d[2];
   const floatn value[LIGHTS] = {d[0], d[1], d[2],
                                 2.2360680f * d[0] * d[1], 2.2360680f * d[1] * d[2],
                                 2.2360680f * d[2] * d[0], 0.6454972f * (2 * zz - xx - yy),
                                 1.1180340f * (xx - yy)};
-  floatn sum = 0;
-  UNROLL for (int i = 0; i < LIGHTS; i++) sum = fma(LOADN(light + i * WIDTH), value[i], sum);
-  return sum;
+  if (channels) d[DIRECTION] = channel_along(light, value);
+  if (channels > 1) {
+    d[DIRECTION + 1] = channel_along(light + LIGHTS * WIDTH, value);
+    d[DIRECTION + 2] = channel_along(light + 2 * LIGHTS * WIDTH, value);
+  }
 }
+
+// Outputs of `count` tiles from tile c on, all their sums at once: a unit is loaded for fifteen
+// products, not five, and no sum waits for the one before.
+#define SUM_TILES(count)                                                            \
+  {                                                                                 \
+    floatn sum[(count) * TILE];                                                     \
+    UNROLL for (int o = 0; o < (count) * TILE; o++) sum[o] = biases[c * TILE + o];  \
+    for (int t = first; t < end; t++) {                                             \
+      __global const float* w = last + (c * head.hidden + live[t]) * TILE;          \
+      const floatn h = unit[t];                                                     \
+      UNROLL for (int i = 0; i < (count); i++) {                                    \
+        UNROLL for (int o = 0; o < TILE; o++)                                       \
+          sum[i * TILE + o] = fma(h, TO_FLOATN w[i * step + o], sum[i * TILE + o]); \
+      }                                                                             \
+    }                                                                               \
+    UNROLL for (int o = 0; o < (count) * TILE; o++) out[c * TILE + o] = sum[o];     \
+    c += (count);                                                                   \
+  }
 
 // Outputs of a head out of its units first to end of those that are awake.  A call, not four copies
 // of a head's worth of code: 0.15 s less to compile, and no slower.
@@ -176,15 +225,13 @@ __attribute__((noinline)) void second_layer(Head head, int first, int end, const
   __global const float* biases = weights + head.last_at;
   // TILE weights a tile and unit, side by side; units count from the first of all heads.
   __global const float* last = biases + (head.tiles - head.unit_at) * TILE;
-  for (int c = 0; c < head.tiles; c++) {
-    floatn sum[TILE];
-    UNROLL for (int o = 0; o < TILE; o++) sum[o] = biases[c * TILE + o];
-    for (int t = first; t < end; t++) {
-      __global const float* w = last + (c * head.hidden + live[t]) * TILE;
-      const floatn h = unit[t];
-      UNROLL for (int o = 0; o < TILE; o++) sum[o] = fma(h, TO_FLOATN w[o], sum[o]);
-    }
-    activate(head, sum);
-    UNROLL for (int o = 0; o < TILE; o++) out[c * TILE + o] = sum[o];
+  const long step = (long)head.hidden * TILE;  // from a tile's weights to the next one's
+  for (int c = 0; c < head.tiles;) {
+    const int rest = head.tiles - c;
+    // Four are two and two: a tile alone waits for its own sums.
+    if (rest == 3 || rest > 4) SUM_TILES(3)
+    else if (rest > 1) SUM_TILES(2)
+    else SUM_TILES(1)
   }
+  for (int c = 0; c < head.tiles; c++) activate(head, out + c * TILE);
 }

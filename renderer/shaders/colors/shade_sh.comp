@@ -1,31 +1,34 @@
 // shade_sh: spherical harmonics of degree 0 to 3 -> colour towards the eye.  One invocation a
 // splat. colour = max(0, 0.5 + sum of basis(direction) * coefficient), the basis and its signs of
 // 3DGS.
-// Reads:   sh (coefficients * 3, count), mean_opacity, eye.
+// Reads:   sh (coefficients * 3, count), mean_opacity, eye; pages, where PAGED, and which of them.
 // Writes:  color.
 // Units:   metres in the object; display sRGB, from 0 on.
 #include "common/direction.glsl"
 #include "common/finite.glsl"
+#ifndef PAGED
+#define PAGED 0  // 1: of pages; sh is (stored pages, coefficients * 3, PAGE)
+#endif
+#if PAGED
+#include "common/pages.glsl"
+#endif
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };
 layout(std430, binding = SLOT_SH) readonly buffer Sh { float sh[]; };  // (coefficients * 3, count)
 layout(std430, binding = SLOT_COLOR) writeonly buffer Color { vec4 color[]; };
 uniform uint count;
-uniform uint start;         // arena row of the first
+uniform uint start;         // arena row of the first; where pages begin
 uniform uint coefficients;  // 1, 4, 9 or 16
 uniform vec3 eye;           // metres in the object
 
-#ifndef PAGE
-#define PAGE 0  // above 0: sh is (pages, coefficients * 3, PAGE), from page first_page on
-#endif
-#if PAGE
-uniform uint first_page;
+#if PAGED
+layout(std430, binding = SLOT_LISTED) readonly buffer Listed { uint listed[]; };  // pages
 #endif
 
 vec3 coefficient(uint i, uint k) {
-#if PAGE
-    uint at = ((first_page + i / PAGE) * 3u * coefficients + 3u * k) * PAGE + i % PAGE;
+#if PAGED
+    uint at = (i / PAGE * 3u * coefficients + 3u * k) * PAGE + i % PAGE;
     return vec3(sh[at], sh[at + PAGE], sh[at + 2u * PAGE]);
 #else
     // A stream a coefficient and channel: neighbouring invocations read neighbouring floats.
@@ -37,9 +40,16 @@ vec3 coefficient(uint i, uint k) {
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (!(i < count)) return;
+    uint into = start + i, row = into;
+#if PAGED
+    uint drawn = listed[i / PAGE] * PAGE + i % PAGE;
+    into = start + drawn;
+    row = page_of(drawn).row;
+    i = row - start;  // among the splats that are stored
+#endif
     // Degree 0 is the same from everywhere; 3DGS stores colours less a half.
     vec3 rgb = 0.5 + 0.28209479177387814 * coefficient(i, 0u);
-    vec3 d = direction_from(eye, mean_opacity[start + i].xyz);
+    vec3 d = direction_from(eye, mean_opacity[row].xyz);
     float x = d.x, y = d.y, z = d.z, xx = x * x, yy = y * y, zz = z * z;
     // Degree 1, in 3DGS's order: -y, z, -x.
     if (coefficients > 1u) {
@@ -64,5 +74,5 @@ void main() {
         rgb -= 0.5900435899266435 * x * (xx - 3.0 * yy) * coefficient(i, 15u);
     }
     // max(NaN, 0) is 0, and project must see a colour that is not a number.
-    color[start + i] = vec4(finite(rgb) ? max(rgb, vec3(0.0)) : rgb, 0.0);
+    color[into] = vec4(finite(rgb) ? max(rgb, vec3(0.0)) : rgb, 0.0);
 }

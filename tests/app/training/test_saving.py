@@ -173,6 +173,8 @@ def test_few_photos_and_missing_masks_are_spoken_of(balls):
     photos = load_photos(balls, "train", 1, "object")
     kept, doubts = validate_views(photos, "object")
     assert kept == photos and len(doubts) == 2 and "RGB has 6 training photos only" in doubts[0]
+    single = [next(photo for photo in photos if photo.modality == "RGB")]
+    assert "RGB has 1 training photo only" in validate_views(single, "object")[1][0]
     many = [replace(p, modality="RGB", masked=True) for p in photos * 3]
     assert validate_views(many, "object") == (many, []) and len(many) > FEW
     some = [replace(p, masked=i % 4 > 0) for i, p in enumerate(many)]

@@ -31,6 +31,17 @@ def folder(tmp_path_factory):
     return write_levels(shell(3000, 1), tmp_path_factory.mktemp("levels") / "shell")
 
 
+@pytest.fixture(params=["tiles", "quads"])
+def opened(request):
+    """Opens a renderer: both drawings share pages, each in its own way."""
+    if request.param == "tiles":
+        yield lambda: Renderer(None, "tiles")
+        return
+    with request.getfixturevalue("session_gpu").ctx as ctx:
+        yield lambda: Renderer(ctx, "quads")
+        assert ctx.error == "GL_NO_ERROR"
+
+
 UPRIGHT = np.array([1.0, 0, 0, 0])
 
 
@@ -60,10 +71,10 @@ def pages_in_use(renderer: Renderer) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("coefficients", [1, 9])
-def test_pictures_are_those_of_separate_objects_to_the_bit(tmp_path, coefficients):
+def test_pictures_are_those_of_separate_objects_to_the_bit(opened, tmp_path, coefficients):
     folder = write_levels(shell(2000, coefficients), tmp_path / "shell")
     shared, apart = map(standing, both(folder))
-    with Renderer(None, "tiles") as one, Renderer(None, "tiles") as other:
+    with opened() as one, opened() as other:
         one.update(shared)
         other.update(apart)
         for view in VIEWS[::3]:
@@ -80,10 +91,10 @@ def test_pictures_are_those_of_separate_objects_to_the_bit(tmp_path, coefficient
 
 
 @pytest.mark.parametrize("edit", EDITS)
-def test_a_copy_that_is_changed_changes_alone_also_in_motion(folder, edit):
+def test_a_copy_that_is_changed_changes_alone_also_in_motion(opened, folder, edit):
     """It gets pages of its own when it is changed, others go on sharing, and back."""
     shared, apart = both(folder)
-    with Renderer(None, "tiles") as one, Renderer(None, "tiles") as other:
+    with opened() as one, opened() as other:
         one.streaming.converges = other.streaming.converges = True
         for n, view in enumerate(VIEWS):
             first = EDITS[edit] if 4 <= n < 8 else {}
@@ -95,9 +106,9 @@ def test_a_copy_that_is_changed_changes_alone_also_in_motion(folder, edit):
             assert stored < drawn
 
 
-def test_frames_in_motion_share_too(folder):
+def test_frames_in_motion_share_too(opened, folder):
     shared = standing(both(folder)[0])
-    with Renderer(None, "tiles") as one:
+    with opened() as one:
         one.streaming.converges = False
         one.update(shared)
         for view in VIEWS:
@@ -115,9 +126,9 @@ def test_frames_in_motion_share_too(folder):
             assert 0 < len(counts) <= most
 
 
-def test_a_hundred_copies_lie_in_the_pages_of_one(folder):
+def test_a_hundred_copies_lie_in_the_pages_of_one(opened, folder):
     model = open_levels(folder, 20_000)
-    with Renderer(None, "tiles") as renderer:
+    with opened() as renderer:
         renderer.update(standing(scene_of(*[model] * 100)))
         stats = renderer.draw([view_at((0, 2, 8))])
         drawn, stored = pages_in_use(renderer)
@@ -128,7 +139,7 @@ def test_a_hundred_copies_lie_in_the_pages_of_one(folder):
 
 
 @pytest.mark.parametrize("converges", [True, False])
-def test_a_small_budget_shows_something_of_every_copy(folder, converges):
+def test_a_small_budget_shows_something_of_every_copy(opened, folder, converges):
     """Where their coarsest levels are seven times the budget: parents stand for them."""
     model, places = open_levels(folder, 6000), np.mgrid[-4:5, -3:4].reshape(2, -1).T
     assert 63 * int(np.bincount(model.leaves.coarse_leaf).sum()) > 7 * 6000
@@ -136,7 +147,7 @@ def test_a_small_budget_shows_something_of_every_copy(folder, converges):
         SceneObject(f"object {i}", model, Pose(np.array([3.0 * x, 3.0 * y, 0]), UPRIGHT))
         for i, (x, y) in enumerate(places)
     ]
-    with Renderer(None, "tiles") as renderer:
+    with opened() as renderer:
         renderer.streaming.converges = converges
         renderer.update(Scene(tuple(objects)))
         for step in range(4):
@@ -153,7 +164,7 @@ def test_a_small_budget_shows_something_of_every_copy(folder, converges):
             assert alpha.min() > 0.5
 
 
-def test_objects_in_full_and_other_models_stand_beside(folder, tmp_path):
+def test_objects_in_full_and_other_models_stand_beside(opened, folder, tmp_path):
     """Rows of objects without levels come first and stay where they are."""
     other = write_levels(shell(900, 4), tmp_path / "other")
     scenes = []
@@ -165,7 +176,7 @@ def test_objects_in_full_and_other_models_stand_beside(folder, tmp_path):
         scenes.append(standing(scene_of(*models)))
     pictures, points = [], []
     for scene in scenes:
-        with Renderer(None, "tiles") as renderer:
+        with opened() as renderer:
             renderer.update(scene)
             renderer.draw([VIEWS[0]])
             pictures.append(renderer.image(0))
@@ -177,10 +188,10 @@ def test_objects_in_full_and_other_models_stand_beside(folder, tmp_path):
     np.testing.assert_array_equal(*points)
 
 
-def test_the_debug_picture_of_objects_tells_copies_apart(folder):
+def test_the_debug_picture_of_objects_tells_copies_apart(opened, folder):
     """Pages lie anywhere: each copy has its own colour, and the legend its own number."""
     scene = standing(both(folder)[0])
-    with Renderer(None, "tiles") as renderer:
+    with opened() as renderer:
         renderer.settings = RenderSettings(debug="object")
         renderer.update(scene)
         for view in (view_at((0, 1, 9)), view_at((4, 1, 8)), view_at((0, 1, 9))):

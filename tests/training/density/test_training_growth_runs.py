@@ -1,6 +1,8 @@
 """Runs that grow in each of the ways, on a small capture: caps, bits, resuming."""
 
+import argparse
 import csv
+import importlib.util
 import subprocess
 import sys
 from dataclasses import replace
@@ -9,14 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.baselines.plain import one_modality
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.first_anchors import first_anchors
 from shapeshift.training.first_anchors.first_anchors import base_colors
 from shapeshift.training.losses.min_opacity import SHARE
 from shapeshift.training.schedule import LIGHT_FROM
-from shapeshift.training.settings import TrainSettings
+from shapeshift.training.settings import ONE_MODALITY, TrainSettings
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import SETTLE, Trainer
@@ -127,6 +131,23 @@ def test_light_rests_until_its_share_of_the_run_and_where_exposures_differ(
     assert moved == [False] * begun + [alike] * (20 - begun)
 
 
+def test_a_checkpoint_with_one_channel_of_light_goes_on_with_one(device, balls, monkeypatch):
+    """As this program wrote them before it had three."""
+    monkeypatch.setattr(Exposures, "alike", lambda self, modality: True)
+    settings = replace(BASE, **WAYS["with light"], iterations=20, grow=False)
+    state, notes = run(Trainer(device, balls, replace(settings, iterations=12))).checkpoint()
+    assert state["light.value"].shape[1] == 24
+    old = state | {name: state[name][:, :8] for name in state if name.startswith("light.")}
+    trainer = run(Trainer(device, balls, settings, resume=(old, notes)))
+    model = trainer.model()
+    assert trainer.layout.light_channels == 1 and model.light.shape[1] == 8
+    assert (model.light != old["light.value"]).any(), "it still learns"
+    eye, stop = np.array([0.3, 1.0, 2.5]), balls.stops[0]
+    drawn = trainer.step.decode(trainer.control(stop.name), eye)
+    shown = evaluate(model, stop.x, eye).color
+    np.testing.assert_allclose(device.download(drawn.color), shown, rtol=0, atol=2e-5)
+
+
 def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
     root, out = Path(__file__).resolve().parents[3], tmp_path / "light.csv"
     program = [sys.executable, "tools/colors/light.py", str(balls.folder), "--out", str(out)]
@@ -136,8 +157,8 @@ def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
     rows = list(csv.DictReader(out.read_text().splitlines()[2:]))
     assert [row["modality"] for row in rows] == 2 * ["RGB", "Thermal", "mean"]
     size = [int(row["package_bytes"]) for row in rows]
-    # Eight halves an anchor, less what deflating saves and with the name of an array.
-    assert 300 * 8 < size[3] - size[0] < 300 * 16 + 600
+    # 24 halves an anchor, less what deflating saves and with the name of an array.
+    assert 300 * 24 < size[3] - size[0] < 300 * 48 + 600
     assert all(float(row["psnr_db"]) > 10 for row in rows)
 
 
@@ -157,3 +178,36 @@ def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path):
     for row in rows:
         assert float(row["psnr_db"]) > 10 and int(row["package_bytes"]) > 10_000
         assert 0 < int(row["splats"]) <= 5 * int(row["anchors"])
+
+
+@pytest.fixture(scope="module")
+def ways():
+    """The program tools/training/ways.py."""
+    path = Path(__file__).resolve().parents[3] / "tools" / "training" / "ways.py"
+    spec = importlib.util.spec_from_file_location("ways", path)
+    sys.modules["ways"] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules["ways"]
+
+
+@pytest.mark.parametrize("modality", ["RGB", ""])
+def test_a_way_changes_what_train_would_take_for_the_capture(ways, balls, modality, monkeypatch):
+    capture = one_modality(balls, modality) if modality else balls
+    monkeypatch.setattr(ways, "read_capture", lambda folder: capture)
+
+    def settings_of(way, **given) -> TrainSettings:
+        options = argparse.Namespace(downscale=1, **({"max_anchors": None} | given))
+        (found,) = ways.rows_of_turn({}, balls.folder, options, BASE, way, lambda turn: [turn])
+        return found.settings
+
+    usual = ONE_MODALITY if modality else {"max_by_shape": True}
+    assert settings_of({}) == replace(BASE, **usual)
+    assert settings_of({"grow": False}) == replace(BASE, grow=False, **usual)
+    assert settings_of({}, max_anchors=900) == settings_of({}, max_mb=0.5) == BASE
+    lacks = {"frame": "color,light", "color": "frame,light", "light": "frame,color"}
+    if not modality:
+        lacks = {"frame": "stop_color", "color": "frame", "light": "frame,stop_color"}
+    for attribute, left in lacks.items():
+        changed = settings_of(ways.without(attribute))
+        assert changed == replace(BASE, **usual | {"anchor_attributes": left})

@@ -122,6 +122,65 @@ def test_parts_survive_what_is_written_over_splats(quads, folder, part):
     np.testing.assert_array_equal(picture_of(quads), whole)
 
 
-def picture_of(renderer) -> np.ndarray:
-    renderer.drawing.draw([view_at()], renderer.settings, PassTimer(None))
+def picture_of(renderer, view=None) -> np.ndarray:
+    renderer.drawing.draw([view or view_at()], renderer.settings, PassTimer(None))
     return renderer.image(0).copy()
+
+
+def test_surfaces_are_those_of_tiles(quads, folder):
+    """Of pages and of rows: metres and normals where something is seen."""
+    model, place = open_levels(folder, 6000), Pose(np.array([2.5, 0, 0]), np.array([1.0, 0, 0, 0]))
+    first, fixed, second = scene_of(model, random_layers(100), model).objects
+    second = replace(second, world_from_object=place)
+    scene = replace(scene_of(model), objects=(first, fixed, second))
+    with Renderer(None, "tiles") as tiles:
+        surfaces = []
+        for renderer in (quads, tiles):
+            drawn(renderer, scene, view_at())
+            surfaces.append(renderer.surface(view_at()))
+        mine, expected = surfaces
+        seen = (expected.coverage > 0.5) & (mine.coverage > 0.5)
+        assert seen.mean() > 0.2
+        np.testing.assert_allclose(mine.coverage, expected.coverage, atol=0.02)
+        off = np.abs(mine.metres - expected.metres)[seen] / expected.metres[seen]
+        assert np.median(off) < 1e-4 and np.percentile(off, 99) < 1e-2
+        assert np.percentile(np.abs(mine.normal - expected.normal)[seen], 99) < 0.02
+
+
+def test_an_antialiased_model_stands_beside_a_plain_one(quads, folder):
+    """Of two models in pages one is: tiles as the oracle, and neither kind for both."""
+    plain, faint = open_levels(folder, ALL), open_levels(folder, ALL)
+    faint = replace(faint, antialiased=True)
+    far, pictures = view_at((0.0, 1.0, 40.0), size=(96, 64)), []
+    place = Pose(np.array([6.0, 0, 0]), np.array([1.0, 0, 0, 0]))
+    for models in ((plain, faint), (plain, plain), (faint, faint)):
+        one, two = scene_of(*models).objects
+        scene = replace(scene_of(plain), objects=(one, replace(two, world_from_object=place)))
+        pictures.append(drawn(quads, scene, far)[0])
+        with Renderer(None, "tiles") as tiles:
+            assert psnr(pictures[-1], drawn(tiles, scene, far)[0]) > 45
+    for other in pictures[1:]:
+        assert np.abs(pictures[0] - other).max() > 0.02
+
+
+def test_pages_that_are_edited_grow_beyond_those_of_one_model(quads, folder):
+    """Copies that are all changed have splats of their own; their pictures, and what is read."""
+    model, objects = open_levels(folder, ALL), []
+    far = view_at((6.0, 0.5, 24.0), (6.0, 0.0, 0.0))
+    for i, obj in enumerate(scene_of(*[model] * 6).objects):
+        place = Pose(np.array([2.5 * i, 0, 0]), np.array([1.0, 0, 0, 0]))
+        objects.append(replace(obj, world_from_object=place))
+    whole, _ = drawn(quads, replace(scene_of(model), objects=tuple(objects)), far)
+    before = len(quads.drawing.paged.uses)
+    rows = quads.drawing.read_splats(0)
+    for i in range(6):
+        mean_opacity, covariance = (array.copy() for array in quads.drawing.read_splats(i))
+        np.testing.assert_array_equal(mean_opacity, rows[0])
+        mean_opacity[:, 3] *= 0.5 if i else 1.0
+        quads.drawing.write_splats(i, mean_opacity, covariance if i % 2 else None)
+    assert (quads.drawing.paged.uses <= 1).all() and len(quads.drawing.paged.uses) > before
+    for was, now in zip(rows, quads.drawing.read_splats(0), strict=True):
+        np.testing.assert_array_equal(was, now)
+    np.testing.assert_array_equal(quads.drawing.read_splats(4)[1], rows[1])
+    changed = np.abs(picture_of(quads, far) - whole).max(axis=(0, 2))
+    assert changed[: len(changed) // 3].max() == 0 and changed.max() > 0.1

@@ -1,0 +1,85 @@
+"""Arguments of the library that cannot be: each is refused in one sentence, and nothing is made."""
+
+import numpy as np
+import pytest
+
+import shapeshift as ss
+
+
+@pytest.fixture(scope="module")
+def demo():
+    return ss.load(ss.DEMO)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda demo, wrong: ss.load(wrong),
+        lambda demo, wrong: demo.export(wrong),
+        lambda demo, wrong: demo.save(wrong),
+        lambda demo, wrong: demo.compare(wrong),
+        lambda demo, wrong: demo.film(wrong),
+        lambda demo, wrong: ss.train(wrong),
+        lambda demo, wrong: ss.evaluate(demo, wrong),
+        lambda demo, wrong: ss.cameras(wrong),
+        lambda demo, wrong: ss.poses(wrong, "capture"),
+    ],
+)
+@pytest.mark.parametrize("wrong", [None, 3, b"scene.shift", ["a.ply", "b.ply"]])
+def test_what_is_no_path_is_refused(demo, call, wrong, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ss.UsageError, match="is no path; a text or a pathlib"):
+        call(demo, wrong)
+    assert not list(tmp_path.iterdir())  # export(None) wrote a file "None"
+
+
+@pytest.mark.parametrize(
+    "size",
+    [
+        (0, 0),
+        (0, 24),
+        (-3, 4),
+        (32.5, 24),
+        (65537, 24),
+        (32,),
+        (32, 24, 3),
+        64,
+        "640x480",
+        {32, 24},
+    ],
+)
+def test_what_is_no_size_is_refused(demo, size):
+    for draw in (demo.render, demo.views, lambda size: demo.frames(count=2, size=size)):
+        with pytest.raises(ss.UsageError, match=r"^size is .*whole pixels, 1 to 65536, is wanted"):
+            draw(size=size)
+
+
+def test_ends_of_sizes_and_other_containers_are_taken(demo):
+    assert demo.render(size=(1, 1)).shape == (1, 1, 3)
+    assert demo.views(size=(65536, 1))[0].size == (65536, 1)
+    assert demo.render(size=np.array([32, 24])).shape == demo.render(size=[32, 24]).shape
+
+
+def test_a_camera_that_is_no_sequence_is_refused(demo):
+    for wrong in (3, 1.5, None):
+        with pytest.raises(ss.UsageError, match="a camera is 'orbit'"):
+            demo.views(wrong)
+
+
+@pytest.mark.parametrize(
+    ("eye", "target", "up"),
+    [
+        ((0, 0, 0), (0, 0, 0), (0, 1, 0)),
+        ((0, 2, 0), (0, 0, 0), (0, 1, 0)),  # straight down, up the way it looks
+        ((0, 0, 1), (0, 0, 0), (0, 0, 0)),
+        ((float("nan"), 0, 1), (0, 0, 0), (0, 1, 0)),
+    ],
+)
+def test_an_eye_without_a_direction_is_refused(eye, target, up):
+    with pytest.raises(ValueError, match="has no direction"):
+        ss.look_at(eye, target, up)
+
+
+def test_an_eye_beside_straight_down_looks_there():
+    pose = ss.look_at((0, 2, 1e-6), (0, 0, 0))  # -Z of the eye, by its matrix
+    np.testing.assert_allclose(-pose.matrix()[:3, 2], (0, -1, 0), atol=1e-6)
