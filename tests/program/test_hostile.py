@@ -158,7 +158,7 @@ ON_THE_COMMAND_LINE = (
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in folders")
 @pytest.mark.parametrize("name", ON_THE_COMMAND_LINE)
 def test_the_command_line_says_one_line_and_ends_with_2(tmp_path, capsys, name):
-    """`info` as a process; `lint`, which reads in the same way, by the call that each starts with."""
+    """`info` as a process; `lint`, which reads in the same way, by what a process would call."""
     path = CASES[name](tmp_path)
     before = listing(tmp_path)
     end = launch("info", path)
