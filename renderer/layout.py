@@ -50,7 +50,7 @@ SLOTS = {
     "LAYER_WEIGHTS": 5,  # float          how much of each layer there is
     "OWN_OPACITY": 6,  # float (n,)     before the weight
     "CONTROL": 6,  # vec4 (A, d / 4)  Psi of a control an anchor
-    "LIGHT": 7,  # vec4 (A, 2)    light by direction: harmonics of degree 1 and 2
+    "LIGHT": 7,  # vec4 (A, 2 C)  light by direction: harmonics of degree 1 and 2
     "PALETTE": 3,  # vec4 (256,)    display sRGB
     "TINT": 4,  # float (A,)     weight of a thermal stop
     "HEAT": 0,  # vec4 (N,)      value times weight 0 0 weight: what is thermal of a splat

@@ -72,7 +72,7 @@ def looked_along(
     model: AnchorModel, direction: np.ndarray, rows: np.ndarray | slice = slice(None)
 ) -> dict[str, np.ndarray]:
     """What a colour network takes of directions (n, 3): themselves, and where anchors have light,
-    what that of these rows of anchors gives along them (n, 1).
+    what that of these rows of anchors gives along them (n, 1 or 3).
     """
     if model.light is None:
         return {"direction": direction}

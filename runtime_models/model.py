@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import WIDTH as LIGHT_WIDTH
+from shapeshift.runtime_models.colors.light_harmonics import WIDTHS, channels_of
 from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.shapes import check
@@ -125,8 +125,8 @@ class AnchorModel:
     frames: AnchorFrames | None = None  # None: the object's axes and size 1 for all
     labels: np.ndarray | None = None  # (A,) uint8 object of each anchor; 0 = background
     objects: tuple[ObjectLabel, ...] = ()  # of every label above 0 that there is; maybe more
-    light: np.ndarray | None = None  # (A, 8) by direction, as light_harmonics.py says: what it
-    #                                  gives is the colour network's input "light"
+    light: np.ndarray | None = None  # (A, 8 C) by direction, as light_harmonics.py says: what it
+    #                                  gives, C numbers, is the colour network's input "light"
     coarser: tuple[CoarserAnchors, ...] = ()  # levels of detail, for ever smaller pictures ...
     coarser_of: tuple = ()  # ... of a model with these numbers: changed ones have none
 
@@ -186,8 +186,11 @@ class AnchorModel:
     @property
     def input_widths(self) -> dict[str, int]:
         """How many numbers each part has that its networks may take."""
-        features = self.features.shape[1]
-        return {"feature": features, "direction": 3, "light": 1, "control": self.encoding.d}
+        return {
+            "feature": self.features.shape[1], "direction": 3,
+            "light": 1 if self.light is None else channels_of(self.light),
+            "control": self.encoding.d,
+        }  # fmt: skip
 
     @cached_property
     def blend(self) -> StopBlend:
@@ -219,7 +222,10 @@ def check_light(model: AnchorModel) -> None:
     """ValueError where anchors have light that no colour network takes, or the other way round."""
     takes = [part for part in ("direction", "light") if part in model.networks["color"].inputs]
     if model.light is not None:
-        check(anchors=(model.anchors, "A 3"), light=(model.light, f"A {LIGHT_WIDTH}"))
+        check(anchors=(model.anchors, "A 3"), light=(model.light, "A L"))
+        if (width := model.light.shape[1]) not in WIDTHS.values():
+            wanted = " or ".join(map(str, WIDTHS.values()))
+            raise ValueError(f"anchors have {width} numbers of light each, expected {wanted}")
     if ("light" in takes) != (model.light is not None) or takes == ["light"]:
         has = "no light" if model.light is None else "light"
         raise ValueError(

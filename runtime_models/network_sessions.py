@@ -27,7 +27,7 @@ class WholeNetwork:
         """Nothing is kept."""
 
     def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:
-        """(n, k * size) of features (n, F), directions (n, 3), light (n, 1) and Psi, (1, d) or
+        """(n, k * size) of features (n, F), directions (n, 3), light (n, 1 or 3) and Psi, (1, d) or
         (n, d).
 
         base: None, as feature_part gives it.

@@ -70,7 +70,7 @@ def model_of(
         if len(own_colors) > 1 and name == "color":
             mlp = with_gates(mlp, layout.features, gate_rows(encoding, stops), gate_bound(colors))
         if own_light and name == "color":
-            mlp = with_light(mlp, features.shape[1])
+            mlp = with_light(mlp, features.shape[1], layout.light_channels)
         networks[name] = mlp
     frames = None
     if "frame" in layout.attributes:
@@ -141,16 +141,16 @@ def with_gates(mlp: Mlp, at: int, weights: np.ndarray, bound: float) -> Mlp:
     )
 
 
-def with_light(mlp: Mlp, features: int) -> Mlp:
+def with_light(mlp: Mlp, features: int, channels: int) -> Mlp:
     """The colour network with an input "light" behind the direction, which follows the features:
-    the last layer adds it to every number of every splat.
+    the last layer adds it to every number of every splat, or each of three to its own.
     """
-    at = features + 3
-    first = np.insert(mlp.weights[0], at, 0, axis=1)
+    at, size = features + 3, SIZE_PER_SPLAT["color"]
+    first = np.insert(mlp.weights[0], [at] * channels, 0, axis=1)
     inputs = list(mlp.inputs)
     inputs.insert(inputs.index("direction") + 1, "light")
     wide = replace(mlp, weights=(first, *mlp.weights[1:]), inputs=tuple(inputs))
-    return with_carried(wide, at, np.ones((SIZE_PER_SPLAT["color"], 1)))
+    return with_carried(wide, at, np.eye(size) if channels > 1 else np.ones((size, 1)))
 
 
 def with_carried(mlp: Mlp, at: int, adds: np.ndarray) -> Mlp:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from shapeshift.rasterizer.project import LOW_BITS, RECORD
-from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, CHUNKS, HeadLayout, padded
+from shapeshift.training.heads.networks import CHUNKS, HeadLayout, padded
 
 FLOAT = 4  # bytes; every array of a step has entries of 4
 SPLAT = 14  # floats: mean 3, scale 3, quaternion 4, opacity, colour 3
@@ -32,7 +32,7 @@ def step_memory(layout: HeadLayout, form: str = "cpu") -> StepMemory:
     features, k = padded(layout.features), layout.splats
     units = 5 * padded(layout.hidden) * (2 if form == "gpu" else 1)
     own = sum(layout.own_widths.values())
-    seen = sum(ATTRIBUTE_WIDTH[name] for name in layout.own)  # base colours of one stop
+    seen = sum(layout.widths[name] for name in layout.own)  # base colours of one stop
     by_anchor = 3 * (3 + features + own)  # values with their two moments
     by_anchor += 2 * (3 + features + seen)  # their gradients, and those that a view shows
     by_anchor += units + 2 * layout.raw_at[-1]  # raw outputs and gradients

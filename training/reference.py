@@ -50,14 +50,14 @@ def activate_reference(
 ) -> tuple:  # fmt: skip
     """(means, scales, wxyz, opacity, color) of raw outputs (A, out) by head.
 
-    frames (A, 7), base colours (A, 3) and light (A, 8), by directions (A, 3) from the eye, where
+    frames (A, 7), base colours (A, 3) and light (A, 8 C), by directions (A, 3) from the eye, where
     anchors have such: see gaussians.cl.
     """
     count, k = raw["opacity"].shape
     frames = np.tile([0.0, 0, 0, 1, 0, 0, 0], (count, 1)) if frames is None else frames
     colors = np.zeros((count, 3)) if colors is None else colors
     if light is not None and direction is not None:
-        colors = colors + light_of(light, direction)[:, None]
+        colors = colors + light_of(light, direction)
     frames, base = np.repeat(frames, k, axis=0), np.repeat(colors, k, axis=0)
     size, turn = np.exp(frames[:, :3]), normalize(frames[:, 3:])
     offset = size * REACH * voxel * np.tanh(raw["offset"].reshape(-1, 3))
@@ -71,9 +71,9 @@ def activate_reference(
 
 
 def light_of(light: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(A,) logits that coefficients (A, 8) add along directions (A, 3), by the table of 3DGS."""
+    """(A, C) logits that coefficients (A, 8 C) add along directions (A, 3), by 3DGS's table."""
     there = basis(direction, 9)[:, [3, 1, 2, 4, 5, 7, 6, 8]] * [-1, -1, 1, 1, -1, -1, 1, 1] / C1
-    return (light * there).sum(axis=1)
+    return (light.reshape(len(light), -1, 8) * there[:, None]).sum(axis=2)
 
 
 def decode_reference(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.drawing import Color, DrawnView
 from shapeshift.training.evaluation.metrics import psnr
@@ -20,6 +21,7 @@ from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.schedule import Budget, Schedule
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.exposure import Exposures
+from shapeshift.training.supervision.still_background import StillBackground, leave_out_still
 from shapeshift.training.supervision.targets import Targets
 
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
@@ -60,10 +62,12 @@ class Run(ABC):
     primitive: str  # what Progress counts ...
     param_group: str  # ... and the group of the optimiser that has a row for each
     device: Device
+    capture: Capture
     settings: TrainSettings | PlainSettings
     budget: Budget
     adam: Adam
     photos: TrainingPhotos
+    still: StillBackground  # what was left out of them
     targets: Targets
     exposures: Exposures
     drawing: DrawnView  # the last one
@@ -111,6 +115,12 @@ class Run(ABC):
         began = clock() - self.photos.seconds(processor)
         yield
         self.set_start(self.start_s + clock() - self.photos.seconds(processor) - began)
+
+    def leave_out_still(self, background: str) -> None:
+        """Cuts out of the photos what stands still behind their subject, where that is known."""
+        with self.counted_start():
+            found = leave_out_still(self.photos, background, self.capture.background)
+        self.photos, self.still = found
 
     def set_start(self, seconds: float) -> None:
         """What the start took; of a run that goes on, what it took then."""

@@ -39,7 +39,6 @@ from shapeshift.training.supervision.backgrounds import (
     background_warning,
     choose_background,
     has_one_exposure,
-    still_warnings,
 )
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
@@ -83,15 +82,15 @@ class Trainer(Run):
             self.photos = TrainingPhotos(loaded["train"], loaded["test"])
         else:
             self.photos = loaded
+        self.leave_out_still(settings.background)
         self.held_out = self.photos.test
         photos, self.warnings = validate_views(self.photos.train, settings.masks)
-        self.warnings += self.photos.warnings()
+        self.warnings += self.photos.warnings() + self.still.warnings()
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         if empty := [name for name, found in by_modality.items() if not found]:
             raise BadFile(f"{capture.folder}: modality '{empty[0]}' has no training photos.")
         with self.counted_start():
             background = choose_background(settings.background, capture.background, photos)
-            self.warnings += [] if background else still_warnings(photos)
         if settings.background == "auto" and background and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
             self.warnings.append(background_warning(background))
@@ -170,6 +169,7 @@ class Trainer(Run):
         self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
         self.run_length, self.anchor_cap = notes["run_length"], notes["anchor_cap"]
         self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
+        self.layout = self.layout.as_in(state)
         values = {n: state[f"{n}.value"] for n in ("weights", *self.layout.per_anchor)}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
@@ -389,6 +389,7 @@ class Trainer(Run):
             "first_anchors": self.origin,
             "downscale": self.factor,
             "background": self.schedule.background,
+            "still_background": bool(self.still.pictures),
             "rate_scale": self.rate_scale,
         }
         state = self.adam.state()

@@ -121,7 +121,8 @@ def print_table(result: dict) -> None:
 
     vgg = ["VGG distance"] if "vgg_file" in result else []
     depth = any("depth_error" in score for score in result["modalities"].values())
-    more = [*vgg, *(["depth error %"] if depth else [])]
+    still = any("whole_db" in score for score in result["modalities"].values())
+    more = [*(["whole photo"] if still else []), *vgg, *(["depth error %"] if depth else [])]
     table = Table(
         "modality", "PSNR dB", "median", "fitted", "SSIM", *more, "photos", "splats alive"
     )
@@ -131,6 +132,8 @@ def print_table(result: dict) -> None:
         worst[photo] = f"{photo} {db:.1f} dB"
         row = [f"{score[key]:.2f}" for key in ("psnr_db", "median_db", "fitted_db")]
         row.append(f"{score['ssim']:.4f}")
+        if still:
+            row.append(f"{score['whole_db']:.2f}" if "whole_db" in score else "")
         row += [f"{score['vgg_distance']:.4f}"] if vgg else []
         if depth:
             row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")

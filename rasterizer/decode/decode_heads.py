@@ -23,6 +23,7 @@ MOST_HIDDEN = 128  # units of a head: they lie in private memory
 MOST_SPLATS = 16  # an anchor, likewise
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")  # their numbers in the kernel
 DIRECTION = 3  # inputs
+LIGHTS = 8  # coefficients of a channel of light by direction
 NO_CLIP = (-float("inf"), float("inf"))
 TABLE = np.dtype(
     [(name, np.int32) for name in ("hidden", "unit_at", "first_at", "last_at", "tiles", "act")]
@@ -35,14 +36,15 @@ class HeadWeights:
     """One hidden layer with ReLU, then gain * activation(clip(z)); Psi(x) is none of its inputs."""
 
     feature: np.ndarray  # (hidden, F) columns of the first layer
-    look: np.ndarray | None  # (hidden, 3) those that meet the direction from the eye, (hidden, 4)
-    #                          with the light along it as a fourth
+    look: np.ndarray | None  # (hidden, 3) those that meet the direction from the eye, (hidden, 4
+    #                          or 6) with the light along it, of one channel or three, behind it
     last: np.ndarray  # (out, hidden)
     last_bias: np.ndarray  # (out,)
     activation: str = "none"  # one of ACTIVATIONS
     clip: tuple[float, float] = NO_CLIP
     gain: float = 1.0
-    brightest: float = 0.0  # the most that any anchor's light is along any direction
+    brightest: np.ndarray | None = None  # (channels,) the most that any anchor's light is along
+    #                                      any direction
 
     @property
     def units(self) -> int:
@@ -63,7 +65,7 @@ class AnchorHeads:
     ) -> None:  # fmt: skip
         """anchors (A, 3) metres, features (A, F); splats: k; frames (A, 7): of every anchor's own
         axes factors and unit wxyz.  width: anchors at a time, 16 or 1; by default the device's.
-        light (A, 8): by direction, where the last head looks at it.
+        light (A, 8 a channel): by direction, where the last head looks at it.
         """
         self._device, self._count, self._splats = device, len(anchors), splats
         self._width = width or WIDTH[device.kind]
@@ -76,10 +78,12 @@ class AnchorHeads:
         )
         self._reach = np.concatenate([_reach(head) for head in heads])
         self._looks = 0 if heads[-1].look is None else heads[-1].look.shape[1]
-        if (self._looks == DIRECTION + 1) != (light is not None):
+        channels = 0 if light is None else light.shape[1] // LIGHTS
+        if max(self._looks - DIRECTION, 0) != channels:
             raise ValueError("light by direction and the colour head's columns for it go together.")
         self._kernels = device.program(
             KERNEL, WIDTH=self._width, TILE=TILE, ROWS=ROWS[device.kind], UNITS=UNITS,
+            LIGHTS=LIGHTS,
             MAX_HIDDEN=MOST_HIDDEN, MAX_SPLATS=MOST_SPLATS,
         )  # fmt: skip
         table, weights = _flat(heads)
@@ -162,8 +166,10 @@ def _reach(head: HeadWeights) -> np.ndarray:
     """(units,) how much a direction of length 1, and light along it, can add to a head's units."""
     if head.look is None:
         return np.zeros(head.units, np.float32)
-    light = np.abs(head.look[:, DIRECTION:]).sum(axis=1) * head.brightest
-    return np.linalg.norm(head.look[:, :DIRECTION], axis=1) + light
+    length = np.linalg.norm(head.look[:, :DIRECTION], axis=1)
+    if head.brightest is None:
+        return length
+    return length + np.abs(head.look[:, DIRECTION:]) @ head.brightest
 
 
 def _flat(heads: list[HeadWeights]) -> tuple[np.ndarray, np.ndarray]:

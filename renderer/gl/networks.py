@@ -51,11 +51,13 @@ class PackedMlp:
         return 16 * self.layers
 
 
-def pack_mlp(mlp: Mlp, features: int, d: int, own_control: bool = False) -> PackedMlp:
-    """Pads and orders one network; its inputs become features, then direction and light; Psi is cut
-    out, or comes third with `own_control`.
+def pack_mlp(
+    mlp: Mlp, features: int, d: int, own_control: bool = False, channels: int = 1
+) -> PackedMlp:
+    """Pads and orders one network; its inputs become features, then direction and light of so many
+    channels; Psi is cut out, or comes third with `own_control`.
     """
-    width_of = {"feature": features, "direction": DIRECTION, "light": 1, "control": d}
+    width_of = {"feature": features, "direction": DIRECTION, "light": channels, "control": d}
     at = np.cumsum([0, *(width_of[part] for part in mlp.inputs)])
     columns = {part: slice(at[i], at[i + 1]) for i, part in enumerate(mlp.inputs)}
     first = np.asarray(mlp.weights[0], np.float64)  # (hidden, inputs)
@@ -64,13 +66,14 @@ def pack_mlp(mlp: Mlp, features: int, d: int, own_control: bool = False) -> Pack
             f"the first layer takes {first.shape[1]} inputs, but {' + '.join(mlp.inputs)} "
             f"are {at[-1]}; write the network or the inputs anew."
         )
-    seen = np.zeros((len(first), 4 * (vecs(features) + 1)))  # features, then direction, light
+    look = 4 * vecs(features)  # features, then direction, light
+    seen = np.zeros((len(first), look + 4 * vecs(DIRECTION + channels)))
     if "feature" in columns:
         seen[:, :features] = first[:, columns["feature"]]
     if "direction" in columns:
-        seen[:, -4:-1] = first[:, columns["direction"]]
+        seen[:, look : look + DIRECTION] = first[:, columns["direction"]]
     if "light" in columns:
-        seen[:, -1:] = first[:, columns["light"]]
+        seen[:, look + DIRECTION :][:, :channels] = first[:, columns["light"]]
     control = first[:, columns["control"]] if "control" in columns else np.zeros((len(first), d))
 
     if own_control:
@@ -133,7 +136,8 @@ class GlNetworks:
                 f"the {name} network gives {mlp.width_out} numbers an anchor, but "
                 f"{model.splats_per_anchor} splats take {wanted}; write one of the two anew."
             )
-        packed = pack_mlp(mlp, model.features.shape[1], model.encoding.d, own_control)
+        channels = model.input_widths["light"] if name == "color" else 1
+        packed = pack_mlp(mlp, model.features.shape[1], model.encoding.d, own_control, channels)
         block = min(gpu.max_uniforms, 65536)
         stored = packed.rows.nbytes > block
         if stored:
@@ -200,12 +204,14 @@ class GlNetworks:
             bind(weights=head.weights)
         else:
             head.weights.bind_to_uniform_block(layout.WEIGHTS_BLOCK)
+        lit = self._light is not None and head.name == "color"
         low, high = head.mlp.clip or (-math.inf, math.inf)
         self._gpu.run(
             head.program, groups_for(count, layout.DECODE_WORKGROUP),
             first=first, count=count, base=base, stride=stride, size=SIZE_PER_SPLAT[head.name],
             splats_per_anchor=self._model.splats_per_anchor, layers=head.packed.layers,
-            feature_vecs=vecs(self._model.features.shape[1]), has_light=self._light is not None,
+            feature_vecs=vecs(self._model.features.shape[1]),
+            light_channels=self._model.input_widths["light"] if lit else 0,
             activation=ACTIVATIONS.index(head.mlp.head), low=low, high=high, gain=head.mlp.gain,
         )  # fmt: skip
 

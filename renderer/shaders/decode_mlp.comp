@@ -35,7 +35,7 @@ uniform uint count;              // anchors in this run
 uniform uint feature_vecs;       // vec4 an anchor
 uniform uint layers;
 uniform vec3 eye;                // metres in the object; only the colour network looks at it
-uniform bool has_light;          // whether anchors have light by direction
+uniform uint light_channels;     // of the anchors' light by direction: 0, 1 or 3
 uniform uint splats_per_anchor;
 uniform uint size;               // numbers a splat
 uniform uint base, stride;       // splat j of the run goes to outputs[base + stride * j ...]
@@ -59,14 +59,20 @@ void main() {
     for (uint v = 0u; v < feature_vecs; v++)
         values[v] = features[(first + anchor) * feature_vecs + v];
     vec4 seen = vec4(direction_from(eye, anchors[first + anchor].xyz), 0.0);
-    if (has_light) {
-        uint at = 2u * (first + anchor);
+    uint seen_end = feature_vecs + 1u;
+    if (light_channels > 0u) {
+        uint at = 2u * light_channels * (first + anchor);
         seen.w = light_along(light[at], light[at + 1u], seen.xyz);
+        // Red stands beside the direction, green and blue in a vector of their own.
+        if (light_channels > 1u)
+            values[seen_end++] = vec4(light_along(light[at + 2u], light[at + 3u], seen.xyz),
+                                      light_along(light[at + 4u], light[at + 5u], seen.xyz),
+                                      0.0, 0.0);
     }
     values[feature_vecs] = seen;
 #if OWN_CONTROL
     for (uint v = 0u; v < control_vecs; v++)
-        values[feature_vecs + 1u + v] = control[(first + anchor) * control_vecs + v];
+        values[seen_end + v] = control[(first + anchor) * control_vecs + v];
 #endif
 
     // Two halves of one array: what a layer takes and what it gives change places.

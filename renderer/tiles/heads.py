@@ -133,12 +133,12 @@ class _Folded:
         self.bias = mlp.biases[0].astype(np.float64)
         control = columns["control"] if "control" in mlp.inputs else nothing[:, :d]
         self.control = control.astype(np.float64)
-        # (units, 3), or 4 with light behind the direction, or none of both.
+        # (units, 3), or 4 or 6 with light behind the direction, or none of both.
         look = np.concatenate([columns["direction"], columns["light"]], axis=1)
         light = model.light if "light" in mlp.inputs else None
         self.head = HeadWeights(
             columns["feature"] if "feature" in mlp.inputs else nothing[:, :features],
             look if "direction" in mlp.inputs else None,
             last, mlp.biases[1], mlp.head, mlp.clip or NO_CLIP, mlp.gain,
-            0.0 if light is None else float(most_light(light).max()),
+            None if light is None else most_light(light).max(axis=0),
         )  # fmt: skip

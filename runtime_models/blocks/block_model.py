@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import most_light
+from shapeshift.runtime_models.colors.light_harmonics import channels_of, most_light
 from shapeshift.runtime_models.eyes import EYES, eyes_of, spread_eyes
 from shapeshift.runtime_models.model import HEADS, AnchorFrames, AnchorModel, BadFile, Finding, Mlp
 
@@ -133,7 +133,9 @@ def refuse_unlike(one: AnchorModel, other: AnchorModel, names: str) -> None:
         "ways between stops": (one.between_stops, other.between_stops),
         "control encodings": (one.encoding, other.encoding),
         "frames of anchors": (one.frames is None, other.frames is None),
-        "light by direction": (one.light is None, other.light is None),
+        "light by direction": tuple(
+            0 if light is None else channels_of(light) for light in (one.light, other.light)
+        ),
     }
     for head in HEADS:
         a, b = one.networks[head], other.networks[head]
@@ -209,11 +211,11 @@ def merged(model: BlockModel, head: str) -> Mlp:
 
 def largest_sum(model: BlockModel, mlp: Mlp) -> float:
     """More than a unit of the first layer ever sums up, whatever the anchor, the eye and x."""
-    light = 0.0 if model.light is None else float(most_light(model.light).max(initial=0))
+    light = np.zeros(1) if model.light is None else most_light(model.light).max(axis=0, initial=0)
     most = {
         "feature": np.abs(model.features).max(axis=0, initial=0),
         "direction": np.ones(3),
-        "light": np.array([light]),
+        "light": light,
         "control": np.ones(model.encoding.d),
     }
     each = np.concatenate([most[part] for part in mlp.inputs])

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.light_harmonics import channels_of
 from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.files.memory import Account, unlimited
 from shapeshift.runtime_models.files.npy import write_arrays
@@ -149,8 +150,9 @@ def read_level(
 ) -> CoarserAnchors:
     """The anchors of one level of a model, as its own table has them.  Raises BadFile."""
     memory = memory or unlimited()
-    width, lit = model.features.shape[1], model.light is not None
-    anchors, features, frames, light = read_anchors(data, width, where, True, memory, lit)
+    width = model.features.shape[1]
+    channels = 0 if model.light is None else channels_of(model.light)
+    anchors, features, frames, light = read_anchors(data, width, where, True, memory, channels)
     labelled = model.objects if model.labels is not None else None
     labels = read_labels(data, labelled, len(anchors), where, memory)
     shown_splats = len(anchors) * model.splats_per_anchor

@@ -108,7 +108,7 @@ def without_silent_units(mlp: Mlp, model: AnchorModel) -> Mlp:
             most, size = most + sums.max(axis=0), size + np.abs(sums).max(axis=0)
     length = np.linalg.norm(first[:, part_of == "direction"], axis=1)
     if "light" in mlp.inputs and model.light is not None:
-        length += np.abs(first[:, part_of == "light"][:, 0]) * most_light(model.light).max()
+        length += np.abs(first[:, part_of == "light"]) @ most_light(model.light).max(axis=0)
     keep = most + length > -SLACK * (size + length)
     if not keep.any():
         keep[0] = True

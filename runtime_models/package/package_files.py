@@ -4,6 +4,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+from shapeshift.runtime_models.colors.light_harmonics import channels_of
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import is_zip, opened_zip, read_member
 from shapeshift.runtime_models.model import AnchorModel, BadFile
@@ -11,7 +12,9 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile
 FORMAT = "shapeshift 1"
 FRAMES_FORMAT = "shapeshift 2"  # the same, and anchors.npz holds the anchors' own frames
 LIGHT_FORMAT = "shapeshift 3"  # and it holds their light by direction; frames or not
-FORMATS = (FORMAT, FRAMES_FORMAT, LIGHT_FORMAT)
+COLOR_LIGHT_FORMAT = "shapeshift 4"  # the same, of red, green and blue each
+FORMATS = (FORMAT, FRAMES_FORMAT, LIGHT_FORMAT, COLOR_LIGHT_FORMAT)
+LIT = {LIGHT_FORMAT: 1, COLOR_LIGHT_FORMAT: 3}  # channels of the anchors' light; of others none
 MANIFEST = "scene.json"
 ANCHORS = "anchors.npz"
 LIGHT = "light"  # the array in it of the anchors' light, and the colour network's input
@@ -25,7 +28,7 @@ LARGEST_NETWORK = 256 << 20  # bytes; five of 64 MB would draw one frame a minut
 def format_name(model: AnchorModel) -> str:
     """What the manifest of its package names."""
     if model.light is not None:
-        return LIGHT_FORMAT
+        return LIGHT_FORMAT if channels_of(model.light) == LIT[LIGHT_FORMAT] else COLOR_LIGHT_FORMAT
     return FORMAT if model.frames is None else FRAMES_FORMAT
 
 

@@ -19,7 +19,7 @@ from shapeshift.runtime_models.package.package_files import (
     FORMATS,
     FRAMES_FORMAT,
     LIGHT,
-    LIGHT_FORMAT,
+    LIT,
 )
 from shapeshift.runtime_models.stop_dates import check_dates
 from shapeshift.runtime_models.stop_weights import Pace
@@ -54,7 +54,7 @@ class Manifest:
     between_stops: str = "blend"
     has_frames: bool | None = False  # whether anchors.npz holds anchors' frames; None: maybe
     objects: tuple[ObjectLabel, ...] | None = None  # None: anchors.npz holds no labels
-    has_light: bool = False  # whether it holds their light by direction
+    light_channels: int = 0  # of their light by direction; 0: it holds none
 
 
 def read_manifest(data: bytes, where: str) -> Manifest:
@@ -73,19 +73,18 @@ def read_manifest(data: bytes, where: str) -> Manifest:
     check_view(provenance)
     check_eyes(provenance)
     heads, stops = top.object("heads"), read_stops(top)
-    lit = found == LIGHT_FORMAT
     return Manifest(
         top.count("splats_per_anchor", 1, LARGEST_COUNT),
         top.count("feature_width", 1, LARGEST_COUNT),
         read_encoding(top.object("encoding")),
         stops,
-        {name: read_head(name, heads.object(name), lit) for name in HEADS},
+        {name: read_head(name, heads.object(name), found) for name in HEADS},
         dict(provenance.data),
         read_pace(top, {stop.name for stop in stops}),
         top.line("between_stops", "blend", known=BETWEEN_STOPS),
-        None if lit else found == FRAMES_FORMAT,
+        None if found in LIT else found == FRAMES_FORMAT,
         read_objects(top),
-        lit,
+        LIT.get(found, 0),
     )
 
 
@@ -102,20 +101,20 @@ def read_encoding(entry: Fields) -> ControlEncoding:
     return encoding
 
 
-def read_head(name: str, entry: Fields, lit: bool) -> Head:
+def read_head(name: str, entry: Fields, version: str) -> Head:
     file, inputs = entry.text("file"), entry.value("inputs")
     if "/" in file or "\\" in file or not file.endswith(".onnx"):
         raise entry.error("file", "the name of a .onnx in the package")
     known = PARTS if name == "color" else ("feature", "control")  # only colour sees the eye
-    parts = tuple(part for part in known if lit or part != LIGHT)
+    parts = tuple(part for part in known if version in LIT or part != LIGHT)
     if not (
         isinstance(inputs, list)
         and inputs
         and all(inputs.count(part) == 1 and part in parts for part in inputs)
     ):
         raise entry.error("inputs", f"a list of some of {', '.join(parts)}, each once,")
-    if lit and name == "color" and not {"direction", LIGHT} <= set(inputs):
-        raise entry.error("inputs", f"a list with 'direction' and '{LIGHT}' in '{LIGHT_FORMAT}'")
+    if version in LIT and name == "color" and not {"direction", LIGHT} <= set(inputs):
+        raise entry.error("inputs", f"a list with 'direction' and '{LIGHT}' in '{version}'")
     return Head(file, tuple(inputs), entry.line("activation", known=ACTIVATIONS))
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import WIDTH as LIGHT_WIDTH
+from shapeshift.runtime_models.colors.light_harmonics import WIDTHS as LIGHT_WIDTHS
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, unlimited
 from shapeshift.runtime_models.files.npy import read_array
 from shapeshift.runtime_models.files.zip_files import opened_zip
@@ -60,7 +60,7 @@ def read_files(
     where = f"{package}/{ANCHORS}"
     data = read(ANCHORS)
     anchors, features, frames, light = read_anchors(
-        data, manifest.feature_width, where, manifest.has_frames, memory, manifest.has_light
+        data, manifest.feature_width, where, manifest.has_frames, memory, manifest.light_channels
     )
     labels = read_labels(data, manifest.objects, len(anchors), where, memory)
     memory.release(len(data))
@@ -83,10 +83,10 @@ def read_anchors(
     where: str,
     with_frames: bool | None = False,
     memory: Account | None = None,
-    with_light: bool = False,
+    light_channels: int = 0,
 ) -> tuple[np.ndarray, np.ndarray, AnchorFrames | None, np.ndarray | None]:
-    """positions (A, 3) metres and features (A, F), both float32; frames and light (A, 8) where
-    asked for.
+    """positions (A, 3) metres and features (A, F), both float32; frames and light (A, 8 C) of so
+    many channels where asked for.
 
     with_frames: None where there may be frames or not; with one of their arrays both must be there.
     """
@@ -95,11 +95,12 @@ def read_anchors(
         with opened_zip(data, where, memory) as archive:
             names = {f"{name}.npy" for name in FRAME_TYPES}
             with_frames = not names.isdisjoint(archive.namelist())
-    types = TYPES | (FRAME_TYPES if with_frames else {}) | ({LIGHT: STORED} if with_light else {})
+    types = TYPES | (FRAME_TYPES if with_frames else {})
+    types |= {LIGHT: STORED} if light_channels else {}
     arrays = read_arrays(data, where, types, memory)
     columns = {
         "positions": 3, "features": width, "frame_log_scales": 3, "frame_rotations": 4,
-        LIGHT: LIGHT_WIDTH,
+        LIGHT: LIGHT_WIDTHS.get(light_channels, 0),
     }  # fmt: skip
     for name in types:
         refuse_array(arrays[name], name, columns[name], types[name], where, memory)
@@ -182,7 +183,7 @@ def read_network(name: str, manifest: Manifest, data: bytes, memory: Account) ->
     mlp = read_onnx(data, head.file, head.inputs, memory)
     memory.release(len(data))
     widths = {"feature": manifest.feature_width, "control": manifest.encoding.d, "direction": 3,
-              LIGHT: 1}  # fmt: skip
+              LIGHT: manifest.light_channels}  # fmt: skip
     takes, gives = sum(widths[part] for part in head.inputs), k * SIZE_PER_SPLAT[name]
     if (mlp.width_in, mlp.width_out) != (takes, gives):
         raise BadFile(

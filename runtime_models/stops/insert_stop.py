@@ -169,7 +169,7 @@ def widened(
         "feature": feature,
         "control": -np.outer(gate, shut),
         "direction": np.zeros((count, 3)),
-        "light": np.zeros((count, 1)),
+        "light": np.zeros((count, model.input_widths["light"])),
     }
     first = np.vstack([mlp.weights[0], np.hstack([blocks[part] for part in mlp.inputs])])
     weights, biases = [first], [np.concatenate([mlp.biases[0], units.bias])]

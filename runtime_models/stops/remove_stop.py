@@ -58,7 +58,7 @@ def without_shut_units(model: AnchorModel, head: str) -> Mlp:
     if "direction" in parts:
         most = most + np.linalg.norm(parts["direction"], axis=1)
     if "light" in parts and model.light is not None:
-        most = most + np.abs(parts["light"][:, 0]) * most_light(model.light).max()
+        most = most + np.abs(parts["light"]) @ most_light(model.light).max(axis=0)
     if "control" in parts:
         psi = np.stack([model.encoding.encode(stop.x) for stop in model.stops])
         most = most + (psi.astype(np.float64) @ parts["control"].T).max(axis=0)

@@ -157,7 +157,7 @@ def network(out: Container, mlp: Mlp, name: str, model: AnchorModel) -> dict:
     looks, control = "direction" in mlp.inputs, None
     columns = [padded(as_features(first, part_of, widths["feature"]))]
     if looks:
-        seen = [first[:, part_of == part] for part in ("direction", "light")]  # 3 and 0 or 1
+        seen = [first[:, part_of == part] for part in ("direction", "light")]  # 3, and 0, 1 or 3
         columns.append(padded(np.concatenate(seen, axis=1)))
     if "control" in mlp.inputs:
         control = out.add(padded(first[:, part_of == "control"].T).T)

@@ -24,7 +24,7 @@ from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.read_scene import describe, files_of, read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
-from tests.support.models import make_random_model
+from tests.support.models import make_random_model, with_light
 
 INF = math.inf
 LEFT = BlockBox((-INF, -INF, -INF), (0.1, INF, INF))
@@ -219,6 +219,24 @@ def test_blocks_of_two_trainings_are_refused(folder):
     write_package(other, folder / "1.shift")
     with pytest.raises(BadFile, match=re.escape("other splats an anchor")):
         read_model(folder)
+
+
+@pytest.mark.parametrize("channels", [(0, 3), (1, 0), (1, 3)])
+def test_blocks_of_other_light_are_refused(channels):
+    each = [with_light(m, channels=c) if c else m
+            for m, c in zip(halves().values(), channels, strict=True)]  # fmt: skip
+    with pytest.raises(BadFile, match="a and b have other light by direction"):
+        joined(each, ["a", "b"])
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_blocks_with_light_are_one_package_with_it(channels):
+    each = [with_light(model, channels=channels) for model in halves().values()]
+    whole = joined(each, ["a", "b"])
+    eye = np.array([0.3, 1.0, 2.5])
+    want = np.concatenate([Evaluator(model).color(0.4, eye) for model in each])
+    for found in (whole, one_network(whole)):
+        np.testing.assert_allclose(Evaluator(found).color(0.4, eye), want, atol=1e-5)
 
 
 def test_anchors_beside_their_box_are_kept_and_told(folder):

@@ -128,16 +128,17 @@ def random_package(folder: Path, anchors: int, **kind) -> Path:
     return path
 
 
-def with_light(model: AnchorModel, seed: int = 0) -> AnchorModel:
+def with_light(model: AnchorModel, seed: int = 0, channels: int = 3) -> AnchorModel:
     """The model with random light by direction, which its colour network takes as it takes all."""
     rng, color = np.random.default_rng([seed, 8]), model.networks["color"]
     widths = [model.input_widths[part] for part in color.inputs]
     at = sum(widths[: color.inputs.index("direction") + 1])
-    weight = np.insert(color.weights[0], at, rng.normal(size=len(color.weights[0])), axis=1)
+    columns = rng.normal(size=(channels, len(color.weights[0]))).T
+    weight = np.insert(color.weights[0], [at] * channels, columns, axis=1)
     inputs = list(color.inputs)
     inputs.insert(inputs.index("direction") + 1, "light")
     lit = replace(color, weights=(weight, *color.weights[1:]), inputs=tuple(inputs))
-    light = rng.normal(0, 0.5, (len(model.anchors), 8)).astype(np.float32)
+    light = rng.normal(0, 0.5, (len(model.anchors), 8 * channels)).astype(np.float32)
     return replace(model, networks=model.networks | {"color": lit}, light=light)
 
 

@@ -58,8 +58,17 @@ def test_every_control_of_a_package_is_drawn_right(browser, tmp_path):
         pytest.param(without_direction(paced_model(50, framed=False)), marks=pytest.mark.slow),
         replace(paced_model(50), between_stops="encoding", pace=()),
         with_light(paced_model(60)),
+        with_light(paced_model(60), channels=1),
     ],
-    ids=["linear", "deep", "only opacity moves", "no direction", "encoded x", "light"],
+    ids=[
+        "linear",
+        "deep",
+        "only opacity moves",
+        "no direction",
+        "encoded x",
+        "light",
+        "grey light",
+    ],
 )
 def test_networks_of_any_shape_are_drawn_right(browser, tmp_path, model):
     document = Document.of(model)

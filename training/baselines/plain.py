@@ -90,6 +90,7 @@ class PlainTrainer(Run):
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
         self.photos = open_photos(capture, self.factor, settings.masks, room)
+        self.leave_out_still(settings.background)
         photos, self.held_out = self.photos.train, self.photos.test
         with self.counted_start():
             background = choose_background(settings.background, capture.background, photos)
@@ -101,7 +102,7 @@ class PlainTrainer(Run):
         self.exposures = Exposures(device, self.schedule.photos, has_one_exposure(photos))
         self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, 1.0
-        self.warnings = self.photos.warnings()
+        self.warnings = self.photos.warnings() + self.still.warnings()
         if resume is None:
             with self.counted_start():
                 values = self.first_values(photos, report)

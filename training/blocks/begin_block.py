@@ -25,9 +25,9 @@ def begin_block(
     color, factor = start.provenance.get("background"), start.provenance.get("downscale")
     settings = replace(settings, downscale=factor)
     if settings.background == "auto":  # a part of the photos could look otherwise than all do
-        if color is None:
+        if color is None and not start.provenance.get("still_background"):
             settings = replace(settings, background="random")
-        else:
+        elif color is not None:
             capture = replace(capture, background=tuple(color))
     given = with_extrinsics(capture, settings.rig)
     device = with_small_pool(device)

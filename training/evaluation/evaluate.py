@@ -16,16 +16,30 @@ from shapeshift.rasterizer.surface import rasterize_depth, surface
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import BadFile, Model, Stop
 from shapeshift.scene.cameras.camera_list import moved
-from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.pose import View
 from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.evaluation.metrics import psnr, ssim
-from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, read
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, is_masked, read
 from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.supervision.exposure import fitted_psnr
+from shapeshift.training.supervision.still_background import (
+    PICTURE_PHOTOS,
+    StillBackground,
+    chosen,
+    key_of,
+    still_background,
+    still_share,
+)
+from shapeshift.training.supervision.still_picture import StillPicture
 
 MOST_LOOKED_AT, LOOKED_AT_PX = 12, 64  # held-out photos, for the colour behind them
-SOME_HAVE = ("vgg", "depth_error", "fitted_db")  # fields of ModalityScore that not every photo has
+SOME_HAVE = (
+    "vgg",
+    "depth_error",
+    "fitted_db",
+    "whole_db",
+)  # fields of ModalityScore that not every photo has
 
 
 @dataclass(frozen=True)
@@ -37,6 +51,7 @@ class ModalityScore:
     each: dict[str, float]  # PSNR of every photo, dB, by its path in the capture
     vgg: float | None = None  # training.vgg_distance; None: not measured
     depth_error: float | None = None  # of photos with depth: ModelRenderer.depth_error
+    whole_db: float | None = None  # PSNR of whole photos, before what stands still behind, if any
     fitted_db: float | None = None  # of right halves, colours fitted on left ones: fitted_psnr
 
     @property
@@ -151,6 +166,9 @@ def evaluate_model(
             smaller = math.ceil(max(photo.view.size) / LOOKED_AT_PX)
             shown.append(read(photo, max(factor, smaller), masks))
     behind = choose_background(background, known, shown) or BLACK
+    still = StillBackground()
+    if background == "auto" and known is None and behind == BLACK:
+        still = still_of(capture, factor, masks, model.provenance.get("still_background"))
     apart = np.subtract(capture.origin, getattr(model, "origin", BLACK))  # metres
     renderer, scores = ModelRenderer(device, model), {}
     for stop in capture.stops:
@@ -160,13 +178,46 @@ def evaluate_model(
             loaded = read(photo, factor, masks)  # one at a time is in memory
             loaded = replace(loaded, view=moved([loaded.view], apart.tolist())[0])
             names.append(name_in(capture, loaded))
-            found.append(photo_scores(renderer, loaded, behind, distance))
+            found.append(photo_scores(renderer, still.cut(loaded), behind, distance))
+            if (picture := still.pictures.get(key_of(loaded))) is not None:
+                found[-1]["whole_db"] = whole_psnr(renderer, loaded, picture)
         if found:
             each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
             psnr_db, ssim_mean = (mean_of(found, key) or 0.0 for key in ("psnr_db", "ssim"))
             some = {key: mean_of(found, key) for key in SOME_HAVE}
             scores[stop.name] = ModalityScore(psnr_db, ssim_mean, len(found), alive, each, **some)
     return scores
+
+
+def still_of(capture: Capture, factor: int, masks: str, known: object) -> StillBackground:
+    """What stands still behind the subject of a capture, by its training photos.
+
+    known: whether its model was trained without, as far as it says so; else a small look tells.
+    """
+    cameras: dict[tuple, list[Photo]] = {}
+    for photo in capture.photos:
+        if photo.split == "train":
+            cameras.setdefault((photo.modality, photo.view.size), []).append(photo)
+    if known is False or any(is_masked(photo, masks) for photo in capture.photos):
+        return StillBackground()
+    looked = [chosen(mine, PICTURE_PHOTOS) for mine in cameras.values()]
+    for mine in looked:
+        smaller = math.ceil(max(mine[0].view.size) / LOOKED_AT_PX)
+        if known is True or still_share([read(p, max(factor, smaller), masks) for p in mine]):
+            return still_background([read(p, factor, masks) for each in looked for p in each])
+    return StillBackground()
+
+
+def whole_psnr(renderer: ModelRenderer, photo: LoadedPhoto, still: StillPicture) -> float:
+    """Decibels of a photo as it is, of the model before what stands still behind it."""
+    _, _, frame = renderer.draw(photo.view, BLACK)
+    return float(psnr(before(renderer.device, frame, still), photo.over(BLACK), photo.weight))
+
+
+def before(device, frame: RasterFrame, still: StillPicture) -> np.ndarray:
+    """(H, W, 3) a frame that was drawn over black, before a picture that stands still."""
+    through = device.download(frame.transmittance)[..., None]
+    return device.download(frame.image).transpose(1, 2, 0) + through * still.rgb / np.float32(255)
 
 
 def known_background(model: Model, capture: Capture) -> tuple | None:
@@ -233,6 +284,7 @@ def report(path: Path | None, scores: dict[str, ModalityScore], started: float) 
                 "psnr_db_each": {photo: round(db, 3) for photo, db in s.each.items()},
             }
             | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})
+            | ({} if s.whole_db is None else {"whole_db": round(s.whole_db, 4)})
             | ({} if s.depth_error is None else {"depth_error": round(s.depth_error, 5)})
             for name, s in scores.items()
         },

@@ -36,7 +36,7 @@ class FirstAnchors(NamedTuple):
     anchors: np.ndarray  # (A, 3) metres
     frames: np.ndarray  # (A, 7) logarithms of sizes in voxels, then wxyz: see gaussians.cl
     colors: np.ndarray  # (A, 3) logits
-    light: np.ndarray  # (A, 8) logits, none yet: colours are alike from everywhere
+    light: np.ndarray  # (A, 24) logits, none yet: colours are alike from everywhere
     voxel: float  # metres: the median size
     most: int  # anchors that there may be
 

@@ -20,6 +20,7 @@ from shapeshift.training.photo_store.open_photos import open_photos
 from shapeshift.training.photos import BLACK, choose_downscale
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background
+from shapeshift.training.supervision.still_background import leave_out_still
 from shapeshift.training.train import Trainer
 
 ReportProgress = Callable[[str, float], None]  # what is tried now, and how far it is, 0..1
@@ -89,7 +90,8 @@ class Fit:
         self.tolerance_db, self.seeds = tolerance_db, seeds
         self.decisions: list[Ablation] = []
         self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
-        self.loaded = open_photos(capture, factor, settings.masks)
+        opened = open_photos(capture, factor, settings.masks)
+        self.loaded, _ = leave_out_still(opened, settings.background, capture.background)
         self.held_out, self.photos = self.loaded.test, self.loaded.train
         behind = choose_background(settings.background, capture.background, self.photos)
         self.background = behind or BLACK

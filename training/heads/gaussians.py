@@ -48,7 +48,7 @@ class Activation:
         self.grad_raw = device.empty((count, self.layout.raw_at[-1]))
         self.grad_anchors = device.empty((count, 3))
         self.grad_attributes = {
-            name: device.empty((count, ATTRIBUTE_WIDTH[name])) for name in self.layout.own
+            name: device.empty((count, self.layout.widths[name])) for name in self.layout.own
         }
 
     def attributes_of(self, rows: dict[str, Any]) -> tuple:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.light_harmonics import WIDTHS, channels_of
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT
 
 KERNELS = Path(__file__).parents[1] / "kernels"
@@ -18,9 +19,10 @@ RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates w
 ANCHOR_ATTRIBUTES = {
     "frame": "frames", "color": "colors", "stop_color": "colors", "light": "light",
 }  # fmt: skip
-ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3, "light": 8}  # numbers an anchor, see gaussians.cl
+# Numbers an anchor, see gaussians.cl; light is of red, green and blue, in older scenes one for all.
+ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3, "light": WIDTHS[3]}
 # Stops that may have base colours of their own; of more, the colour network would get more hidden
-# units than the kernels of decoding take (rasterizer/decode): 12 a stop beside 32, and 2 for light.
+# units than the kernels of decoding take (rasterizer/decode): 12 a stop beside 32, and 6 for light.
 MOST_STOP_COLORS = 7
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
@@ -45,6 +47,7 @@ class HeadLayout:
     view_dependent: bool = True  # whether colour sees the direction from the eye
     attributes: tuple[str, ...] = ("frame", "stop_color")  # of anchors, besides their features
     stops: int = 1  # how many a run has: base colours an anchor, with "stop_color"
+    light_channels: int = 3  # with "light": 1 where red, green and blue have the same
 
     def __post_init__(self) -> None:
         for name in self.fixed:
@@ -75,10 +78,21 @@ class HeadLayout:
         return tuple(f"colors_{stop}" for stop in range(self.stops)) if each else ("colors",)
 
     @property
+    def widths(self) -> dict[str, int]:
+        """How many numbers an anchor has of each attribute, as the kernels call it."""
+        return ATTRIBUTE_WIDTH | {"light": WIDTHS[self.light_channels]}
+
+    def as_in(self, state: dict[str, np.ndarray]) -> "HeadLayout":
+        """With light of as many channels as an optimiser's state has: older runs had one."""
+        if "light" not in self.own:
+            return self
+        return replace(self, light_channels=channels_of(state["light.value"]))
+
+    @property
     def own_widths(self) -> dict[str, int]:
         """How many numbers an anchor has in each of the optimiser's groups of what is its own."""
         groups = ((n, self.color_groups if n == "colors" else (n,)) for n in self.own)
-        return {group: ATTRIBUTE_WIDTH[name] for name, found in groups for group in found}
+        return {group: self.widths[name] for name, found in groups for group in found}
 
     @property
     def per_anchor(self) -> tuple[str, ...]:
@@ -123,7 +137,7 @@ class HeadLayout:
             "CONDITIONED": sum(1 << m for m, name in enumerate(HEADS) if name not in self.fixed),
             "FRAMES": "frames" in self.own,
             "BASE_COLORS": "colors" in self.own,
-            "LIGHT": "light" in self.own,
+            "LIGHT": self.light_channels if "light" in self.own else 0,
         }  # fmt: skip
         for m, out in enumerate(self.outs):
             numbers |= {

@@ -1,16 +1,17 @@
 // Raw outputs of the heads -> Gaussians, forward and backward: the activations of each head.
 //
 // Defined by networks.py: SPLATS (k an anchor), RAW and OUT_AT0..4 in the order of the heads
-// offset, scale, rotation, opacity, colour; FRAMES, BASE_COLORS and LIGHT (1: anchors have such).
+// offset, scale, rotation, opacity, colour; FRAMES and BASE_COLORS (1: anchors have such); LIGHT
+// (channels of their light: 0, 1 or 3).
 // offset = reach * tanh(h) metres     (bounded: culling boxes can rely on it)
 // scale  = unit * exp(clip(h, -6, 3)) metres, one sigma
 // opacity = tanh(h), below zero absent; colour = sigmoid(h + c + l) with the anchor's base colour c
 // and what its light l adds, logits; rotation is left as it comes, wxyz.
 // A frame (A, 7) is an anchor's own sizes, as logarithms s, and axes, as a quaternion q of any
 // length: mean = anchor + R(q) (exp(s) * offset), scale = exp(s) * scale, rotation = q times it.
-// Light (A, 8) makes an anchor lighter or darker by the direction d from the eye to it:
+// Light (A, LIGHT, 8) changes an anchor's colour by the direction d from the eye to it:
 // coefficients of the spherical harmonics of degrees 1 and 2, in units of those of degree 1, so
-// that these are x, y and z:  l = sum of light_j Y_j(d), the same for the three channels.
+// that these are x, y and z:  l_c = sum of light_cj Y_j(d), of one channel the same for all three.
 // Reads:   raw (A, RAW), anchors (A, 3), frames, base colours, light, the eye; backward the
 //          Gaussians' gradients.
 // Writes:  means, scales, wxyz, opacity, color; backward grad_raw and gradients of what it read.
@@ -76,15 +77,20 @@ inline float3 harmonics_backward(float8 light, float3 d) {
          2.2360680f * light.s7 * (float3)(d.x, -d.y, 0.0f);
 }
 
+inline float sum8(float8 v) {
+  float4 half_of = v.lo + v.hi;
+  return half_of.x + half_of.y + half_of.z + half_of.w;
+}
+
 // What an anchor adds to the logits of all its splats.
 inline float3 own_color(int a, float3 eye, __global const float *anchors,
                         __global const float *colors, __global const float *light) {
   float3 sum = base_color(a, colors);
 #if LIGHT
-  float3 d = direction_and_inverse(eye, anchors + 3 * a).xyz;
-  float8 each = vload8(a, light) * harmonics(d);
-  float4 half_of = each.lo + each.hi;
-  sum += half_of.x + half_of.y + half_of.z + half_of.w;
+  float8 there = harmonics(direction_and_inverse(eye, anchors + 3 * a).xyz);
+  float along[LIGHT];
+  for (int c = 0; c < LIGHT; c++) along[c] = sum8(vload8(LIGHT * a + c, light) * there);
+  sum += (float3)(along[0], along[LIGHT / 2], along[LIGHT - 1]);
 #endif
   return sum;
 }
@@ -196,9 +202,17 @@ __kernel void activate_backward(int anchors_count, float reach, float unit, floa
   }
 #if LIGHT
   float4 look = direction_and_inverse((float3)(eye_x, eye_y, eye_z), anchors + 3 * a);
-  float by_light = by_color.x + by_color.y + by_color.z;
-  vstore8(by_light * harmonics(look.xyz), a, grad_light);
-  float3 by_look = by_light * harmonics_backward(vload8(a, light), look.xyz);
+  float8 there = harmonics(look.xyz), mixed = 0;  // the channels' light by their gradients
+#if LIGHT == 1
+  float by_channel[LIGHT] = {by_color.x + by_color.y + by_color.z};
+#else
+  float by_channel[LIGHT] = {by_color.x, by_color.y, by_color.z};
+#endif
+  for (int c = 0; c < LIGHT; c++) {
+    vstore8(by_channel[c] * there, LIGHT * a + c, grad_light);
+    mixed += by_channel[c] * vload8(LIGHT * a + c, light);
+  }
+  float3 by_look = harmonics_backward(mixed, look.xyz);
   // Through the division by the distance: what points along the direction does nothing.
   by_anchor += (by_look - look.xyz * dot(by_look, look.xyz)) * look.w;
 #endif

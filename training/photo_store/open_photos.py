@@ -1,9 +1,10 @@
 """The photos of a run: all of them in memory where they fit, else from a store on the disk."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from shapeshift.runtime_models.files.memory import amount
 from shapeshift.scene.captures.capture import Capture
@@ -34,6 +35,7 @@ class TrainingPhotos:
     ) -> None:
         self.train, self.test, self.store = train, test, store
         self.load_s = 0.0  # processor time of those that were all read at the beginning
+        self.left_out: Any = None  # what leave_out_still found in them, once it has looked
         self.asked = 0  # the first iteration whose photo was not asked for
 
     def read_ahead(self, photo_of: Callable[[int], LoadedPhoto], iteration: int) -> None:
@@ -68,6 +70,23 @@ class TrainingPhotos:
     def trouble(self) -> str:
         """What a person should know of the disk by now, in words."""
         return "" if self.store is None else self.store.trouble
+
+    def changed(
+        self, change: Callable[[LoadedPhoto], LoadedPhoto], cameras: Collection[tuple]
+    ) -> "TrainingPhotos":
+        """The photos after a change, which masks those of some cameras (modality and size).
+
+        Photos of a store are changed when they are read, what is on disk stays as it is.
+        """
+        if self.store is None:
+            out = TrainingPhotos([change(p) for p in self.train], [change(p) for p in self.test])
+            out.load_s = self.load_s
+            return out
+        self.store.change_photos(change)
+        for photo in (*self.train, *self.test):
+            if isinstance(photo, StoredPhoto) and (photo.modality, photo.view.size) in cameras:
+                photo.mask()
+        return self
 
     def warnings(self) -> list[str]:
         """What a person should know of where the photos are, a sentence each."""

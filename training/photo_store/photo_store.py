@@ -8,6 +8,7 @@ the photos show is the same to the bit as where all of them are in memory.
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
@@ -40,6 +41,7 @@ class PhotoStore:
         self.sources = 0  # photos that were read from the capture's own files
         self.trouble = ""  # why photos are not kept any more, in words
         self.shows_background: dict[int, bool] = {}
+        self.change: Callable[[LoadedPhoto], LoadedPhoto] | None = None  # of what was read
 
     def get(self, number: int) -> LoadedPhoto:
         """The photo, in memory.  Raises BadFile where its file cannot be read."""
@@ -75,6 +77,8 @@ class PhotoStore:
             stamp = self.files.stamp(number)
             found = self.reader.read(self.photos[number])
             self._keep(number, found, stamp)
+        if self.change is not None:
+            found = self.change(found)
         shown = found.masked and found.see_through
         with self.lock:
             self.shows_background[number] = shown
@@ -82,6 +86,13 @@ class PhotoStore:
             self._into_window(number, found)
             self.read_s += time.thread_time() - start
         return found
+
+    def change_photos(self, change: Callable[[LoadedPhoto], LoadedPhoto]) -> None:
+        """From now on photos are as `change` makes them; nothing may be coming."""
+        with self.lock:
+            self.change, self.bytes = change, 0
+            self.window.clear()
+            self.shows_background.clear()
 
     def _keep(self, number: int, photo: LoadedPhoto, stamp: bytes) -> None:
         """Onto the disk; where that is full, training goes on with the capture's own files."""
@@ -125,6 +136,10 @@ class StoredPhoto(LoadedPhoto):
             "store": store, "number": number,
         }  # fmt: skip
         self.__dict__.update(about)
+
+    def mask(self) -> None:
+        """From now on it has an alpha that says what lies outside of its subject."""
+        self.__dict__["masked"] = True
 
     @property
     def rgba(self) -> np.ndarray:

@@ -10,10 +10,6 @@ BACKDROP = 0.06  # display sRGB: a photographed backdrop is lit unevenly, see do
 EDGE = 0.02  # of a photo's sides: its outermost pixels, where a subject stands before something
 ALIKE = 0.7  # of these, in every modality, that have the colour: some photos cut their subject
 EMPTY = 0.2  # of all pixels, at least, that have it: the black rims of undistorted photos are fewer
-STILL = 0.9  # of the photos that have the same colour in a pixel: there nothing moves
-STILL_PHOTOS = 24  # that are compared; fewer than 8 may be alike by chance
-STILL_PIXELS = 160  # a side that are compared
-TURNED = 30.0  # degrees between two cameras that cannot see the same background
 DARK = 0.5  # of the brightest channel: a darker backdrop looks much alike at every exposure
 Background = tuple[float, float, float]
 
@@ -64,42 +60,6 @@ def has_one_exposure(photos: list[LoadedPhoto] | tuple) -> bool:
     """
     color = shared_color(photos)
     return color is not None and max(color) >= DARK
-
-
-def still_share(photos: list[LoadedPhoto]) -> float:
-    """How much of the photos shows a picture that stands still while their cameras turn; 0: none.
-
-    That is the room behind a turntable: it belongs to the camera, not to the scene.  It assumes
-    photos of one size that are no picture of one colour there, without masks; a car's bonnet is
-    found, too, an even sky is not.  Of a modality at most STILL_PHOTOS are compared.
-    """
-    if not photos or any(photo.see_through for photo in sampled(photos)):
-        return 0.0
-    size, modality = photos[0].view.size, photos[0].modality
-    alike = [photo for photo in photos if photo.view.size == size and photo.modality == modality]
-    alike = alike[:: -(-len(alike) // STILL_PHOTOS)]
-    ahead = np.array([photo.view.world_from_eye.matrix()[:3, 2] for photo in alike])
-    turned = np.degrees(np.arccos(np.clip((ahead @ ahead.T).min(), -1, 1)))
-    if len(alike) < STILL_PHOTOS // 3 or not turned >= TURNED:
-        return 0.0
-    step = -(-max(size) // STILL_PIXELS)
-    pixels = np.stack([photo.rgba[::step, ::step, :3] for photo in alike])  # (N, h, w, 3)
-    middle = np.median(pixels, axis=0)
-    still = near(pixels, middle).mean(axis=0) >= STILL
-    plain = not still.any() or near(middle[still], np.median(middle[still], axis=0)).mean() >= ALIKE
-    return 0.0 if plain or still.mean() < EMPTY else float(still.mean())
-
-
-def still_warnings(photos: list[LoadedPhoto]) -> list[str]:
-    """What a person should do about a background that stands still, where there is one."""
-    if not (share := still_share(photos)):
-        return []
-    return [
-        f"{share:.0%} of the photos' pixels show the same in all of them, while their cameras "
-        "turn: what is behind the subject stands still, as behind a turntable, and cannot be "
-        "learned; give masks of the subject (docs/training.md says how to make them of such "
-        "photos), or put one even colour behind it."
-    ]
 
 
 def background_warning(color: Background) -> str:

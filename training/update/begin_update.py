@@ -9,6 +9,7 @@ from shapeshift.training.first_anchors.initial import Report
 from shapeshift.training.photo_store.open_photos import open_photos
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, memory_for_photos
 from shapeshift.training.settings import TrainSettings
+from shapeshift.training.supervision.still_background import leave_out_still
 from shapeshift.training.update.regions import cut_photos, refuse_unseen
 from shapeshift.training.update.trainable import layout_of
 from shapeshift.training.update.update_trainer import UpdateBase, UpdateTrainer
@@ -85,7 +86,9 @@ def begin_update(
     fitting, said = capture_for(base.model, capture)
     factor = settings.downscale or choose_downscale(fitting.photos)
     settings = replace(settings, downscale=factor)
-    photos = open_photos(fitting, factor, settings.masks)
+    photos, _ = leave_out_still(
+        open_photos(fitting, factor, settings.masks), settings.background, fitting.background
+    )
     cut = cut_photos({"train": photos.train, "test": photos.test}, base.region)
     photos.close()
     refuse_large(cut, factor)

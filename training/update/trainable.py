@@ -35,6 +35,7 @@ def layout_of(model: AnchorModel) -> HeadLayout:
         tuple(name for name in HEADS if "control" not in model.networks[name].inputs),
         "direction" in model.networks["color"].inputs,
         tuple(name for name, there in own if there),
+        light_channels=model.input_widths["light"],
     )
 
 
@@ -48,10 +49,16 @@ def unlit_color(model: AnchorModel) -> Mlp:
         return color
     at = np.repeat(color.inputs, [model.input_widths[part] for part in color.inputs]) == "light"
     (first, last), (bias, _) = color.weights, color.biases
-    slope = first[:, at][:, 0]
-    carry = slope != 0
-    adds = [last[:, side] @ slope[side] for side in (slope > 0, slope < 0)]  # of l > 0 and l < 0
-    if first[carry][:, ~at].any() or bias[carry].any() or not all((a == 1).all() for a in adds):
+    slopes = first[:, at]  # (units, channels)
+    carry, channels = slopes.any(axis=1), slopes.shape[1]
+    # What each channel adds, where it is above 0 and where it is below.
+    adds = [
+        last @ np.where(side, slopes, 0) for side in (slopes > 0, slopes < 0)
+    ]  # (outputs, channels)
+    wanted = np.arange(len(last))[:, None] % channels == np.arange(channels)
+    mixes = first[carry][:, ~at].any() or bias[carry].any()
+    mixes = mixes or (np.count_nonzero(slopes, axis=1) > 1).any()
+    if mixes or not all((a == wanted).all() for a in adds):
         raise BadFile(
             "the color network of this scene mixes light by direction with its other inputs; "
             "scenes of `train`, where it is added to them, can be updated."

@@ -171,18 +171,21 @@ function checkModel(model, array) {
     whole(d, 1, 256, "the width of the control encoding");
     if (!(Number.isFinite(spacing) && sigma > 0)) refuse("the control encoding is none");
     if (model.features?.width !== 4 * features) refuse("the scene's tables do not fit its counts");
-    if (model.light && !(model.light.width === 8 && model.networks?.color?.looks)) refuse("the scene's tables do not fit its counts");
+    if (model.light && !([8, 24].includes(model.light.width) && model.networks?.color?.looks)) refuse("the scene's tables do not fit its counts");
     /** @type {Record<string, number>} */
     const vectors = { offset: Math.ceil((3 * k) / 4), scale: Math.ceil((3 * k) / 4), rotation: k, opacity: Math.ceil(k / 4), color: Math.ceil((3 * k) / 4) };
-    for (const [name, outs] of Object.entries(vectors)) checkNetwork(model.networks?.[name], features, outs, d, array);
+    for (const [name, outs] of Object.entries(vectors)) checkNetwork(model.networks?.[name], features, name === "color" ? lookVectors(model) : 1, outs, d, array);
 }
 
-/** @param {any} net @param {number} features @param {number} outs @param {number} d @param {(section: any) => ArrayLike<number>} array */
-function checkNetwork(net, features, outs, d, array) {
+/** How many vectors the colours' network takes of the eye: the direction and light of one channel, or of three. @param {any} model */
+export const lookVectors = (model) => (model.light?.width === 24 ? 2 : 1);
+
+/** @param {any} net @param {number} features @param {number} looks  vectors @param {number} outs @param {number} d @param {(section: any) => ArrayLike<number>} array */
+function checkNetwork(net, features, looks, outs, d, array) {
     const wrong = "the scene's networks do not fit together";
     if (!Array.isArray(net?.layers) || !(net.layers.length >= 1 && net.layers.length <= 4)) refuse(wrong);
     numbers([...numbers(net.clip, 2, "the clip of a network"), net.gain], 3, "the gain of a network");
-    let before = features + (net.looks ? 1 : 0), weights = 0;
+    let before = features + (net.looks ? looks : 0), weights = 0;
     for (const layer of net.layers) {
         if (layer.ins !== before) refuse(wrong);
         before = whole(layer.outs, 1, 64, "the width of a network");

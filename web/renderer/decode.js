@@ -2,6 +2,7 @@
 // the arena.  The shape runs on a change of x alone, colours on a change of the eye too.  Anchors go
 // through in batches, so that what lies between the passes stays small.
 import { BATCH_ROWS, WIDTH } from "../conventions.js";
+import { lookVectors } from "./container.js";
 import { rowsOf } from "./gl.js";
 import { MOST_OUTPUTS, foldedBias, headNumber, layerShader, partSize, weightBlock } from "./networks.js";
 import { PACK } from "./pack.js";
@@ -81,8 +82,8 @@ export class Decoder {
                 let framebuffer = target.framebuffers.get(key);
                 if (!framebuffer) target.framebuffers.set(key, (framebuffer = gpu.framebufferOfLayers(target.texture, first, part.outs)));
                 program.use({
-                    inputs: { layers: inputs }, anchors: { texture: model.anchorList }, stop_weights: { texture: object.own?.texture ?? model.anchorList }, light: { texture: model.lightList ?? model.anchorList }, lit: { int: model.lightList ? 1 : 0 },
-                    first_anchor: { int: batch.first }, count: { int: model.anchors }, input_row: { int: inputRow }, ins: { int: of.ins - (looks ? 1 : 0) },
+                    inputs: { layers: inputs }, anchors: { texture: model.anchorList }, stop_weights: { texture: object.own?.texture ?? model.anchorList }, light: { texture: model.lightList ?? model.anchorList }, lit: { int: looks && model.light ? model.light.width / 8 : 0 },
+                    first_anchor: { int: batch.first }, count: { int: model.anchors }, input_row: { int: inputRow }, ins: { int: of.ins - (looks ? (name === "color" ? lookVectors(model) : 1) : 0) },
                     looks: { int: looks ? 1 : 0 }, stops: { int: l ? 0 : stops }, head: { int: headNumber(last ? net.head : "relu") },
                     low: last ? net.clip[0] : -LARGEST, high: last ? net.clip[1] : LARGEST, gain: last ? net.gain : 1, eye,
                     ...(stops && !l ? { mask: { vec4s: mask } } : {}),

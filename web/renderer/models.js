@@ -26,7 +26,7 @@ function loadNetworks(gpu, model, array, table) {
     const shapes = ["offset", "scale", "rotation", "opacity"];
     return {
         ...model, networks, featureLayers: layers(gpu, table(model.features, model.anchors), model.anchors, model.featureVecs),
-        lightList: model.light ? gpu.list("rgba32f", 2 * model.anchors, table(model.light, model.anchors)) : null,
+        lightList: model.light ? gpu.list("rgba32f", (model.light.width / 4) * model.anchors, table(model.light, model.anchors)) : null,
         colorsFollow: !!networks.color.control, colorsLook: networks.color.looks, shapeFollows: shapes.some((name) => networks[name].control),
     };
 }

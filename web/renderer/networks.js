@@ -21,8 +21,8 @@ export function layerShader(outs) {
 uniform sampler2DArray inputs;   // vector i of an anchor in layer i
 uniform sampler2D anchors, stop_weights, light;
 uniform int first_anchor, count, input_row, ins;
-uniform bool looks;              // the last vector of inputs is the direction from the eye, and light
-uniform bool lit;                // anchors have light by direction
+uniform bool looks;              // behind these inputs comes the direction from the eye, and light
+uniform int lit;                 // channels of the anchors' light by direction: 0, 1 or 3
 uniform int stops;               // each anchor has weights of so many stops; 0: Psi is in the bias
 uniform vec4 mask[16];           // of the stops that count
 uniform int head;                // index of HEADS
@@ -59,6 +59,11 @@ float light_along(vec4 low, vec4 high, vec3 d) {
     return dot(low, vec4(d, products.x)) + dot(high, vec4(products.yz, zone, rest));
 }
 
+float channel_along(int c, int a, vec3 d) {
+    int low = 2 * (lit * a + c);
+    return light_along(texelFetch(light, at(low), 0), texelFetch(light, at(low + 1), 0), d);
+}
+
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     int a = first_anchor + here.y * WIDTH + here.x;
@@ -71,9 +76,14 @@ void main() {
     }
     if (looks) {
         vec4 v = vec4(direction_from(eye, texelFetch(anchors, at(a), 0).xyz), 0.0);
-        if (lit) v.w = light_along(texelFetch(light, at(2 * a), 0), texelFetch(light, at(2 * a + 1), 0), v.xyz);
+        if (lit > 0) v.w = channel_along(0, a, v.xyz);
         int n = ins * ${4 * outs};
         ${add("n", "v")}
+        if (lit > 1) {  // red is beside the direction
+            vec4 more = vec4(channel_along(1, a, v.xyz), channel_along(2, a, v.xyz), 0.0, 0.0);
+            n += ${4 * outs};
+            ${add("n", "more")}
+        }
     }
     int vectors = (stops + 3) / 4 + 1;
     float total = 0.0;

@@ -146,8 +146,8 @@ __kernel void decode_shapes(int anchors, int start, int run, int splats, int fea
   }
 }
 
-// The fifth -> colours towards an eye; looks: 3 where they follow it, 4 where anchors have light by
-// direction, too, else 0; of the blocks that are wanted, 0: all.
+// The fifth -> colours towards an eye; looks: 3 where they follow it, 4 or 6 where anchors have
+// light by direction of one channel or three, too, else 0; of the blocks that are wanted, 0: all.
 __kernel void decode_colors(int anchors, int start, int run, int splats, int features, int units,
                             int looks, float eye_x, float eye_y, float eye_z,
                             __global const Head* heads, __global const float* weights,
@@ -158,6 +158,7 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
   const Head head = heads[COLOR_HEAD];
   // Its first row as if units were counted from its own.
   const int first_at = head.first_at - head.unit_at * (features + looks);
+  const int channels = looks ? looks - DIRECTION : 0;  // of light
   const int from = get_global_id(0) * run, end = min((anchors + WIDTH - 1) / WIDTH, from + run);
   for (int block = from; block < end; block++) {
     if (wanted && !wanted[block]) continue;  // nobody sees any anchor of it
@@ -165,7 +166,7 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
     __global const float* woken = bounds + (size_t)block * units;
     __global const float* mine = feature + (size_t)block * features * WIDTH;
     __global const float* place = places + (size_t)block * 3 * WIDTH;
-    __global const float* own = light + (looks > 3 ? (size_t)block * LIGHTS * WIDTH : 0);
+    __global const float* own = light + (size_t)block * channels * LIGHTS * WIDTH;
     __global float* rows = color + 4 * (start + (size_t)block * WIDTH * splats);
     if (WIDTH > 1 && n == WIDTH) FETCH_TO_WRITE(rows, WIDTH * splats * 4)
     if (WIDTH > 1 && block + 1 < end) {
@@ -173,10 +174,10 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
       FETCH(woken + units + head.unit_at, head.hidden)
       FETCH(mine + features * WIDTH, features * WIDTH)
       FETCH(place + 3 * WIDTH, 3 * WIDTH)
-      if (looks > 3) FETCH(own + LIGHTS * WIDTH, LIGHTS * WIDTH)
+      if (channels) FETCH(own + channels * LIGHTS * WIDTH, channels * LIGHTS * WIDTH)
     }
     int live[MAX_HIDDEN + ROWS];
-    floatn look[4], unit[MAX_HIDDEN + ROWS], out[3 * MAX_SPLATS + TILE];
+    floatn look[DIRECTION + 3], unit[MAX_HIDDEN + ROWS], out[3 * MAX_SPLATS + TILE];
     if (looks) {
       // delta of paper eq. 4, from the eye to the anchor, of length 1.
       look[0] = LOADN(place) - eye_x;
@@ -185,7 +186,7 @@ __kernel void decode_colors(int anchors, int start, int run, int splats, int fea
       const floatn length = sqrt(look[0] * look[0] + look[1] * look[1] + look[2] * look[2]);
       const intn known = (length > 0.0f) & (length < INFINITY);  // else no direction: 0
       UNROLL for (int i = 0; i < 3; i++) look[i] = select(TO_FLOATN 0, look[i] / length, known);
-      if (looks > 3) look[3] = light_along(own, look);
+      light_along(own, channels, look);
     }
     // bound_units knows the features alone: `least` allows for any direction.
     const int awake = wake(head.unit_at, head.unit_at + head.hidden, woken, least, 0, live);

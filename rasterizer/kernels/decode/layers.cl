@@ -1,6 +1,6 @@
 // layers: the two layers of a head and its activation, for a block of WIDTH anchors at a time.
-// Reads:   WIDTH, TILE, ROWS, UNITS.
-// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL, LIGHTS; Head, wake, first_layer,
+// Reads:   WIDTH, TILE, ROWS, UNITS, LIGHTS (numbers of a channel of light by direction).
+// Defines: floatn, intn, LOADN, STOREN, TO_FLOATN, ALL, UNROLL; Head, wake, first_layer,
 //          light_along, second_layer, exp2n.
 // Units:   none; a head's gain gives metres or display values.
 // A comparison of floatn gives intn: 0 or 1 of a scalar, 0 or -1 a lane; select() takes both.
@@ -24,7 +24,7 @@ typedef int16 intn;
 #define ALL(lanes) all_lanes(lanes)
 #endif
 #define UNROLL _Pragma("unroll")
-#define LIGHTS 8  // numbers of an anchor's light by direction
+#define DIRECTION 3  // inputs
 #define LOG2E 1.44269504f  // log2(e): e^z = 2^(z log2(e))
 #define MOST 126.0f  // the largest exponent of 2
 // Activations, numbered as decode_heads.py has them.
@@ -138,6 +138,15 @@ inline int wake(int first, int end, __global const float* bounds, __global const
   return n;
 }
 
+// Inputs `from` to `end` of what looks at the eye; numbers known to the compiler stay in registers.
+#define LOOK(from, end)                                              \
+  {                                                                  \
+    UNROLL for (int i = from; i < (end); i++) {                      \
+      UNROLL for (int u = 0; u < ROWS; u++)                          \
+        sum[u] = fma(look[i], TO_FLOATN w[u][features + i], sum[u]); \
+    }                                                                \
+  }
+
 // The hidden units `live` of one block: ROWS of them share each load of a feature.
 inline void first_layer(int n, int* live, int features, int looks, __global const float* weights,
                         __global const float* bias, __global const float* feature,
@@ -157,34 +166,36 @@ inline void first_layer(int n, int* live, int features, int looks, __global cons
       const floatn f = LOADN(feature + i * WIDTH);
       UNROLL for (int u = 0; u < ROWS; u++) sum[u] = fma(f, TO_FLOATN w[u][i], sum[u]);
     }
-    // Only the colour looks at the direction: none, three, or four with light along it.
-    if (looks) {
-      UNROLL for (int i = 0; i < 3; i++) {
-        UNROLL for (int u = 0; u < ROWS; u++)
-          sum[u] = fma(look[i], TO_FLOATN w[u][features + i], sum[u]);
-      }
-    }
-    if (looks > 3) {
-      UNROLL for (int u = 0; u < ROWS; u++)
-        sum[u] = fma(look[3], TO_FLOATN w[u][features + 3], sum[u]);
-    }
+    // Only the colour looks at the direction: none, three, or four or six with light along it.
+    if (looks) LOOK(0, DIRECTION)
+    if (looks > DIRECTION) LOOK(DIRECTION, DIRECTION + 1)
+    if (looks > DIRECTION + 1) LOOK(DIRECTION + 1, DIRECTION + 3)
     // Not fmax: NaN has to stay NaN.
     UNROLL for (int u = 0; u < ROWS; u++)
       unit[t + u] = select(sum[u], TO_FLOATN 0.0f, sum[u] < 0.0f);
   }
 }
 
-// What the block's light by direction (LIGHTS, WIDTH) gives along unit directions, or along none:
-// spherical harmonics of degree 1 and 2 in units of those of degree 1, light_harmonics.py.
-inline floatn light_along(__global const float* light, const floatn* d) {
+inline floatn channel_along(__global const float* light, const floatn* value) {
+  floatn sum = 0;
+  UNROLL for (int i = 0; i < LIGHTS; i++) sum = fma(LOADN(light + i * WIDTH), value[i], sum);
+  return sum;
+}
+
+// What the block's light by direction (channels, LIGHTS, WIDTH) gives along unit directions d, or
+// along none, written behind them: spherical harmonics of degree 1 and 2 in units of those of
+// degree 1, light_harmonics.py.
+inline void light_along(__global const float* light, int channels, floatn* d) {
   const floatn xx = d[0] * d[0], yy = d[1] * d[1], zz = d[2] * d[2];
   const floatn value[LIGHTS] = {d[0], d[1], d[2],
                                 2.2360680f * d[0] * d[1], 2.2360680f * d[1] * d[2],
                                 2.2360680f * d[2] * d[0], 0.6454972f * (2 * zz - xx - yy),
                                 1.1180340f * (xx - yy)};
-  floatn sum = 0;
-  UNROLL for (int i = 0; i < LIGHTS; i++) sum = fma(LOADN(light + i * WIDTH), value[i], sum);
-  return sum;
+  if (channels) d[DIRECTION] = channel_along(light, value);
+  if (channels > 1) {
+    d[DIRECTION + 1] = channel_along(light + LIGHTS * WIDTH, value);
+    d[DIRECTION + 2] = channel_along(light + 2 * LIGHTS * WIDTH, value);
+  }
 }
 
 // Outputs of `count` tiles from tile c on, all their sums at once: a unit is loaded for fifteen

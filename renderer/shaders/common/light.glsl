@@ -1,4 +1,4 @@
-// light: what an anchor's light by direction gives, the same for all channels.
+// light: what one channel of an anchor's light by direction gives.
 // Reads:   nothing.
 // Defines: float light_along(vec4 low, vec4 high, vec3 d): coefficients of the spherical harmonics
 //          of degree 1 and 2, in units of those of degree 1, along d: light_harmonics.py.

@@ -71,8 +71,9 @@ def test_anchors_with_axes_and_sizes_of_their_own(gpu, anchors, k):
 
 
 @pytest.mark.parametrize("anchors", [1, BLOCK + 1, GROUP + 1])
-def test_anchors_with_light_by_direction(gpu, anchors):
-    model = with_light(make_model(anchors, k=3))
+@pytest.mark.parametrize("channels", [1, 3])
+def test_anchors_with_light_by_direction(gpu, anchors, channels):
+    model = with_light(make_model(anchors, k=3), channels=channels)
     color = assert_as_evaluated(gpu, model)[3]
     assert (
         np.abs(color - assert_as_evaluated(gpu, replace(model, light=-model.light))[3]).max() > 0.1
@@ -86,11 +87,12 @@ def test_anchors_with_light_by_direction(gpu, anchors):
 
 def test_light_of_one_model_is_not_that_of_another(gpu):
     """The same arena holds a model with light between two without; each has its own."""
-    models = make_model(70), with_light(make_model(70)), make_model(70)
+    one, three = (with_light(make_model(70), channels=channels) for channels in (1, 3))
+    models = make_model(70), one, make_model(70), three, make_model(70)
     with Arena(gpu, [m.splat_count for m in models]) as arena, Decoder(gpu, arena, models) as made:
-        for i in (0, 1, 2, 1, 0):
+        for i in (0, 1, 2, 3, 4, 3, 2, 1, 0):
             made.color(i, 0.3, EYE)
-        found = np.split(read(arena.color, np.float32, 4)[:, :3], 3)
+        found = np.split(read(arena.color, np.float32, 4)[:, :3], 5)
     for model, color in zip(models, found, strict=True):
         np.testing.assert_allclose(color, Evaluator(model).color(0.3, EYE), atol=1e-5)
 

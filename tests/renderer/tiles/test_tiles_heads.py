@@ -57,9 +57,10 @@ def decoded(model: AnchorModel, x: float, eye=EYE, seen=None) -> tuple[np.ndarra
 
 @pytest.mark.parametrize("anchors", [1, BLOCK, BLOCK + 1, RUNS + 1])
 @pytest.mark.parametrize("size", [1.0, 20.0])  # 20: light alone wakes units, and closes them
-def test_anchors_with_light_by_direction(anchors, size):
+@pytest.mark.parametrize("channels", [1, 3])
+def test_anchors_with_light_by_direction(anchors, size, channels):
     """onnxruntime and numpy's harmonics; at an anchor there is no direction, so no light."""
-    model = with_light(make_random_model(anchors, k=3))
+    model = with_light(make_random_model(anchors, k=3), channels=channels)
     model = replace(model, light=np.float32(size) * model.light)
     for eye in (EYE, -EYE, model.anchors[0].astype(np.float64)):
         found, want = decoded(model, 0.4, eye)[2][:, :3], Evaluator(model).color(0.4, eye)

@@ -13,7 +13,8 @@ from scipy.special import sph_harm_y
 from shapeshift.runtime_models.bake import bake
 from shapeshift.runtime_models.colors.color_slope import color_slope
 from shapeshift.runtime_models.colors.light_harmonics import (
-    WIDTH,
+    COEFFICIENTS,
+    WIDTHS,
     harmonics,
     light_along,
     most_light,
@@ -21,7 +22,6 @@ from shapeshift.runtime_models.colors.light_harmonics import (
 )
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
-from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.drop_unused import drop_unused
 from shapeshift.runtime_models.package.feature_codes import FEATURES
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST
@@ -76,28 +76,46 @@ def test_they_are_orthogonal_and_of_one_size_over_the_sphere():
     places = [ring * np.cos(turn), ring * np.sin(turn), np.broadcast_to(z[:, None], (8, 16))]
     values = harmonics(np.stack([each.ravel() for each in places], 1))
     mean = np.einsum("n,na,nb->ab", np.repeat(weight, 16) / 32, values, values)
-    np.testing.assert_allclose(mean, np.eye(WIDTH) / 3, atol=1e-12)
+    np.testing.assert_allclose(mean, np.eye(COEFFICIENTS) / 3, atol=1e-12)
 
 
 def test_no_direction_gives_no_light():
     assert not harmonics(np.zeros((2, 3), np.float32)).any()
 
 
-def test_light_stays_below_its_bound_and_may_reach_it():
+CHANNELS = pytest.mark.parametrize("channels", list(WIDTHS))
+
+
+@CHANNELS
+def test_light_stays_below_its_bound_and_may_reach_it(channels):
     direction = spread(4000)
-    light = np.random.default_rng(1).normal(size=(50, WIDTH))
-    most = np.abs(light @ harmonics(direction).T).max(axis=1)
+    light = np.random.default_rng(1).normal(size=(50, WIDTHS[channels]))
+    each = light.reshape(50, channels, COEFFICIENTS)  # red, green, blue
+    most = np.abs(each @ harmonics(direction).T).max(axis=2)
+    assert most_light(light).shape == most.shape
     assert (most <= most_light(light)).all()
     ahead = np.array([[0.0, 0, 1]])
-    same_way = harmonics(ahead)  # both degrees are largest there: 1 + 5/3
+    same_way = np.tile(harmonics(ahead), channels)  # both degrees are largest there: 1 + 5/3
     assert most_light(same_way)[0] == pytest.approx(8 / 3)
-    assert light_along(same_way, ahead)[0, 0] == pytest.approx(8 / 3)
+    assert light_along(same_way, ahead)[0] == pytest.approx(8 / 3)
 
 
+def test_channels_are_apart_and_one_after_the_other():
+    light, direction = np.random.default_rng(2).normal(size=(40, 24)), spread(40)
+    found = light_along(light, direction)
+    for channel in range(3):
+        own = light[:, 8 * channel : 8 * channel + 8]
+        np.testing.assert_array_equal(found[:, [channel]], light_along(own, direction))
+        np.testing.assert_allclose(
+            found[:, channel], (own * by_scipy(direction)).sum(1), atol=1e-12
+        )
+
+
+@CHANNELS
 @pytest.mark.parametrize("seed", range(3))
-def test_turned_light_is_the_same_light_seen_from_a_turned_eye(seed):
+def test_turned_light_is_the_same_light_seen_from_a_turned_eye(seed, channels):
     turn = Rotation.random(random_state=seed).as_matrix()
-    light = np.random.default_rng(seed).normal(size=(40, WIDTH))
+    light = np.random.default_rng(seed).normal(size=(40, WIDTHS[channels]))
     direction = spread(40, seed + 9)
     found = light_along(turn_light(light, turn), direction @ turn.T)
     np.testing.assert_allclose(found, light_along(light, direction), atol=1e-12)
@@ -111,24 +129,29 @@ def logits(color: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("fold", [True, False])
 @pytest.mark.parametrize("hidden", [1, 32])
-def test_an_exported_network_adds_the_light_to_every_logit(fold, hidden):
+@CHANNELS
+def test_an_exported_network_adds_the_light_to_every_logit(fold, hidden, channels):
     """Its oracle is scipy's harmonics and float64; the colours are far from 0 and 1."""
     bare = make_random_model(37, k=3, hidden=(hidden,))
-    light = np.random.default_rng(3).normal(0, 0.3, (37, WIDTH)).astype(np.float32)
-    color = carried(bare.networks["color"], 16)
+    light = np.random.default_rng(3).normal(0, 0.3, (37, WIDTHS[channels])).astype(np.float32)
+    color = carried(bare.networks["color"], 16, channels)
     model = replace(bare, networks=bare.networks | {"color": color}, light=light)
     delta = model.anchors - EYE
     delta /= np.linalg.norm(delta, axis=1, keepdims=True)
-    added = (light * by_scipy(delta)).sum(axis=1)
+    added = np.stack(
+        [(part * by_scipy(delta)).sum(axis=1) for part in np.split(light, channels, 1)]
+    )
+    added = np.broadcast_to(added, (3, 37)).T  # of red, green and blue
     for x in (0.0, 0.4, 1.0):
         shown = Evaluator(model, fold=fold).color(x, EYE).astype(np.float64)
         plain = Evaluator(bare, fold=fold).color(x, EYE).astype(np.float64)
         found = (logits(shown) - logits(plain)).reshape(37, -1)
-        np.testing.assert_allclose(found, np.repeat(added[:, None], 9, axis=1), atol=2e-4)
+        np.testing.assert_allclose(found, np.tile(added, 3), atol=2e-4)
 
 
-def test_folded_whole_and_chosen_rows_agree():
-    model = with_light(make_random_model(50, k=2))
+@CHANNELS
+def test_folded_whole_and_chosen_rows_agree(channels):
+    model = with_light(make_random_model(50, k=2), channels=channels)
     want = Evaluator(model, fold=False).color(0.3, EYE)
     folded = Evaluator(model)
     np.testing.assert_allclose(folded.color(0.3, EYE), want, atol=1e-6)
@@ -143,10 +166,11 @@ def test_folded_whole_and_chosen_rows_agree():
     np.testing.assert_allclose(folded.color_along(0.3, direction), want, atol=1e-6)
 
 
+@CHANNELS
 @pytest.mark.parametrize("sides", [2, 50])
-def test_a_control_an_anchor_has_its_own_light(sides):
+def test_a_control_an_anchor_has_its_own_light(sides, channels):
     """Two controls run in two folded networks, many in a whole one: each as one for all does."""
-    model = with_light(make_random_model(50, k=2))
+    model = with_light(make_random_model(50, k=2), channels=channels)
     xs = np.linspace(0, 1, sides)
     x = xs[np.arange(50) % sides].astype(np.float32)
     found = Evaluator(model).color(x, EYE).reshape(50, -1)
@@ -155,11 +179,13 @@ def test_a_control_an_anchor_has_its_own_light(sides):
         np.testing.assert_allclose(found[x == value], one[x == value], atol=1e-5)
 
 
-def test_the_file_itself_run_by_onnxruntime_gives_the_same(tmp_path):
+@CHANNELS
+def test_the_file_itself_run_by_onnxruntime_gives_the_same(tmp_path, channels):
     """As docs/package.md says it to a stranger; nothing of ours between the bytes and numbers."""
-    write_package(with_light(make_random_model(30, k=4)), tmp_path / "scene", "float32")
+    lit = with_light(make_random_model(30, k=4), channels=channels)
+    write_package(lit, tmp_path / "scene", "float32")
     manifest = json.loads((tmp_path / "scene" / MANIFEST).read_text())
-    assert manifest["format"] == "shapeshift 3"
+    assert manifest["format"] == {1: "shapeshift 3", 3: "shapeshift 4"}[channels]
     with np.load(tmp_path / "scene" / ANCHORS) as arrays:
         positions, features, light = (arrays[n] for n in ("positions", "features", "light"))
     d = positions.astype(np.float64) - EYE
@@ -169,9 +195,12 @@ def test_the_file_itself_run_by_onnxruntime_gives_the_same(tmp_path):
         x, y, z, np.sqrt(5) * x * y, np.sqrt(5) * y * z, np.sqrt(5) * z * x,
         np.sqrt(5 / 12) * (2 * z * z - x * x - y * y), np.sqrt(5 / 4) * (x * x - y * y),
     ]  # fmt: skip
-    added = sum(light[:, i] * term for i, term in enumerate(terms))
+    added = np.stack(
+        [sum(light[:, 8 * c + i] * term for i, term in enumerate(terms)) for c in range(channels)],
+        axis=1,
+    )
     model = read_package(tmp_path / "scene")
-    parts = {"feature": features, "direction": d, "light": added[:, None],
+    parts = {"feature": features, "direction": d, "light": added,
              "control": np.tile(psi_of(model, 0.6), (30, 1))}  # fmt: skip
     rows = np.concatenate([parts[p] for p in manifest["heads"]["color"]["inputs"]], axis=1)
     session = onnxruntime.InferenceSession(
@@ -183,8 +212,9 @@ def test_the_file_itself_run_by_onnxruntime_gives_the_same(tmp_path):
 
 @pytest.mark.parametrize("frames", [True, False])
 @pytest.mark.parametrize("kind", [*FEATURES, EXACT])
-def test_a_package_gives_back_the_light(tmp_path, kind, frames):
-    model = with_light(make_random_model(300))
+@CHANNELS
+def test_a_package_gives_back_the_light(tmp_path, kind, frames, channels):
+    model = with_light(make_random_model(300), channels=channels)
     model = with_frames(model) if frames else model
     write_package(model, tmp_path / "a.shift", kind)
     back = read_package(tmp_path / "a.shift")
@@ -196,8 +226,8 @@ def test_a_package_gives_back_the_light(tmp_path, kind, frames):
     facts = describe(back, tmp_path / "a.shift")
     size = {"float32": 4, EXACT: 4, "float16": 2, "uint8": 1}[kind]
     ends = 64 if kind == "uint8" else 0
-    assert facts["format"] == "shapeshift 3"
-    assert facts["light_by_direction_bytes"] == 300 * 8 * size + ends
+    assert facts["format"] == {1: "shapeshift 3", 3: "shapeshift 4"}[channels]
+    assert facts["light_by_direction_bytes"] == channels * (300 * 8 * size + ends)
     write_package(back, tmp_path / "b.shift", EXACT)
     np.testing.assert_array_equal(read_package(tmp_path / "b.shift").light, back.light)
 
@@ -214,82 +244,6 @@ def test_a_package_without_light_is_as_it_was(tmp_path):
     assert "light_by_direction_bytes" not in describe(back, tmp_path / "a.shift")
 
 
-def changed(files: dict[str, bytes], **arrays) -> dict[str, bytes]:
-    """The package with arrays of its npz replaced, or left out where None."""
-    with np.load(io.BytesIO(files[ANCHORS])) as archive:
-        there = dict(archive) | arrays
-    out = io.BytesIO()
-    np.savez(out, **{name: array for name, array in there.items() if array is not None})
-    return files | {ANCHORS: out.getvalue()}
-
-
-@pytest.mark.parametrize(
-    ("arrays", "sentence"),
-    [
-        ({"light": None}, "lacks the array 'light'"),
-        ({"light": np.zeros((10, 9), np.float32)}, r"expected \(A, 8\)"),
-        ({"light": np.ones((9, 8), np.float32)}, "10 positions but 9 light"),
-        ({"light": np.full((10, 8), np.nan, np.float32)}, "NaN or Inf in 10 of 10"),
-        ({"light": np.full((10, 8), np.inf, np.float16)}, "NaN or Inf in 10 of 10"),
-        ({"light": np.full((10, 8), -1.1e4, np.float32)}, "light reach 1.1e.04, expected what is"),
-        ({"light": np.zeros((10, 8))}, "is float64"),
-        ({"light": np.zeros((10, 8), np.uint8)}, "need light_range"),
-        ({"frame_rotations": np.ones((10, 4), np.float32)}, "lacks the array 'frame_log_scales'"),
-    ],
-)
-def test_light_that_cannot_be_is_refused(arrays, sentence):
-    files = package_files(with_light(make_random_model(10)), "float32")
-    with pytest.raises(BadFile, match=sentence):
-        read_files(changed(files, **arrays).__getitem__, "here")
-
-
-def test_the_largest_light_is_read():
-    files = package_files(with_light(make_random_model(10)), "float32")
-    files = changed(files, light=np.full((10, 8), 1e4, np.float32))
-    assert (read_files(files.__getitem__, "here").light == 1e4).all()
-
-
-@pytest.mark.parametrize(
-    ("version", "inputs", "sentence"),
-    [
-        (
-            "shapeshift 3",
-            ["feature", "direction", "control"],
-            "a list with 'direction' and 'light'",
-        ),
-        ("shapeshift 3", ["feature", "light", "control"], "a list with 'direction' and 'light'"),
-        ("shapeshift 2", None, "a list of some of feature, direction, control, each once"),
-        ("shapeshift 1", None, "a list of some of feature, direction, control, each once"),
-    ],
-)
-def test_a_manifest_that_does_not_fit_its_light_is_refused(version, inputs, sentence):
-    files = package_files(with_light(make_random_model(10)), "float32")
-    manifest = json.loads(files[MANIFEST])
-    manifest["format"] = version
-    if inputs is not None:
-        manifest["heads"]["color"]["inputs"] = inputs
-    with pytest.raises(BadFile, match=sentence):
-        read_files((files | {MANIFEST: json.dumps(manifest).encode()}).__getitem__, "here")
-
-
-def test_another_head_may_not_take_it():
-    files = package_files(with_light(make_random_model(10)), "float32")
-    manifest = json.loads(files[MANIFEST])
-    manifest["heads"]["opacity"]["inputs"] = ["feature", "light", "control"]
-    with pytest.raises(BadFile, match="a list of some of feature, control, each once"):
-        read_files((files | {MANIFEST: json.dumps(manifest).encode()}).__getitem__, "here")
-
-
-def test_a_model_cannot_lose_its_light_or_the_input_alone():
-    model = with_light(make_random_model(5))
-    with pytest.raises(ValueError, match="anchors have no light, but the colour network takes"):
-        replace(model, light=None)
-    with pytest.raises(ValueError, match="anchors have light, but the colour network takes"):
-        replace(model, networks=make_random_model(5).networks)
-    with pytest.raises(ValueError, match="shape"):
-        replace(model, light=model.light[:4])
-
-
 def test_what_nothing_shows_goes_with_its_light():
     model = with_light(make_random_model(40, k=2))
     alive = np.random.default_rng(2).random((40, 2)) < 0.4
@@ -299,29 +253,33 @@ def test_what_nothing_shows_goes_with_its_light():
     np.testing.assert_array_equal(smaller.light, model.light[kept])
 
 
+@CHANNELS
 @pytest.mark.parametrize("size", [0.0, 1.0])
-def test_units_that_carry_light_go_only_where_there_is_none(size):
+def test_units_that_carry_light_go_only_where_there_is_none(size, channels):
     bare = make_random_model(30)
-    color = carried(bare.networks["color"], 16)
-    light = np.random.default_rng(0).normal(0, size, (30, WIDTH)).astype(np.float32)
+    color = carried(bare.networks["color"], 16, channels)
+    light = np.random.default_rng(0).normal(0, size, (30, WIDTHS[channels])).astype(np.float32)
     model = replace(bare, networks=bare.networks | {"color": color}, light=light)
     # In reach of the bound alone: units that light opens, and nothing else does.
     biases = (color.biases[0].copy(), color.biases[1])
-    biases[0][-2:] = -0.9 * np.abs(light @ harmonics(spread(5000)).T).max()
+    each = light.reshape(30, channels, COEFFICIENTS) @ harmonics(spread(5000)).T
+    # Units carry the channels, then the channels below 0.
+    biases[0][-2 * channels :] = -0.9 * np.tile(np.abs(each).max(axis=(0, 2)), 2)
     gated = replace(model, networks=model.networks | {"color": replace(color, biases=biases)})
     for each in (model, gated):
         smaller, _ = drop_unused(each, np.ones((30, 5), bool))
         assert (smaller.light is None) == (size == 0)
         assert ("light" in smaller.networks["color"].inputs) == (size > 0)
-        assert len(smaller.networks["color"].biases[0]) == (34 if size else 32)
+        assert len(smaller.networks["color"].biases[0]) == 32 + (2 * channels if size else 0)
         for eye in (EYE, -EYE, np.array([0.1, 3.0, 0])):
             np.testing.assert_allclose(
                 evaluate(smaller, 0.4, eye).color, evaluate(each, 0.4, eye).color, atol=1e-6
             )
 
 
-def test_a_new_stop_leaves_light_as_it_was_and_may_go_again():
-    model = with_light(make_random_model(25, k=2))
+@CHANNELS
+def test_a_new_stop_leaves_light_as_it_was_and_may_go_again(channels):
+    model = with_light(make_random_model(25, k=2), channels=channels)
     names, rng = [stop.name for stop in model.stops], np.random.default_rng(4)
     wide = insert_stop(model, "Styled", names[0])
     units = {"color": NewUnits(rng.normal(size=(3, 17)), rng.normal(size=3),
@@ -343,14 +301,15 @@ def test_a_new_stop_leaves_light_as_it_was_and_may_go_again():
         np.testing.assert_allclose(shown(again, name), shown(model, name), atol=2e-5)
 
 
-def test_baked_harmonics_follow_light():
+@CHANNELS
+def test_baked_harmonics_follow_light(channels):
     """A network blind but for light: degree 2 of what a small light adds, to its rounding."""
     bare = make_random_model(20, k=1)
-    color = carried(bare.networks["color"], 16)
+    color = carried(bare.networks["color"], 16, channels)
     first = color.weights[0].copy()
     first[:, 16:19] = 0
     color = replace(color, weights=(first, color.weights[1]))
-    light = np.random.default_rng(1).normal(0, 0.02, (20, WIDTH)).astype(np.float32)
+    light = np.random.default_rng(1).normal(0, 0.02, (20, WIDTHS[channels])).astype(np.float32)
     model = replace(bare, networks=bare.networks | {"color": color}, light=light)
     plain = bake(model, 0.0, sh_degree=2)
     there = Evaluator(model).geometry(0.0)[3] >= 1 / 255
@@ -364,14 +323,14 @@ def test_baked_harmonics_follow_light():
 def test_the_slope_of_colours_counts_light():
     """Light of degree 1 alone, all else blind: |dl / dangle| has the mean square |c|^2 / 3."""
     bare = without_control(make_random_model(4000, k=1), "color")
-    color = carried(bare.networks["color"], 16)
+    color = carried(bare.networks["color"], 16, 1)
     first = color.weights[0].copy()
     first[:32] = 0
     last = color.weights[1].copy()
     last[:, :32] = 0
     flat = (np.zeros_like(color.biases[0]), np.zeros_like(color.biases[1]))
     color = replace(color, weights=(first, last), biases=flat)
-    light = np.zeros((4000, WIDTH), np.float32)
+    light = np.zeros((4000, 8), np.float32)
     light[:, 2] = 0.2
     model = replace(bare, networks=bare.networks | {"color": color}, light=light)
     # A quarter: the sigmoid's slope at 0.  4,000 random directions: to 2 %.

@@ -40,7 +40,7 @@ def situation(seed: int, layout: HeadLayout = LAYOUT):
     }
     own = {
         "frames": rng.normal(0, 0.5, (5, 7)), "colors": rng.normal(size=(5, 3)),
-        "light": rng.normal(0, 0.5, (5, 8)),
+        "light": rng.normal(0, 0.5, (5, 24)),
     }  # fmt: skip
     parameters |= {n: own[n].astype(np.float32) for n in layout.per_anchor[2:]}
     control = rng.random(4).astype(np.float32)

@@ -222,7 +222,7 @@ def test_a_change_of_the_state_keeps_the_others_moments():
         ("features", 8),
         ("frames", 7),
         ("colors", 3),
-        ("light", 8),
+        ("light", 24),
     ):
         for part in ("value", "mean", "square"):
             state[f"{name}.{part}"] = RNG(0).normal(size=(4, width)).astype(np.float32)
@@ -256,7 +256,7 @@ def test_a_package_within_its_megabytes(tmp_path, features, max_mb, lit):
         "features.value": rng.normal(size=(most, -(-features // 8) * 8)).astype(np.float32),
         "frames.value": rng.normal(size=(most, 7)).astype(np.float32),
         "colors.value": rng.normal(size=(most, 3)).astype(np.float32),
-        "light.value": rng.normal(size=(most, 8)).astype(np.float32),
+        "light.value": rng.normal(size=(most, 24)).astype(np.float32),
     }  # noise, which does not compress
     model = model_of(state, layout, 0.1, encoding, STOPS, {"settings": settings.as_dict()})
     size = write_package(model, tmp_path / "a.shift")

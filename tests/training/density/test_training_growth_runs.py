@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.baselines.plain import one_modality
@@ -131,6 +132,23 @@ def test_light_rests_until_its_share_of_the_run_and_where_exposures_differ(
     assert moved == [False] * begun + [alike] * (20 - begun)
 
 
+def test_a_checkpoint_with_one_channel_of_light_goes_on_with_one(device, balls, monkeypatch):
+    """As this program wrote them before it had three."""
+    monkeypatch.setattr(Exposures, "alike", lambda self, modality: True)
+    settings = replace(BASE, **WAYS["with light"], iterations=20, grow=False)
+    state, notes = run(Trainer(device, balls, replace(settings, iterations=12))).checkpoint()
+    assert state["light.value"].shape[1] == 24
+    old = state | {name: state[name][:, :8] for name in state if name.startswith("light.")}
+    trainer = run(Trainer(device, balls, settings, resume=(old, notes)))
+    model = trainer.model()
+    assert trainer.layout.light_channels == 1 and model.light.shape[1] == 8
+    assert (model.light != old["light.value"]).any(), "it still learns"
+    eye, stop = np.array([0.3, 1.0, 2.5]), balls.stops[0]
+    drawn = trainer.step.decode(trainer.control(stop.name), eye)
+    shown = evaluate(model, stop.x, eye).color
+    np.testing.assert_allclose(device.download(drawn.color), shown, rtol=0, atol=2e-5)
+
+
 def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
     root, out = Path(__file__).resolve().parents[3], tmp_path / "light.csv"
     program = [sys.executable, "tools/colors/light.py", str(balls.folder), "--out", str(out)]
@@ -140,8 +158,8 @@ def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
     rows = list(csv.DictReader(out.read_text().splitlines()[2:]))
     assert [row["modality"] for row in rows] == 2 * ["RGB", "Thermal", "mean"]
     size = [int(row["package_bytes"]) for row in rows]
-    # Eight halves an anchor, less what deflating saves and with the name of an array.
-    assert 300 * 8 < size[3] - size[0] < 300 * 16 + 600
+    # 24 halves an anchor, less what deflating saves and with the name of an array.
+    assert 300 * 24 < size[3] - size[0] < 300 * 48 + 600
     assert all(float(row["psnr_db"]) > 10 for row in rows)
 
 

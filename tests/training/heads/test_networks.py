@@ -74,6 +74,7 @@ LAYOUTS = [
     HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=("frame",)),
     HeadLayout(splats=3, features=7, hidden=9, attributes=("color",)),
     HeadLayout(splats=3, features=7, hidden=9, attributes=("light",)),
+    HeadLayout(splats=3, features=7, hidden=9, attributes=("light",), light_channels=1),
     HeadLayout(splats=3, features=7, hidden=9, control=5, fixed=("offset", "scale", "rotation")),
     HeadLayout(splats=2, hidden=12, fixed=HEADS, view_dependent=False),
 ]
@@ -202,14 +203,15 @@ def activated(layout, raw, rows):
     return activate_reference(by_head, anchors, VOXEL, *own, directions(anchors, EYE))
 
 
+@pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("spread", [0.5, 20.0])  # 20: every activation saturates somewhere
-def test_activations_and_their_gradient(device, spread):
-    layout = HeadLayout(splats=3, attributes=EVERY)
+def test_activations_and_their_gradient(device, spread, channels):
+    layout = HeadLayout(splats=3, attributes=EVERY, light_channels=channels)
     rng = np.random.default_rng(2)
     anchors = rng.normal(size=(21, 3)).astype(np.float32)
     raw = (spread * rng.normal(size=(21, layout.raw_at[-1]))).astype(np.float32)
     activation = Activation(device, layout, VOXEL)
-    own = {n: rng.normal(0, 0.7, (21, width)) for n, width in ATTRIBUTE_WIDTH.items()}
+    own = {n: rng.normal(0, 0.7, (21, width)) for n, width in layout.widths.items()}
     rows = {"anchors": anchors} | {n: a.astype(np.float32) for n, a in own.items()}
     there = {name: device.upload(array) for name, array in rows.items()}
     splats = activation.forward(device.upload(raw), there, EYE)
@@ -292,7 +294,7 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     encoding, stops = ControlEncoding(layout.control), (Stop("RGB", 0.0), Stop("Heat", 1.0))
     state = {"weights.value": weights, "anchors.value": anchors, "features.value": features}
     rng = np.random.default_rng(5)
-    widths = {n: ATTRIBUTE_WIDTH[n] for n in layout.per_anchor[2:]}
+    widths = {n: layout.widths[n] for n in layout.per_anchor[2:]}
     own = {n: rng.normal(size=(21, w)).astype(np.float32) for n, w in widths.items()}
     state |= {f"{n}.value": array for n, array in own.items()}
     exported = model_of(state, layout, VOXEL, encoding, stops, {})

@@ -34,26 +34,28 @@ def worst_db(device, model, coarse, turn):
     return min(found)
 
 
-def lit_as_by_train(model):
-    """The model with light that two units of the colour network add to every logit."""
+def lit_as_by_train(model, channels):
+    """The model with light that two units a channel of the colour network add to the logits."""
     color = model.networks["color"]
     first, last = color.weights
-    carry = np.zeros((2, first.shape[1] + 1), np.float32)
-    carry[:, -1] = 1, -1
-    first = np.vstack([np.pad(first, ((0, 0), (0, 1))), carry])
-    last = np.hstack([last, np.tile(np.float32([1, -1]), (len(last), 1))])
+    both = np.concatenate([np.eye(channels), -np.eye(channels)]).astype(np.float32)
+    carry = np.pad(both, ((0, 0), (first.shape[1], 0)))
+    first = np.vstack([np.pad(first, ((0, 0), (0, channels))), carry])
+    adds = np.tile(both.T, (len(last) // channels, 1))  # output o is of channel o % 3
+    last, more = np.hstack([last, adds]), 2 * channels
     color = replace(
-        color, weights=(first, last), biases=(np.pad(color.biases[0], (0, 2)), color.biases[1]),
+        color, weights=(first, last), biases=(np.pad(color.biases[0], (0, more)), color.biases[1]),
         inputs=(*color.inputs, "light"),
     )  # fmt: skip
-    light = np.random.default_rng(8).normal(size=(len(model.anchors), 8)).astype(np.float32)
+    light = np.random.default_rng(8).normal(size=(len(model.anchors), 8 * channels))
+    light = light.astype(np.float32)
     return replace(model, networks=model.networks | {"color": color}, light=light)
 
 
-@pytest.mark.parametrize("lit", [False, True])
+@pytest.mark.parametrize("lit", [0, 1, 3])
 def test_it_comes_nearer_at_every_x_and_networks_stay(lit):
     model = make_random_model(200)
-    model = lit_as_by_train(model) if lit else model
+    model = lit_as_by_train(model, lit) if lit else model
     device, coarse = open_device(), average_anchors(model, 0.5)
     learned, steps = distill(device, model, coarse, views(), 1e9, most_steps=60)
     assert steps == 60 and learned.networks is model.networks

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.colors.light_harmonics import WIDTHS
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, BadFile
 from shapeshift.runtime_models.package.write_package import package_files, write_package
@@ -128,12 +129,12 @@ def test_what_it_decodes_is_what_the_package_shows(device, visits, base):
         np.testing.assert_allclose(color[:old], shown.color[:old], rtol=0, atol=2e-5)
 
 
-@pytest.fixture(scope="module")
-def lit(base) -> UpdateBase:
-    """The scene with random light by direction, as training exports it."""
-    model = base.model
-    light = np.random.default_rng(0).normal(0, 0.5, (len(model.anchors), 8)).astype(np.float16)
-    color = with_light(model.networks["color"], model.features.shape[1])
+@pytest.fixture(scope="module", params=[1, 3])
+def lit(base, request) -> UpdateBase:
+    """The scene with random light by direction, as training exports it, today and before."""
+    model, size = base.model, (len(base.model.anchors), WIDTHS[request.param])
+    light = np.random.default_rng(0).normal(0, 0.5, size).astype(np.float16)
+    color = with_light(model.networks["color"], model.features.shape[1], request.param)
     networks = model.networks | {"color": color}
     return replace(base, model=replace(model, networks=networks, light=light.astype(np.float32)))
 
@@ -155,7 +156,7 @@ def test_light_outside_stays_to_the_bit_and_inside_learns(device, visits, lit):
     )
 
 
-@pytest.mark.parametrize("where", ["first", "bias", "last"])
+@pytest.mark.parametrize("where", ["first", "bias", "last", "channels"])
 def test_light_that_a_network_mixes_with_others_is_refused(lit, where):
     color = lit.model.networks["color"]
     first, last = (weight.copy() for weight in color.weights)
@@ -165,7 +166,14 @@ def test_light_that_a_network_mixes_with_others_is_refused(lit, where):
     if where == "bias":
         bias[-1] = 0.1
     if where == "last":
-        last[0, -1] *= 2
+        last[:, -1] *= 2
+    if where == "channels":  # of one there is none to take for another
+        at = color.inputs.index("direction")
+        width = lit.model.features.shape[1] + 3
+        assert color.inputs[at + 1] == "light"
+        if lit.model.light.shape[1] == 8:
+            pytest.skip("one channel")
+        first[-1, width : width + 2] = -1
     color = replace(color, weights=(first, last), biases=(bias, color.biases[1]))
     mixed = replace(lit.model, networks=lit.model.networks | {"color": color})
     with pytest.raises(BadFile, match="mixes light by direction with its other inputs; scenes"):

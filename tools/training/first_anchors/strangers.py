@@ -7,7 +7,9 @@ Kinds are those of training/synthetic/strangers.py, each another place for anoth
 spot and read as a stranger's files are.  Both models have the same processor seconds of one core
 and start from what the program itself finds.  psnr_db: of all held-out photos; worst_db: of the
 worst of them; fitted_db: of their right halves, with the colours fitted on the left ones, which is
-what counts where exposures differ; start_s: processor seconds until the first step, which --seconds
+what counts where exposures differ; whole_db, where something stands still behind the subject: of
+whole photos, which are drawn before it; subject_db: of the pixels that the tracer's subject fills,
+in the same drawings; start_s: processor seconds until the first step, which --seconds
 counts.
 """
 
@@ -35,20 +37,27 @@ from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.training.baselines.plain import PlainTrainer  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
+from shapeshift.training.drawing import DrawnView  # noqa: E402
+from shapeshift.training.evaluation.evaluate import before  # noqa: E402
+from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
 from shapeshift.training.photos import BLACK  # noqa: E402
 from shapeshift.training.settings import TrainSettings, suited  # noqa: E402
 from shapeshift.training.supervision.exposure import fitted_psnr  # noqa: E402
-from shapeshift.training.synthetic.strangers import KINDS, make_stranger  # noqa: E402
+from shapeshift.training.supervision.still_background import key_of  # noqa: E402
+from shapeshift.training.synthetic.strangers import KINDS, make_stranger, mask_of  # noqa: E402
+from shapeshift.training.synthetic.tracer import Place  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 
 COLUMNS = (
-    "capture", "seed", "model", "psnr_db", "worst_db", "fitted_db", "seconds", "steps", "start_s",
-    "count", "origin", "said",
+    "capture", "seed", "model", "psnr_db", "worst_db", "fitted_db", "whole_db", "subject_db",
+    "seconds", "steps", "start_s", "count", "origin", "said",
 )  # fmt: skip
 MODELS = {"anchors": (Trainer, TrainSettings), "splats": (PlainTrainer, PlainSettings)}
 
 
-def trained(device, capture: Capture, model: str, options: argparse.Namespace, seed: int) -> dict:
+def trained(
+    device, capture: Capture, model: str, options: argparse.Namespace, seed: int, place: Place
+) -> dict:
     make, settings = MODELS[model]
     asked = settings(iterations=None, seconds=options.seconds, seed=seed)
     if isinstance(asked, TrainSettings):
@@ -71,10 +80,26 @@ def trained(device, capture: Capture, model: str, options: argparse.Namespace, s
     return {
         "psnr_db": f"{sum(each) / len(each):.2f}", "worst_db": f"{min(each):.2f}",
         "fitted_db": f"{sum(fitted) / len(fitted):.2f}",
+        **of_whole_photos(run, drawn, place),
         "seconds": f"{run.elapsed:.1f}", "steps": run.iteration, "start_s": f"{start_s:.1f}",
         "count": len(run.adam[run.param_group]), "origin": run.origin,
         "said": " ".join(run.warnings).replace(str(capture.folder), capture.folder.name),
     }  # fmt: skip
+
+
+def of_whole_photos(run, drawn: list[DrawnView], place: Place) -> dict[str, str]:
+    """Scores of held-out photos as they were before what stands still was left out."""
+    if not run.still.pictures:
+        return {}
+    whole, subject = [], []
+    for drawing, photo in zip(drawn, run.held_out, strict=True):
+        picture = before(run.device, drawing.frame, run.still.pictures[key_of(photo)])
+        wanted = photo.rgba[..., :3].astype(np.float32) / 255
+        there = (mask_of(photo.view, place, 0) >= 0.5).astype(np.float32)
+        whole.append(psnr(picture, wanted))
+        subject.append(psnr(picture, wanted, there))
+    names = {"whole_db": whole, "subject_db": subject}
+    return {name: f"{sum(values) / len(values):.2f}" for name, values in names.items()}
 
 
 def draw(run, view: View):
@@ -135,10 +160,10 @@ def main() -> None:
             for seed in options.seeds:
                 there = Path(folder) / str(seed) / kind
                 there.mkdir(parents=True)
-                make_stranger(there, kind, seed)
+                place, _ = make_stranger(there, kind, seed)
                 for model in options.models:
                     try:
-                        found = trained(device, read_capture(there), model, options, seed)
+                        found = trained(device, read_capture(there), model, options, seed, place)
                     except BadFile as why:
                         found = {"said": str(why).replace(str(there), kind)}
                     rows.writerow({"capture": kind, "seed": seed, "model": model} | found)
