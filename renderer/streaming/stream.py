@@ -101,7 +101,7 @@ class Stream:
         drawing.allocate_pages(list(models), pages, coefficients, stored)
         self.follows_eye = coefficients > 1  # then its colours are decoded a frame
         self.table = PageTable(pages, int(self.first[-1]))
-        self._fades = Fades(drawing, self.table)
+        self.fades = Fades(drawing, self.table)
         self._uploader = Uploader(drawing, self.table, self.objects, nodes, self.first)
         self.weights = Weights(int(self.first[-1]), self._look())
         self._fetcher = Fetcher()
@@ -162,7 +162,7 @@ class Stream:
         changed, moved = self._change(wanted, worth, self._held_nodes(sight))
         self._last = now
         splats = int(self.table.splats[changed].sum())
-        pending = bool((wanted != self.table.level).any() or self._fades.leaves.any())
+        pending = bool((wanted != self.table.level).any() or self.fades.leaves.any())
         self.stats = self._stats(splats, pending, int(self._finest[sight.held].sum()))
         return sorted({self.objects[i] for i in np.unique(self._object[moved])})
 
@@ -231,7 +231,7 @@ class Stream:
         """Brings the arena nearer to the wanted levels; the leaves with other levels, and all that
         have other pages.  stayed: (N,) bool, nodes whose place was in the last picture, too.
         """
-        table, fades = self.table, self._fades
+        table, fades = self.table, self.fades
         over = [fades.end(np.flatnonzero(fades.leaves))] if self.converges else []
         level = wanted = patient(self.tree, wanted, table.level, fades.leaves)
         before = table.level.copy()
@@ -310,7 +310,7 @@ class Stream:
         if not self.stats.pending:
             return False
         decoded = sum(int(np.count_nonzero(there)) for there in self._from.at_hand())
-        fades = bool(self._fades.leaves.any())
+        fades = bool(self.fades.leaves.any())
         return fades or self.stats.changed > 0 or decoded != self._decoded
 
     def _first_of(

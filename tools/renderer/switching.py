@@ -124,14 +124,14 @@ def change(
     level = stream.table.level[one] + step
     stream.table.retire(one)
     stream._upload(one, level)
-    stream._fades.begin(one, np.array([step < 0]))
+    stream.fades.begin(one, np.array([step < 0]))
     if at_once:
-        stream._fades.end(one)
+        stream.fades.end(one)
     while True:
         pictures.append(picture(renderer, view))
-        if not stream._fades.leaves.any():
+        if not stream.fades.leaves.any():
             break
-        stream._fades.advance()
+        stream.fades.advance()
     differences = [np.abs(b - a).mean(axis=2) for a, b in pairwise(pictures)]
     return [255 * float((d * weight).sum() / weight.sum()) for d in differences]
 

@@ -43,7 +43,7 @@ def test_both_levels_are_drawn_for_so_many_frames_and_then_one(moving):
         moving.draw([view])
         table = stream.table
         before, ages = ages, np.zeros_like(ages)
-        for leaf in np.flatnonzero(stream._fades.leaves):
+        for leaf in np.flatnonzero(stream.fades.leaves):
             new = pages.weight[table.pages_of(np.array([leaf]))]
             old = pages.weight[table.leaving(np.array([leaf]))]
             ages[leaf] = before[leaf] % len(PARTS) + 1  # frame by frame; then perhaps again
@@ -54,7 +54,7 @@ def test_both_levels_are_drawn_for_so_many_frames_and_then_one(moving):
             np.testing.assert_allclose(new, part, atol=1e-6)
             np.testing.assert_allclose(old, 1 - part, atol=1e-6)
             seen.add((bool(finer[leaf]), len(new) > 0, len(old) > 0))
-        fading = np.flatnonzero(stream._fades.leaves)
+        fading = np.flatnonzero(stream.fades.leaves)
         others = np.setdiff1d(np.flatnonzero(table.leaf_of >= 0), table.pages_of(fading))
         assert (pages.weight[others] == 1).all()
         assert set(np.unique(table.left[table.left >= 0])) <= set(fading)

@@ -203,7 +203,7 @@ def test_what_goes_and_leaves_nothing_fades_and_so_does_what_comes(crowd, monkey
             stream.left = int(part * whole)
             for _ in range(80):
                 pending = crowd.draw([view]).streaming.pending
-                fades = stream._fades.leaves & ~related(stream.tree, stream.table.level >= 0)
+                fades = stream.fades.leaves & ~related(stream.tree, stream.table.level >= 0)
                 lone += np.count_nonzero(fades)
                 pictures.append(crowd.image(0).copy())
                 if not pending:
