@@ -11,7 +11,7 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
-from shapeshift.app.errors import UsageError
+from shapeshift.app.errors import UsageError, as_typed
 from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.files.whole_file import whole_file
@@ -138,7 +138,7 @@ def read_look(options: LookOptions) -> tuple[Appearance, Background | None]:
         tint = three(options.tint)
         appearance = Appearance(options.exposure, options.gamma, tint, options.opacity)
     except ValueError as error:
-        raise UsageError(f"--{error}") from None
+        raise as_typed(error, type(options)) from None
     if options.sky is None:
         return appearance, options.background
     if options.background is not None:

@@ -178,6 +178,7 @@ def describe(model: Model, path: str | Path) -> dict:
     facts: dict[str, object] = {
         "format": format_name(model) if isinstance(model, AnchorModel) else file_format,
         "anchors": 0 if isinstance(model, SplatLayers) else len(model.anchors),
+        **({"made_of": plain_words(model)} if isinstance(model, SplatLayers) else {}),
         "splats": model.splat_count,
         "sh_degree": (
             round(model.sh.shape[1] ** 0.5) - 1 if isinstance(model, SplatLayers) else None
@@ -216,6 +217,16 @@ def describe(model: Model, path: str | Path) -> dict:
         | describe_labels(model)
         | describe_findings(model)
     )
+
+
+def plain_words(model: SplatLayers) -> str:
+    """What stands in place of anchors in a scene without networks."""
+    if model.motion is not None:
+        return "plain splats that move with x"
+    if model.leaves is not None or "level" in model.provenance:
+        return "plain splats in levels of detail"
+    layers = len(model.stops)
+    return "plain splats" if layers == 1 else f"plain splats in {layers} layers"
 
 
 def describe_blocks(model: AnchorModel) -> dict:

@@ -16,6 +16,7 @@ from shapeshift.scene.captures.lenses.panorama import (
     faces_of,
     is_panorama,
 )
+from shapeshift.scene.captures.lenses.turned import quarter_of, turned_lens
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.undistort import is_straight, lost, pinhole_of
 from shapeshift.scene.pose import View
@@ -63,7 +64,10 @@ def posed_photo(
 
     world_from_camera: (4, 4) OpenCV axes, our world; lens: of the size that the capture states.
     """
-    lens = of_size(lens, image_size(path, None), path)
+    size = image_size(path, None)
+    if not fits(lens.size, size):
+        world_from_camera, lens = as_it_lies(path, world_from_camera, lens)
+    lens = of_size(lens, size, path)
     try:
         if is_straight(lens, where):
             view = View.from_pinhole(world_from_camera, lens.focal, lens.centre, lens.size)
@@ -75,6 +79,28 @@ def posed_photo(
     return Photo(view, path, modality, lens=lens)
 
 
+def as_it_lies(
+    path: Path, world_from_camera: np.ndarray, lens: ColmapCamera
+) -> tuple[np.ndarray, ColmapCamera]:
+    """Camera and lens for the pixels in the file, where EXIF turns these by a quarter and the
+    capture is about the upright photo; else as they are.
+    """
+    with open_image(path) as image:
+        turn = quarter_of(image, lens)
+    if turn is None:
+        return world_from_camera, lens
+    pose = np.array(world_from_camera, np.float64)
+    pose[:3, :3] = pose[:3, :3] @ turn
+    return pose, turned_lens(lens, turn)
+
+
+def fits(stated: tuple[int, int], size: tuple[int, int]) -> bool:
+    """Whether a file of `size` pixels may be one of `stated` that was made smaller or larger."""
+    across, down = (new / old for new, old in zip(size, stated, strict=True))
+    off = abs(stated[1] * across - size[1]), abs(stated[0] * down - size[0])
+    return min(off) <= 1  # a pixel: sides are rounded
+
+
 def of_size(lens: ColmapCamera, size: tuple[int, int], path: Path) -> ColmapCamera:
     """The lens for a file of `size` pixels: photos may have been made smaller after the poses.
 
@@ -82,10 +108,9 @@ def of_size(lens: ColmapCamera, size: tuple[int, int], path: Path) -> ColmapCame
     """
     if lens.size == size:
         return lens
-    across, down = (new / old for new, old in zip(size, lens.size, strict=True))
-    off = abs(lens.size[1] * across - size[1]), abs(lens.size[0] * down - size[0])
-    if not min(off) <= 1:  # a pixel: sides are rounded
+    if not fits(lens.size, size):
         image_size(path, lens.size)
+    across, down = (new / old for new, old in zip(size, lens.size, strict=True))
     scales = (across, down) if len(lens.focals) == 2 else ((across + down) / 2,)
     scales = (*scales, across, down)
     params = [value * scale for value, scale in zip(lens.params, scales, strict=False)]
@@ -100,12 +125,13 @@ def doubts_of(
     rescaled: list[str],
     no_depth: Sequence[str] = (),
     no_normals: Sequence[str] = (),
+    turned: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """What a person should know of a capture's files, a sentence each.
 
     named: photos that the capture names, of which the files `missing` are not there; rescaled:
     photos of another size than it says; no_depth, no_normals: photos whose depth photo or
-    normal map is not there.
+    normal map is not there; turned: photos that were read by as_it_lies.
     """
     said = []
     if missing:
@@ -117,6 +143,12 @@ def doubts_of(
         said.append(
             f"{len(rescaled)} photos have another size than the capture says, for example "
             f"{path_end(rescaled[0])}; the intrinsics are scaled with them."
+        )
+    if turned:
+        said.append(
+            f"{len(turned)} photos lie on their side in the file, as EXIF says, for example "
+            f"{path_end(turned[0])}; the capture is about the upright ones, so their cameras are "
+            "turned."
         )
     if no_depth:
         said.append(

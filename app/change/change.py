@@ -72,7 +72,7 @@ def run(options: Options) -> int:
     choice = ChangeChoice(
         options.cell / 1000, options.millimetres / 1000, options.degrees, options.colour, size
     )
-    choice.settings(1.0)  # refused before anything is read
+    refuse_amounts(options)  # before anything is read
     if options.out is not None:
         check_folder(options.out, options.overwrite)
     names = options.scene_a.name, options.scene_b.name
@@ -102,3 +102,15 @@ def run(options: Options) -> int:
     if options.out is not None:
         say(f"written to {full(options.out)}; look: launch.py {full(options.out / 'layers')}")
     return 0
+
+
+def refuse_amounts(options: Options) -> None:
+    """Raises UsageError for what is no amount."""
+    from shapeshift.app.errors import UsageError
+
+    for name, value in (("--cell", options.cell), ("--millimetres", options.millimetres)):
+        if not 0 <= value < float("inf"):
+            raise UsageError(f"{name} is {value:g}; 0 (by the scene) or more is wanted.")
+    for name, value in (("--degrees", options.degrees), ("--colour", options.colour)):
+        if not 0 < value < float("inf"):
+            raise UsageError(f"{name} is {value:g}; more than 0 is wanted.")

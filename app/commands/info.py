@@ -42,7 +42,7 @@ def print_table(facts: dict) -> None:
 
     table = Table(show_header=False)
     for key, value in facts.items():
-        if value is None:
+        if value is None or (key == "anchors" and value == 0):  # made_of says what is there instead
             continue
         if key == "stops":
             value = "\n".join(f"{s['x']:.3f}  {s['name']} ({s['kind']})" for s in value)

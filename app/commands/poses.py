@@ -93,7 +93,7 @@ def run(options: Options) -> int:
 
 def settings_of(options: Options) -> "PoseSettings":
     """Raises UsageError."""
-    from shapeshift.app.errors import UsageError
+    from shapeshift.app.errors import as_typed
     from shapeshift.decomposition.poses.find_poses import NEIGHBOURS, PoseSettings
     from shapeshift.decomposition.poses.video_frames import VIDEOS
 
@@ -105,7 +105,7 @@ def settings_of(options: Options) -> "PoseSettings":
             length=parse_length(options.metres), straight=options.undistort,
         )  # fmt: skip
     except ValueError as error:
-        raise UsageError(f"{error}.") from None
+        raise as_typed(error, PoseSettings, {"length": "metres"}) from None
 
 
 def parse_length(text: str) -> "Length | None":

@@ -277,14 +277,14 @@ def unit_of(options: Options, document: "Document", views: list) -> float:
 
 def choose_settings(options: Options):
     """The RenderSettings of the options; UsageError names what is out of range."""
-    from shapeshift.app.errors import UsageError
+    from shapeshift.app.errors import as_typed
     from shapeshift.renderer.settings import RenderSettings
 
     try:
         names = ("debug", "stereo_colors", "foveation", *LIMITS)
         return RenderSettings(**{name: getattr(options, name) for name in names})
     except ValueError as error:
-        raise UsageError(f"--{str(error).replace('_', '-', 1)}") from None
+        raise as_typed(error, RenderSettings) from None
 
 
 def with_words(settings, stereo_colors: str, foveation: str):
@@ -322,7 +322,7 @@ def choose_paths(
     views = views or (options.frames if options.camera == "orbit" else 1)
     count = len(labels) * views
     if count > MOST_VALUES:
-        raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
+        raise UsageError(f"--x and --frames ask for {count} pictures, over {MOST_VALUES}.")
     rows = [(c, i) for c in range(len(labels)) for i in range(views)]
     paths = [options.out / f"{n:04d}_{labels[c]}.png" for n, (c, _) in enumerate(rows)]
     beside = [p.with_suffix(".npy") for p in paths] + [options.out / LEGEND]

@@ -89,7 +89,7 @@ def choose_cases(options: Options) -> list[str]:
             raise UsageError(f"--{name} is {given}, expected {least} to {most}.")
     for name in options.cases:
         if name not in CASES:
-            raise UsageError(f"there is no case '{name}'; choose of {', '.join(CASES)}.")
+            raise UsageError(f"--cases: there is no case '{name}'; choose of {', '.join(CASES)}.")
     return [name for name in CASES if not options.cases or name in options.cases]
 
 

@@ -54,8 +54,7 @@ def check_video(path: Path, codec: str, size: tuple[int, int], fps: float) -> st
     if codec == "h264" and (size[0] % 2 or size[1] % 2):
         even = f"{size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
         raise UsageError(
-            f"the picture has {size[0]}x{size[1]} pixels, and H.264 wants even sides; the next is "
-            f"{even}."
+            f"--size is {size[0]}x{size[1]}, and H.264 wants even sides; the next is {even}."
         )
     if codec == "av1" and min(size) < SMALLEST_AV1:
         raise UsageError(f"AV1 wants sides of {SMALLEST_AV1} pixels and more; --size is smaller.")

@@ -1,8 +1,9 @@
 """Emissivity as `thermal` is told of it: of all that is seen, and of single marks."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import BadFile
@@ -10,6 +11,8 @@ from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.camera_settings import camera_settings
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation, scale_of
 from shapeshift.scene.inspection.marks_file import MarksFile
+
+Made = TypeVar("Made")
 
 
 class EmissionOptions(Protocol):
@@ -61,18 +64,27 @@ def choose_emission(
     camera = _camera(options, unit)
     try:
         scale_of(unit)
-        known = before or as_set(camera)
-        surface = SurfaceRadiation(
-            known.surface.emissivity if of_all is None else of_all,
-            known.surface.reflected if options.reflected is None else options.reflected,
-        )
-        taken, camera_air = camera or (known.taken, known.taken_air)
-        taken = SurfaceRadiation(*options.taken_with) if options.taken_with else taken
-        air = Air(*options.air) if options.air else known.air
-        camera_air = Air(*options.taken_air) if options.taken_air else camera_air
     except ValueError as error:
         raise UsageError(str(error)) from None
+    known = before or as_set(camera)
+    share = known.surface.emissivity if of_all is None else of_all
+    mirrored = known.surface.reflected if options.reflected is None else options.reflected
+    surface = _made("--reflected", SurfaceRadiation, share, mirrored)
+    taken, camera_air = camera or (known.taken, known.taken_air)
+    if options.taken_with:
+        taken = _made("--taken-with", SurfaceRadiation, *options.taken_with)
+    air = _made("--air", Air, *options.air) if options.air else known.air
+    if options.taken_air:
+        camera_air = _made("--taken-air", Air, *options.taken_air)
     return Emission(surface, taken, air, camera_air), own
+
+
+def _made(option: str, kind: Callable[..., Made], *numbers: float) -> Made:
+    """What an option's numbers stand for.  Raises UsageError, one sentence."""
+    try:
+        return kind(*numbers)
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from None
 
 
 def _camera(options: EmissionOptions, unit: str) -> tuple[SurfaceRadiation, Air] | None:

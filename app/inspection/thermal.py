@@ -312,18 +312,21 @@ def with_new_marks(
 def choose_isotherms(options: Options) -> "list[Isotherm]":
     """Those of the options.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.scene.inspection.marks import Isotherm
+    from shapeshift.scene.inspection.marks import Bound, Isotherm
 
+    asked: dict[Bound, dict[str, float]] = {}
+    if options.above is not None:
+        asked["above"] = {"low": options.above}
+    if options.below is not None:
+        asked["below"] = {"high": options.below}
+    if options.between is not None:
+        asked["between"] = {"low": options.between[0], "high": options.between[1]}
     found = []
-    try:
-        if options.above is not None:
-            found.append(Isotherm("above", low=options.above))
-        if options.below is not None:
-            found.append(Isotherm("below", high=options.below))
-        if options.between is not None:
-            found.append(Isotherm("between", *options.between))
-    except ValueError as error:
-        raise UsageError(str(error)) from None
+    for kind, ends in asked.items():
+        try:
+            found.append(Isotherm(kind, **ends))
+        except ValueError as error:
+            raise UsageError(f"--{kind}: {error}") from None
     return found
 
 

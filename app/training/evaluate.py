@@ -57,6 +57,8 @@ def run(options: Options) -> int:
             f"{options.scene} is a scene file of objects, and photos are of one scene as it was "
             "trained; name the model of one object."
         )
+    if options.downscale is not None and options.downscale < 1:
+        raise UsageError(f"--downscale is {options.downscale}; it has to be at least 1.")
     distance = None if options.vgg is None else VggDistance(options.vgg)
     capture = open_capture(options.capture, options.memory)
     if options.modality is not None:

@@ -62,14 +62,13 @@ class Options(ClusterOptions, MachineOptions):
 
 
 TRIAL = 600  # steps
+FINAL = {"iterations": "final_iterations", "seconds": "final_seconds"}  # of the last run
 WRITTEN = "the fitted model of the first seed with this report in it"
 CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.commands.bench import write_json
-    from shapeshift.app.errors import UsageError
     from shapeshift.app.opening import open_capture
     from shapeshift.app.pace import with_pace
     from shapeshift.app.paths import full
@@ -78,27 +77,23 @@ def run(options: Options) -> int:
     from shapeshift.app.training.trials.run_trial import run_trial
     from shapeshift.app.training.trials.run_trials import (
         calibrated_once,
-        check_places,
         say_of_clock,
     )
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
+    from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.fit.fit import Fit
 
     if options.only is not None:
         return run_trial(options)
-    if options.resume:
-        raise UsageError("--resume goes on with one training; add --only, or leave it out.")
-    if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
-        raise UsageError("--seeds has to be 1 or more, and --tolerance-db 0 or more.")
-    check_cluster(options)
-    if options.cluster != NONE:
-        check_places(options)
-    refuse_foreign(options.out)  # now, not after the trials
+    refuse_options(options)
     settings = settings_of(options.asked | budget(options.iterations, options.seconds))
     longer = options.final_iterations, options.final_seconds
-    last = None if longer == (None, None) else settings_of(options.asked | budget(*longer))
+    last = (
+        None
+        if longer == (None, None)
+        else settings_of(options.asked | budget(*longer), None, FINAL)
+    )
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     settings = suited(settings, options.asked, capture)
     if options.calibrate is not None:
@@ -146,6 +141,25 @@ def trainings(options: Options) -> "Iterator[tuple[ReportProgress, TrainSeeds | 
             bar.update(task, description=what, completed=done)
 
         yield show_progress, None
+
+
+def refuse_options(options: Options) -> None:
+    """Raises UsageError, BadFile for what cannot be done: now, not after the trials."""
+    from shapeshift.app.cluster.open_cluster import check_cluster
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.trials.run_trials import check_places
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
+
+    if options.resume:
+        raise UsageError("--resume goes on with one training; add --only, or leave it out.")
+    if not options.seeds >= 1:
+        raise UsageError(f"--seeds is {options.seeds}; it has to be at least 1.")
+    if not 0 <= options.tolerance_db < float("inf"):
+        raise UsageError(f"--tolerance-db is {options.tolerance_db}; it has to be at least 0.")
+    check_cluster(options)
+    if options.cluster != NONE:
+        check_places(options)
+    refuse_foreign(options.out)
 
 
 def budget(iterations: int | None, seconds: float | None) -> Asked:

@@ -106,7 +106,7 @@ def add(options: Options, model: "AnchorModel") -> int:
 
 def style_of(options: Options, model: "AnchorModel") -> "NewStyle":
     """What the options say of the new stop.  Raises UsageError."""
-    from shapeshift.app.errors import UsageError
+    from shapeshift.app.errors import UsageError, as_typed
     from shapeshift.app.training.style_sources import usual_name
     from shapeshift.runtime_models.model import BadFile
     from shapeshift.runtime_models.stops.insert_stop import insert_stop
@@ -127,7 +127,7 @@ def style_of(options: Options, model: "AnchorModel") -> "NewStyle":
     except BadFile as error:
         raise UsageError(f"--name {name}: {error}") from None
     except ValueError as error:
-        raise UsageError(f"--{error}") from None
+        raise as_typed(error, NewStyle) from None
     return style
 
 

@@ -83,7 +83,7 @@ def run_whole(options: Options) -> int:
     began, before = time.monotonic(), trainer.iteration
     with saved_when_it_fails(trainer, options.out, checkpoint):
         interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
-    step_s = (time.monotonic() - began) / max(trainer.iteration - before, 1)
+    step_s = seconds_a_step(trainer, before, time.monotonic() - began)
     save(trainer, options.out, checkpoint)
     if not interrupted:
         pace_package(options.out)
@@ -160,6 +160,14 @@ def doubts(trainer: "Trainer") -> tuple[list[str], bool]:
         return report(find_outlier_views(trainer, look)), False
     except KeyboardInterrupt:
         return ["The scene is complete; not every photo was looked at for what does not fit."], True
+
+
+def seconds_a_step(trainer: "Trainer", before: int, waited_s: float) -> float:
+    """By the clock of this run, which began after `before` steps.  Where a checkpoint was at its
+    end already, those of the runs before: of a core, the clock's are not kept.
+    """
+    done = trainer.iteration - before
+    return waited_s / done if done > 0 else trainer.elapsed / max(trainer.iteration, 1)
 
 
 def what_next(options: Options, steps: int, step_s: float, interrupted: bool) -> list[str]:

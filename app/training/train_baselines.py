@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from shapeshift.app.errors import UsageError
+from shapeshift.app.errors import UsageError, as_typed
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.progress import working
@@ -117,7 +117,7 @@ def plain_settings(options: Options) -> "PlainSettings":
     try:
         return PlainSettings(**chosen)
     except ValueError as error:
-        raise UsageError(str(error)) from None
+        raise as_typed(error, PlainSettings) from None
 
 
 def share_of(settings: "Kind", capture: "Capture") -> "Kind":
@@ -185,7 +185,7 @@ def begun_or_resumed(settings: "Kind", asked: Asked, state: "Checkpoint | None")
     try:
         return resumed(settings, state[1]["settings"], given, "--")
     except ValueError as error:
-        raise UsageError(str(error)) from None
+        raise as_typed(error, type(settings)) from None
 
 
 def train_model(

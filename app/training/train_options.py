@@ -1,5 +1,6 @@
 """Options of train, those that fit and table share with it, and the settings they ask for."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -82,12 +83,15 @@ class Options(MachineOptions, ClusterOptions):
     the modalities share the budget."""
 
 
-def settings_of(asked: Asked, before: dict[str, Any] | None = None) -> TrainSettings:
+def settings_of(
+    asked: Asked, before: dict[str, Any] | None = None, options: Mapping[str, str] | None = None
+) -> TrainSettings:
     """The usual settings with those that were asked for; or a checkpoint's, with another budget.
 
-    Raises UsageError, also when a resumed run is asked for anything but another budget.
+    options: a setting -> the option that gives it, where that has another name.  Raises UsageError,
+    also when a resumed run is asked for anything but another budget.
     """
-    from shapeshift.app.errors import UsageError
+    from shapeshift.app.errors import as_typed
     from shapeshift.app.paths import plain
     from shapeshift.training.first_anchors.initial import SOURCES
 
@@ -98,4 +102,4 @@ def settings_of(asked: Asked, before: dict[str, Any] | None = None) -> TrainSett
             return resumed(TrainSettings(), before, asked, "--")
         return adjusted(TrainSettings(), asked)
     except ValueError as error:
-        raise UsageError(str(error)) from None
+        raise as_typed(error, TrainSettings, options) from None

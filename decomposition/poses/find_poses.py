@@ -57,13 +57,13 @@ class PoseSettings:
 
     def __post_init__(self) -> None:
         if self.straight and self.masks is not None:
-            raise ValueError("masks lie on the photos as they are; undistort without masks")
-        if not (self.side >= 100 and self.features >= 100 and self.threads >= 0):
-            raise ValueError("side and features are at least 100, threads at least 0")
-        if self.neighbours is not None and not self.neighbours >= 0:
-            raise ValueError("neighbours is at least 0")
+            raise ValueError("masks lie on the photos as they are; undistort without masks.")
+        for name, least in (("side", 100), ("features", 100), ("threads", 0), ("neighbours", 0)):
+            value = getattr(self, name)
+            if value is not None and not value >= least:
+                raise ValueError(f"{name} is {value}; it has to be at least {least}.")
         if self.length is not None and not 0 < self.length.metres < np.inf:
-            raise ValueError("the known length must be above 0 metres")
+            raise ValueError(f"length is {self.length.metres:g} metres; it has to be above 0.")
 
 
 def find_poses(

@@ -165,7 +165,8 @@ class QuadsDrawing(Drawing):
                 with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
                     self._sorter.sort(arena, settings.key_bits)
             with timer.time("splat"):
-                self._splat(group, first + i, settings, sets[i : i + len(group)])
+                in_order = frame is not None and self._sorter.backend == "gl"  # the keys, too
+                self._splat(group, first + i, settings, sets[i : i + len(group)], in_order)
             if settings.depth_scale > 0:
                 with timer.time("depth"):
                     for row, view in enumerate(group):
@@ -174,8 +175,9 @@ class QuadsDrawing(Drawing):
         self._last = len(groups[-1]) - 1
 
     def _splat(
-        self, group: list[View], i: int, settings: RenderSettings, sets: Sequence[int] = ()
-    ) -> None:
+        self, group: list[View], i: int, settings: RenderSettings, sets: Sequence[int] = (),
+        keys_sorted: bool = False,
+    ) -> None:  # fmt: skip
         """Draws views that were projected together, from image i on; two at once where it pays."""
         arena, pair, disparity = self.arena, self.stereo_pair, None
         foveas = foveas_of(group, settings)
@@ -185,7 +187,7 @@ class QuadsDrawing(Drawing):
         alike = len(group) == 2 and not foveas and group[0].size == group[1].size and arena.count
         if pair is not None and alike and not self.draws_heat:
             if settings.low_pass >= LEAST_LOW_PASS:
-                disparity = pair.disparity(arena, group[0].size[0])
+                disparity = pair.disparity(arena, group[0].size[0], keys_sorted)
         if pair is not None and disparity is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
             pair.draw(arena, pictures, disparity, settings.min_alpha, self._splatter.unit)

@@ -13,7 +13,7 @@ import numpy as np
 
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
-from shapeshift.renderer.layout import CULLED_KEY
+from shapeshift.renderer.layout import COUNTS, CULLED_KEY
 
 MAX_RESIDUAL_DISPARITY = 5.5  # pixels between the two ellipses of a splat, in the mean
 FARTHEST = 1e6  # pixels: any larger disparity is refused as well
@@ -33,12 +33,14 @@ class StereoPairSplatter:
         self._screen = gpu.ctx.vertex_array(self._move, [])
         self.targets: moderngl.Framebuffer | None = None
 
-    def disparity(self, arena: Arena, width: int) -> int | None:
+    def disparity(self, arena: Arena, width: int, keys_sorted: bool = False) -> int | None:
         """By how many pixels the right view, as just projected, has to move to lie on the left;
         None where splats lie too differently, so that two draws are no slower, and where the grid
         for pictures of `width` pixels would be wider than the driver draws.
+
+        keys_sorted: the keys were sorted with the order, as on a GPU, and are no splat's own.
         """
-        sampled = disparities(arena)
+        sampled = disparities(arena, keys_sorted)
         if not sampled.size:
             return None
         disparity = int(np.rint(np.clip(np.median(sampled), -FARTHEST, FARTHEST)))
@@ -106,11 +108,12 @@ def grid_width(width: int, disparity: int) -> int:
     return -(-(width + abs(disparity)) // STEP) * STEP
 
 
-def disparities(arena: Arena) -> np.ndarray:
+def disparities(arena: Arena, keys_sorted: bool = False) -> np.ndarray:
     """Pixels by which splats lie further left in the second view than in the first: a sample of
     those that are drawn in both.
     """
     count, found = arena.count, []
+    drawn = drawn_splats(arena) if keys_sorted else None
     for start in np.unique(np.linspace(0, max(count - RUN, 0), SAMPLES).astype(int)).tolist():
         rows = min(RUN, count)
         left, right = (
@@ -118,8 +121,21 @@ def disparities(arena: Arena) -> np.ndarray:
             for row in (0, count)
         )
         left, right = left.reshape(-1, 8), right.reshape(-1, 8)
-        keys = np.frombuffer(arena.keys.read(4 * rows, offset=4 * start), np.uint32)
-        both = (keys != CULLED_KEY) & (left[:, 7] > 0) & (right[:, 7] > 0)  # drawn: bits of 0 are 0
+        if drawn is None:
+            keys = np.frombuffer(arena.keys.read(4 * rows, offset=4 * start), np.uint32)
+            there = keys != CULLED_KEY
+        else:
+            there = drawn[start : start + rows]
+        both = there & (left[:, 7] > 0) & (right[:, 7] > 0)  # drawn: bits of 0 are 0
         x = [np.ascontiguousarray(view[both, 0]).view(np.float32) for view in (left, right)]
         found.append(x[0] - x[1])
     return np.concatenate(found) if found else np.zeros(0, np.float32)
+
+
+def drawn_splats(arena: Arena) -> np.ndarray:
+    """(N,) bool: the splats that the order holds."""
+    place = 4 * COUNTS["SORTED"]
+    (count,) = np.frombuffer(arena.counts.read(4, offset=place), np.uint32).tolist()
+    drawn = np.zeros(arena.count, bool)
+    drawn[np.frombuffer(arena.order.read(4 * count), np.uint32)] = True
+    return drawn

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
 from shapeshift.scene.capture_files import SMALLER, find_file
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
-from shapeshift.scene.capture_photos import doubts_of, posed_photos, refuse_all_missing
+from shapeshift.scene.capture_photos import doubts_of, fits, posed_photos, refuse_all_missing
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
@@ -55,6 +55,7 @@ def read_colmap(folder: Path) -> Capture:
     means = stated_meaning(Fields(said, f"{folder}/capture.json"))
     photos: list[Photo] = []
     rescaled: list[str] = []
+    turned: list[str] = []
     for image, path, world_from_camera in compress(zip(posed, paths, cameras, strict=True), there):
         lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
@@ -63,14 +64,15 @@ def read_colmap(folder: Path) -> Capture:
         if mask is not None:
             refuse_other_mask(mask, made[0].file_size)
         photos += [replace(photo, mask=mask, mask_means=means) for photo in made]
-        rescaled += [str(path)] if made[0].file_size != lens.size else []
+        if made[0].file_size != lens.size:
+            (rescaled if fits(lens.size, made[0].file_size) else turned).append(str(path))
     points, colors, more = points_of(model / f"points3D{ending}")
     counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
     photos = with_counts(listed_split(photos, folder, root), counts)
     background = background_from(said, f"{folder}/capture.json")
     guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
-    doubts = doubts_of(len(posed), missing, photos, rescaled) + unsure + more
+    doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
     return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
 
 

@@ -15,6 +15,7 @@ from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
 from shapeshift.scene.capture_photos import (
     doubts_of,
+    fits,
     posed_photos,
     refuse_all_missing,
 )
@@ -96,14 +97,16 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         where,
     )
     lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
-    photos, rescaled, no_depth, no_normals = [], [], [], []
+    photos, rescaled, turned, no_depth, no_normals = [], [], [], [], []
     for shot, lens in zip(shots, lenses, strict=True):
         photos += (made := photos_of(shot, lens, world, folder))
-        rescaled += [str(shot.path)] if made[0].file_size != lens.size else []
+        if made[0].file_size != lens.size:
+            other = rescaled if fits(lens.size, made[0].file_size) else turned
+            other.append(str(shot.path))
         if not is_panorama(lens):
             no_depth += [str(shot.path)] if made[0].depth is None and shot.names_depth else []
             no_normals += [str(shot.path)] if made[0].normals is None and shot.names_normals else []
-    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth, no_normals)
+    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth, no_normals, turned)
     doubts += stereo_sentences(lenses)
     doubts += doubts_of_entries(shots, entries)
     photos, unsure = meant_by_masks(photos)

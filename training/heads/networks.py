@@ -53,11 +53,13 @@ class HeadLayout:
         for name in self.fixed:
             if name not in HEADS:
                 known = ", ".join(HEADS)
-                raise ValueError(f"There is no head '{name}' to fix; they are {known}.")
+                raise ValueError(f"fixed: there is no head '{name}' to fix; they are {known}.")
         for name in self.attributes:
             if name not in ANCHOR_ATTRIBUTES:
                 known = ", ".join(ANCHOR_ATTRIBUTES)
-                raise ValueError(f"Anchors have no attribute '{name}'; use {known}.")
+                raise ValueError(
+                    f"anchor_attributes: anchors have no attribute '{name}'; use {known}."
+                )
 
     @property
     def own(self) -> tuple[str, ...]:

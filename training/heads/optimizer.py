@@ -14,7 +14,7 @@ BETA1, BETA2 = 0.9, 0.999  # the same numbers stand in adam.cl
 # Towards 0, of a group: each step that shows a value takes so much of it, times the rate, from it.
 # Of light that leaves what the photos agree on: their gradients mostly point one way, those of
 # chance do not.
-PULL = {"light": np.float32(0.1)}
+PULL = {"light": np.float32(0.25)}
 
 
 @dataclass

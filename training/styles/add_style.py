@@ -40,14 +40,13 @@ class NewStyle:
     def __post_init__(self) -> None:
         """ValueError, one sentence."""
         if self.rule and self.rule not in RULES:
-            raise ValueError(f"there is no shape '{self.rule}'; there are {', '.join(RULES)}.")
+            raise ValueError(f"shape: there is none '{self.rule}'; there are {', '.join(RULES)}.")
         if not 0 <= self.strength <= 1:
             raise ValueError(f"strength is {self.strength}; it is a share, 0 to 1.")
-        if not (1 <= self.steps <= MOST_STEPS and self.seed >= 0):
-            raise ValueError(
-                f"steps is {self.steps} and seed {self.seed}; 1 to {MOST_STEPS:,} steps and a seed "
-                "of 0 or more are wanted."
-            )
+        if not 1 <= self.steps <= MOST_STEPS:
+            raise ValueError(f"steps is {self.steps}; 1 to {MOST_STEPS:,} are wanted.")
+        if not self.seed >= 0:
+            raise ValueError(f"seed is {self.seed}; it has to be at least 0.")
 
 
 def refuse_plain(model: Model) -> AnchorModel:

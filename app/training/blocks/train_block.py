@@ -3,7 +3,7 @@
 from functools import partial
 from typing import TYPE_CHECKING
 
-from shapeshift.app.errors import UsageError
+from shapeshift.app.errors import UsageError, as_typed
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
@@ -111,4 +111,4 @@ def settings_of_block(
         usual = {"iterations": TrainSettings().iterations}
         return adjusted(TrainSettings(**start.notes["settings"]), usual | options.asked)
     except ValueError as error:
-        raise UsageError(str(error)) from None
+        raise as_typed(error, TrainSettings) from None

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.cluster.task import Task
-from shapeshift.app.errors import UsageError
+from shapeshift.app.errors import UsageError, as_typed
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
@@ -78,6 +78,8 @@ def wanted_of(text: str, said: str = "--") -> "Wanted":
 
 def refuse_options(options: Options, said: str) -> None:
     """Raises UsageError for what cannot go with --blocks."""
+    from shapeshift.training.settings import TrainSettings, adjusted
+
     if options.out.suffix != ENDING:
         raise UsageError(
             f"{said}out is {options.out.name}; {said}blocks writes a folder, name it "
@@ -97,6 +99,16 @@ def refuse_options(options: Options, said: str) -> None:
         raise UsageError("--blocks: plain splats and --separate are trained as a whole; leave it.")
     for name in options.splats:
         raise UsageError(f"{typed(name, said)} is of plain splats; leave it out.")
+    for name, value, least in (
+        ("coarse_iterations", options.coarse_iterations, 1),
+        ("block_photos", options.block_photos, 0),
+    ):
+        if value is not None and value < least:
+            raise UsageError(f"{typed(name, said)} is {value}; it has to be at least {least}.")
+    try:  # now, not in the tasks
+        adjusted(TrainSettings(), options.asked)
+    except ValueError as error:
+        raise as_typed(error, TrainSettings, said=said) from None
 
 
 def typed(name: str, said: str) -> str:

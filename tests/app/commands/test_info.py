@@ -8,7 +8,9 @@ import pytest
 from shapeshift.app import cli
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.support.models import STOPS, make_random_model
+from tests.support.splat_scenes import shell
 
 KEYS = {"format", "anchors", "splats", "sh_degree", "stops", "bytes"}
 
@@ -43,6 +45,7 @@ def test_layers_of_plain_splats(data, capsys):
     facts = facts_of(capsys, data / "anatomy_leg_ml3dgs")
     assert (facts["format"], facts["anchors"], facts["splats"]) == ("ply", 0, 136_605)
     assert facts["sh_degree"] == 3 and facts["mode"] == "cumulative"
+    assert facts["made_of"] == "plain splats in 3 layers"
     assert [s["x"] for s in facts["stops"]] == [0.0, 0.5, 1.0]
     exclusive = facts_of(capsys, data / "anatomy_leg_ml3dgs", "--mode", "exclusive")
     assert exclusive == facts | {"mode": "exclusive"}
@@ -52,6 +55,19 @@ def test_a_phone_capture(data, capsys):
     path = sorted(data.glob("splats_marcelpadilla/*/*.splat"))[0]
     facts = facts_of(capsys, path)
     assert facts["splats"] == path.stat().st_size // 32 and facts["sh_degree"] == 0
+
+
+@pytest.mark.parametrize(("layers", "said"), [(1, "plain splats"), (2, "plain splats in 2 layers")])
+def test_plain_splats_are_said_to_be_that_and_not_no_anchors(tmp_path, capsys, layers, said):
+    for n in range(layers):
+        write_ply(shell(20, seed=n), tmp_path / f"layer{n}.ply")
+    path = tmp_path if layers > 1 else tmp_path / "layer0.ply"
+    facts = facts_of(capsys, path)
+    assert (facts["anchors"], facts["splats"], facts["made_of"]) == (0, 20 * layers, said)
+    assert info(path) == 0
+    rows = [[word.strip() for word in row.split("│")[1:3]]
+            for row in capsys.readouterr().out.splitlines() if "│" in row]  # fmt: skip
+    assert ["made of", said] in rows and "anchors" not in dict(rows)
 
 
 def test_the_table_says_the_same(tmp_path, capsys):

@@ -3,12 +3,13 @@
 import os
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from shapeshift.app import cli, program
 from shapeshift.app.paths import full
-from shapeshift.app.training.train import FEW_STEPS, Options, what_next
+from shapeshift.app.training.train import FEW_STEPS, Options, seconds_a_step, what_next
 from tests.support.models import random_package
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -60,6 +61,15 @@ def test_a_short_training_says_so_and_how_to_go_on(tmp_path):
     assert look.startswith("look: ")
     assert shlex.split(look)[1 + start :] == [str(tmp_path / "a b.shift")]
     assert "about 6 seconds more" in what_next(asked(tmp_path), 500, 0.004, False)[0]
+
+
+def test_a_run_that_had_nothing_to_do_says_what_steps_took_before():
+    """589 steps in 5.8 s were said to need 38 minutes for 1,411 more."""
+    resumed = SimpleNamespace(iteration=589, elapsed=4.6)
+    assert seconds_a_step(resumed, 0, 11.78) == pytest.approx(0.02)
+    assert seconds_a_step(resumed, 588, 0.5) == 0.5
+    assert seconds_a_step(resumed, 589, 1.6) == pytest.approx(4.6 / 589)
+    assert seconds_a_step(SimpleNamespace(iteration=0, elapsed=0.0), 0, 1.6) == 0
 
 
 def test_a_usual_training_only_says_how_to_look(tmp_path):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.renderer.gl.stereo_pair import disparities
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
@@ -222,3 +223,36 @@ def test_memory_of_a_second_eye_comes_and_goes(ctx):
         assert renderer.drawing.allocations == made, "nothing is made anew in a frame"
         draw_counted(renderer, scene, pair[:1])
         assert len(arena.colors) == 1
+
+
+@pytest.mark.parametrize("key_bits", [16, 32])
+def test_the_disparity_is_that_of_the_same_splats_whatever_sorts(ctx, monkeypatch, key_bits):
+    """The GPU's sort leaves sorted keys behind, so a row's key there is another splat's; records of
+    splats that are culled now are those of the frame that drew them last.
+    """
+    scene, views, samples = two_objects(5000), stereo_views((120, 90)), {}
+    for sort in ("numpy", "gl"):
+        found = []
+
+        def kept(*words, found=found):
+            found.append(disparities(*words))
+            return found[-1]
+
+        monkeypatch.setattr("shapeshift.renderer.gl.stereo_pair.disparities", kept)
+        with Renderer(ctx, "quads", target="rgba32f", sort=sort) as renderer:
+            if renderer.drawing.stereo_pair is None:
+                pytest.skip("a GPU draws the views one after the other")
+            renderer.update(scene)
+            sorts = []
+            for limit, frames in ((1e9, 1), (4.3, 1), (4.3, 5), (4.3, 5)):
+                renderer.settings = RenderSettings(
+                    key_bits=key_bits, resort_frames=frames, max_distance=limit
+                )
+                renderer.draw(views)
+                sorts.append(renderer.drawing.sorts)
+        assert len(found) == 4 and sorts == [1, 1, 1, 0]  # the last has the order before, own keys
+        samples[sort] = found
+    counts = [len(each) for each in samples["numpy"]]
+    assert 100 < counts[1] == counts[2] < counts[0] - 100
+    for one, other in zip(samples["numpy"], samples["gl"], strict=True):
+        np.testing.assert_array_equal(one, other)
