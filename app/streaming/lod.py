@@ -57,6 +57,7 @@ def run(options: Options) -> int:
     from shapeshift.app.commands.exported import check_output
     from shapeshift.app.errors import UsageError
     from shapeshift.app.streaming.lod_files import write_several
+    from shapeshift.app.training.saving import check_writable
 
     if not LEAST_LEAF <= options.leaf <= MOST_LEAF:
         raise UsageError(f"--leaf is {options.leaf}, expected {LEAST_LEAF} to {MOST_LEAF}.")
@@ -72,6 +73,7 @@ def run(options: Options) -> int:
             f"{PACKAGE_LEVELS} for a package."
         )
     check_output(options.out, [options.scene], options.overwrite)
+    check_writable(options.out)
     with progress_after(PATIENCE_S) as progress:
         splats, baked = bake_scene(options, progress)
         for finding in splats.findings:
@@ -106,6 +108,7 @@ def write_package_levels(options: Options) -> int:
         refuse_other,
         write_made,
     )
+    from shapeshift.app.training.saving import check_writable
 
     if not 0 <= options.distill < math.inf:
         raise UsageError(f"--distill is {options.distill}, expected processor seconds, 0 or more.")
@@ -113,8 +116,10 @@ def write_package_levels(options: Options) -> int:
         raise UsageError("--x is of streamed SOG; levels of a package follow x, leave it out.")
     check_output(options.out, [options.scene], options.overwrite)
     refuse_foreign_folder(options.out)
+    check_writable(options.out)
     start = process_time()
     model = refuse_other(open_model(options.scene, options), options.scene)
+    check_room(options.scene, options.out)
     with progress_after(PATIENCE_S) as progress:
         made = make_levels(model, options.distill, progress)
     size = write_made(made, options.scene, options.out)
@@ -132,6 +137,23 @@ def write_package_levels(options: Options) -> int:
     seconds = process_time() - start
     say(f"{full(options.out)}: {size:,} bytes, {seconds:.0f} s of processor time.")
     return 0
+
+
+def check_room(package: Path, out: Path) -> None:
+    """Raises UsageError where not even the package itself would fit: now, not after minutes."""
+    import shutil
+
+    from shapeshift.app.errors import UsageError
+
+    files = [package] if package.is_file() else package.rglob("*")
+    wanted = sum(file.stat().st_size for file in files if file.is_file())
+    there = next(folder for folder in out.absolute().parents if folder.exists())
+    free = shutil.disk_usage(there).free
+    if free < wanted:
+        raise UsageError(
+            f"--out {out}: {free:,} bytes are free there, and the package alone has {wanted:,}; "
+            "make room, or name another place."
+        )
 
 
 def bake_scene(

@@ -6,6 +6,7 @@ on what it does not like: none of this may happen to the program.
 
 import json
 import queue
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from shapeshift.runtime_models.model import BadFile
 
 Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
 POLL_S = 0.5
+FULL_BYTES = 1 << 20  # less is left on a full disk: its last write wanted more
 ABSENT = 3  # the exit code of a script where pycolmap is not installed or does not load
 
 
@@ -50,6 +52,8 @@ def run_child(
         raise BadFile(
             "pycolmap, which photos are matched with, is not installed; install the requirements."
         )
+    if code and shutil.disk_usage(log.parent).free < FULL_BYTES:  # C++ ends with SIGABRT then
+        raise BadFile(f"the disk of {log.parent} is full; make room there and start it again.")
     if code:
         raise BadFile(failure.format(code=code, log=log))
     return reports

@@ -1,6 +1,7 @@
 """lod: a folder that this program and others open, refusals in one sentence, nothing lost."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 
@@ -61,6 +62,29 @@ def test_refusals_are_one_sentence(scene, tmp_path, monkeypatch, capsys, words, 
     assert said in text and "Traceback" not in text
     assert (tmp_path / "there" / "own.txt").read_text() == "kept"
     assert not (tmp_path / "b").exists()
+
+
+def test_no_place_and_no_room_are_said_before_the_work(tmp_path, monkeypatch, capsys):
+    """A full disk was said after five minutes of levels, and these were lost."""
+    package = random_package(tmp_path, 40)
+
+    def worked(*_):
+        raise AssertionError("the work began")
+
+    monkeypatch.setattr("shapeshift.app.streaming.lod.bake_scene", worked)
+    monkeypatch.setattr("shapeshift.app.streaming.package_levels.make_levels", worked)
+    for name in ("levels", "levels.lod"):
+        assert cli.main(["lod", str(package), "--out", str(package / name)]) == 2
+        assert "nothing can be written into" in capsys.readouterr().err
+    size = package.stat().st_size
+    for free, began in ((size - 1, False), (size, True)):
+        usage = SimpleNamespace(total=free, used=0, free=free)
+        monkeypatch.setattr("shutil.disk_usage", lambda path, usage=usage: usage)
+        ended = cli.main(["lod", str(package), "--out", str(tmp_path / "b.lod")])
+        assert ended == (cli.FAULT if began else cli.BAD_INPUT)
+        said = capsys.readouterr().err
+        assert ("the work began" in said) == began
+        assert (f"{free:,} bytes are free there, and the package" in said) != began
 
 
 def test_several_scenes_are_the_folders_of_each(scene, tmp_path, capsys):
