@@ -62,8 +62,8 @@ def fill(
     cells = ((points - low) / cell_m).astype(np.int32)
     taken = np.zeros(cells.max(0) + ROOM + 2, bool)
     taken[tuple(cells.T)] = True
-    away = ndimage.distance_transform_edt(~taken)
-    solid = ndimage.distance_transform_edt(away <= GAP) > GAP if hollow else all_solid(away)
+    away = squared_distances(taken, WIDE_GAP)
+    solid = ~within(away > GAP**2, GAP) if hollow else all_solid(away)
     pieces, count = ndimage.label(solid, np.ones((3, 3, 3)))
     sizes = np.bincount(pieces.reshape(-1), minlength=count + 1)
     sizes[0] = 0
@@ -72,10 +72,33 @@ def fill(
     return solid, points[solid[tuple(cells.T)]]
 
 
+def squared_distances(taken: np.ndarray, reach: int) -> np.ndarray:
+    """(X, Y, Z) uint8 squared cells to the nearest taken one; 255 beyond `reach`, at most 15.
+
+    The squares of the distances along each axis add up, so one axis after the other is looked
+    along: a tenth of the time of a transform that knows all distances.
+    """
+    out = np.where(taken, np.uint8(0), np.uint8(255))
+    for axis in range(3):
+        line = np.moveaxis(out, axis, 0)
+        before = line.copy()
+        for step in range(1, min(reach, len(line) - 1) + 1):
+            far = np.minimum(before, np.uint8(255 - step**2)) + np.uint8(step**2)
+            np.minimum(line[step:], far[:-step], out=line[step:])
+            np.minimum(line[:-step], far[step:], out=line[:-step])
+    out[out > reach**2] = 255
+    return out
+
+
+def within(taken: np.ndarray, reach: int) -> np.ndarray:
+    """(X, Y, Z) bool: at most `reach` cells from a taken one."""
+    return squared_distances(taken, reach) <= reach**2
+
+
 def all_solid(away: np.ndarray) -> np.ndarray:
     """Cells that count as solid, of an object that is solid throughout; of a leaking skin, too.
 
-    away: cells from each to the nearest taken one.
+    away: squared cells from each to the nearest taken one.
     """
     solid = enclosed(away, GAP)
     roofed = under_a_roof(away, WIDE_GAP)
@@ -86,27 +109,26 @@ def all_solid(away: np.ndarray) -> np.ndarray:
     return solid | (roofed & walled(solid))
 
 
-def enclosed(away: np.ndarray, gap: float) -> np.ndarray:
+def enclosed(away: np.ndarray, gap: int) -> np.ndarray:
     """Cells that nothing outside comes within `gap` of, if it keeps as far from what is taken.
 
-    away: cells from each to the nearest taken one.  A closing and the filling of holes in one.
+    away: squared cells from each to the nearest taken one.  A closing and the filling of holes in
+    one.
     """
     from scipy import ndimage
 
-    free, _ = ndimage.label(away > gap)
-    outside = free == free[0, 0, 0]
-    return ndimage.distance_transform_edt(~outside) > gap
+    free, _ = ndimage.label(away > gap**2)
+    return ~within(free == free[0, 0, 0], gap)
 
 
-def under_a_roof(away: np.ndarray, gap: float) -> np.ndarray:
+def under_a_roof(away: np.ndarray, gap: int) -> np.ndarray:
     """Cells with walls above (+Y) and on all four sides: the inside of what stood on a floor.
 
-    away: cells from each to the nearest taken one.  Holes up to `gap` either way let nothing in.
+    away: squared cells from each to the nearest taken one.  Holes up to `gap` either way let
+    nothing in.
     """
-    from scipy import ndimage
-
-    walls = away <= gap
-    return ndimage.distance_transform_edt(walls | walled(walls)) > gap
+    walls = away <= gap**2
+    return ~within(~(walls | walled(walls)), gap)
 
 
 def walled(solid: np.ndarray) -> np.ndarray:
@@ -123,24 +145,28 @@ def distance_field(
     solid: np.ndarray, points: np.ndarray, low: np.ndarray, cell_m: float, hollow: bool = False
 ) -> np.ndarray:
     """(X, Y, Z) float32 cells to the surface OFFSET outside of points and solid, below 0 inside."""
-    from scipy import ndimage
     from scipy.spatial import cKDTree
 
     taken = np.zeros_like(solid)
     taken[tuple(((points - low) / cell_m).astype(np.int32).T)] = True
-    bare = solid & (ndimage.distance_transform_edt(~taken) > 1.8)  # no point beside it
-    out = np.minimum(ndimage.distance_transform_edt(~solid), FAR).astype(np.float32)
-    near = (out < 3) & (~solid | (ndimage.distance_transform_edt(solid) < 3))
+    bare = solid & (squared_distances(taken, 2) > 3)  # no point in the cells around it
+    out = cells_away(solid).astype(np.float32)
+    near = (out < 3) & (~solid | (squared_distances(~solid, 3) < 9))
     where = np.argwhere(near)
     tree = cKDTree(thin((points - low) / cell_m))
     away = tree.query(where + 0.5, distance_upper_bound=FAR)[0].astype(np.float32)
     away = np.minimum(away, FAR)  # Inf where no point is so near
     if bare.any():
-        away = np.minimum(away, ndimage.distance_transform_edt(~bare)[near])
+        away = np.minimum(away, cells_away(bare)[near])
     field = np.where(solid, np.float32(-OFFSET), out)
     field[near] = np.where(solid[near], np.minimum(away - OFFSET, -0.1), away - OFFSET)
     field[field == 0] = 1e-6
     return without_channels(field, hollow)
+
+
+def cells_away(taken: np.ndarray) -> np.ndarray:
+    """(X, Y, Z) float64 cells to the nearest taken one, FAR at most."""
+    return np.minimum(np.sqrt(np.arange(256.0)), FAR)[squared_distances(taken, int(FAR))]
 
 
 def without_channels(field: np.ndarray, hollow: bool) -> np.ndarray:
@@ -209,7 +235,7 @@ def draw_in(mesh: TriangleMesh, inside: np.ndarray, cell_m: float) -> TriangleMe
     """Every vertex moved back by the OFFSET, or less where the mesh is thin, in three steps."""
     from scipy import ndimage
 
-    depth = ndimage.distance_transform_edt(inside).astype(np.float32)  # cells
+    depth = cells_away(~inside).astype(np.float32)  # no vertex goes back by more than OFFSET
     vertices = mesh.vertices.astype(np.float64)
     inward = -normals(vertices, mesh.faces)
     half = np.zeros(len(vertices))

@@ -12,6 +12,7 @@ import pytest
 
 from shapeshift.app import cli, progress
 from tests.support.models import random_package
+from tests.support.program import HeardLines
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -69,25 +70,28 @@ def read_some(terminal: int) -> bytes:
         return b""
 
 
-def test_a_line_a_minute_says_what_is_under_way(monkeypatch, capsys):
-    monkeypatch.setattr(progress, "LINE_EVERY_S", 0.05)
-    with progress.lines("demo"):
-        time.sleep(0.12)  # nothing says what is done
-        with progress.working("reading [bold]photos") as report:
-            time.sleep(0.12)
-            report("carving")
-            time.sleep(0.12)
-        for number in progress.tracked(range(4), "photographing [x]"):
-            time.sleep(0.12 if number == 2 else 0)
-        with progress.progress_bar() as bar:
-            bar.add_task("[/] 12 steps", total=1.0, completed=0.4, loss="loss 0.1", psnr="")
-            time.sleep(0.12)
-    time.sleep(0.1)  # it is over: no more of them
-    told = dict.fromkeys(capsys.readouterr().err.splitlines())
+def test_a_line_a_minute_says_what_is_under_way(monkeypatch):
+    said = HeardLines(monkeypatch)
     wanted = [
         "demo: at work (0 min)", "demo: reading [bold]photos (0 min)", "demo: carving (0 min)",
         "demo: photographing [x], 2 of 4 (0 min)", "demo: [/] 12 steps, 40 %, loss 0.1 (0 min)",
     ]  # fmt: skip
+    with progress.lines("demo"):
+        said.wait(wanted[0])  # nothing says what is done
+        with progress.working("reading [bold]photos") as report:
+            said.wait(wanted[1])
+            report("carving")
+            said.wait(wanted[2])
+        for number in progress.tracked(range(4), "photographing [x]"):
+            if number == 2:
+                said.wait(wanted[3])
+        with progress.progress_bar() as bar:
+            bar.add_task("[/] 12 steps", total=1.0, completed=0.4, loss="loss 0.1", psnr="")
+            said.wait(wanted[4])
+    over = list(said.lines)
+    time.sleep(0.1)  # it is over: no more of them
+    assert said.lines == over
+    told = dict.fromkeys(over)
     between = r"demo: (at work|photographing \[x\], [013] of 4) \(0 min\)"
     assert [line for line in told if line in wanted] == wanted
     assert all(re.fullmatch(between, line) for line in told.keys() - set(wanted)), told

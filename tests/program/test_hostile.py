@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 import tests.support.hostile.hostile_things  # noqa: F401  adds its cases
+from shapeshift.app import cli
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from tests.support.hostile.fuzz_run import check_sentence, watched
@@ -156,16 +157,19 @@ ON_THE_COMMAND_LINE = (
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in folders")
 @pytest.mark.parametrize("name", ON_THE_COMMAND_LINE)
-def test_the_command_line_says_one_line_and_ends_with_2(tmp_path, name):
+def test_the_command_line_says_one_line_and_ends_with_2(tmp_path, capsys, name):
+    """`info` as a process; `lint`, which reads in the same way, by what a process would call."""
     path = CASES[name](tmp_path)
     before = listing(tmp_path)
-    commands = ["info"] + ["lint"] * (ROOT / "app" / "commands" / "lint.py").is_file()
-    for command in commands:
-        end = launch(command, path)
-        assert end.returncode == 2, end.stderr
-        assert len(end.stderr.splitlines()) == 1 and not end.stdout, end.stderr + end.stdout
-        assert end.stderr.endswith(".\n")
-        assert end.stderr.startswith("shapeshift ")  # the words of a traceback come otherwise
+    end = launch("info", path)
+    code = cli.main(["lint", str(path)])
+    called = capsys.readouterr()
+    ends = (end.returncode, end.stdout, end.stderr), (code, called.out, called.err)
+    for code, out, said in ends:
+        assert code == 2, said
+        assert len(said.splitlines()) == 1 and not out, said + out
+        assert said.endswith(".\n")
+        assert said.startswith("shapeshift ")  # the words of a traceback come otherwise
     assert listing(tmp_path) == before
 
 

@@ -14,10 +14,9 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
-from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
-from tests.support.training.training_runs import bits, run
+from tests.support.training.training_runs import bits, run, run_keeping
 
 STOPS = (Stop("A", 0.0), Stop("C", 1.0), Stop("B", 0.4))
 SETTINGS = TrainSettings(iterations=300, grow=False, max_anchors=500)
@@ -93,10 +92,8 @@ def test_the_picture_between_light_and_heat_comes_nearer_to_their_cross_fade(dev
 
 def test_the_same_seed_gives_the_same_bits_resumed_or_not(device, shared, tmp_path):
     settings = replace(SETTINGS, iterations=60, blended_shapes=0.5, grow=True, grow_every=20)
-    whole = run(Trainer(device, shared, settings))
-    part = run(Trainer(device, shared, settings), steps=17)
-    write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
-    resumed = run(Trainer(device, shared, settings, read_checkpoint(tmp_path / "c.npz")))
+    whole, kept = run_keeping(Trainer(device, shared, settings), tmp_path, 17)
+    resumed = run(Trainer(device, shared, settings, *kept))
     assert bits(resumed) == bits(whole)
     assert bits(whole) != bits(run(Trainer(device, shared, replace(settings, blended_shapes=0.0))))
 

@@ -7,14 +7,13 @@ import pytest
 
 from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.losses.min_scale import SLOPE, MinScale
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from tests.support.training.training_runs import bits, run
+from tests.support.training.training_runs import bits, run, run_keeping
 
 RNG = np.random.default_rng
 SIZE = (40, 30)
@@ -86,13 +85,11 @@ SETTINGS = TrainSettings(iterations=70, max_anchors=900, grow_every=20, min_scal
 def test_a_run_with_it_leaves_fewer_thin_splats_and_resumes_to_the_bit(device, tmp_path):
     balls = make_balls(tmp_path, size=48, views=6, test_views=1)
     plain = run(Trainer(device, balls, replace(SETTINGS, min_scale_px=0.0)))
-    bound = run(Trainer(device, balls, SETTINGS))
+    bound, kept = run_keeping(Trainer(device, balls, SETTINGS), tmp_path, 33)
     assert not np.array_equal(
         plain.adam.state()["weights.value"], bound.adam.state()["weights.value"]
     )
-    part = run(Trainer(device, balls, SETTINGS), steps=33)
-    write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
-    resumed = run(Trainer(device, balls, SETTINGS, read_checkpoint(tmp_path / "c.npz")))
+    resumed = run(Trainer(device, balls, SETTINGS, *kept))
     assert bits(resumed) == bits(bound)
 
 

@@ -1,16 +1,17 @@
 """Training as a whole on a small ray-traced capture: quality, bits, guard, resume, export."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from shapeshift.app import progress
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.eyes import eyes_of
 from shapeshift.runtime_models.model import BadFile
@@ -22,7 +23,7 @@ from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.settings import TrainSettings, resumed
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from tests.support.training.training_runs import run
+from tests.support.training.training_runs import run, run_keeping
 
 ROOT = Path(__file__).resolve().parents[2]
 # An even encoding tells two stops apart within fewer steps than one unit a stop does.
@@ -84,12 +85,11 @@ def test_one_thread_gives_the_same_bits_as_all(device, balls, tmp_path):
 
 def test_resuming_equals_never_having_stopped(device, balls, tmp_path):
     settings = replace(SETTINGS, iterations=100, grow=True, grow_every=20, max_anchors=2500)
-    whole = run(Trainer(device, balls, settings))
+    stops = (37, 40)  # before a change of anchors, and on one
+    whole, kept = run_keeping(Trainer(device, balls, settings), tmp_path, *stops)
     assert whole.anchors_count != 1977  # growing did something between the stops
-    for stop in (37, 40):  # before a change of anchors, and on one
-        part = run(Trainer(device, balls, settings), steps=stop)
-        write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
-        resumed = run(Trainer(device, balls, settings, read_checkpoint(tmp_path / "c.npz")))
+    for stop, state in zip(stops, kept, strict=True):
+        resumed = run(Trainer(device, balls, settings, state))
         assert resumed.iteration == whole.iteration
         assert same_bits(resumed.adam.state(), whole.adam.state()), stop
 
@@ -168,13 +168,11 @@ def test_ctrl_c_leaves_a_readable_package_and_resume_goes_on(balls, tmp_path):
     command = train_command(
         balls.folder, "--out", out, "--iterations", 100000, "--max-anchors", 1500
     )
-    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
-    lines = []
-    for line in process.stderr:  # "compiling", then the steps
-        lines.append(line)
-        if "apart" in line:
-            break
-    time.sleep(3)
+    environment = os.environ | {progress.PERIOD: "0.1"}  # seconds from line to line
+    process = subprocess.Popen(
+        command, cwd=ROOT, stderr=subprocess.PIPE, text=True, env=environment
+    )
+    assert any(re.search(r"train: [1-9]\d* steps", line) for line in process.stderr)
     process.send_signal(signal.SIGINT)
     _, rest = process.communicate(timeout=60)
     assert process.returncode == 130, rest

@@ -11,12 +11,14 @@ from shapeshift.app import cli, progress
 from shapeshift.app.training.fit import without_times
 from shapeshift.app.training.train import train
 from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.training import run
 from shapeshift.training.photo_store.open_photos import TrainingPhotos
 from shapeshift.training.run import LENGTH_STEPS, Progress, Run
 from shapeshift.training.schedule import Budget
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.program import HeardLines
 
 
 class Steps(Run):
@@ -56,49 +58,79 @@ def burn(seconds: float) -> None:
         pass
 
 
-def idle() -> None:
-    time.sleep(0.02)
+class Clock:
+    """The module `time` of a run: its clocks go on by what work says that it took, exactly."""
+
+    def __init__(self) -> None:
+        self.processor, self.wall = 1000.0, 5.0
+
+    def process_time(self) -> float:
+        return self.processor
+
+    def perf_counter(self) -> float:
+        return self.wall
+
+    def burn(self, seconds: float) -> None:
+        self.processor, self.wall = self.processor + seconds, self.wall + seconds
+
+    def idle(self, seconds: float) -> None:
+        self.wall += seconds
 
 
-def test_a_processor_s_seconds_are_those_that_it_computed():
+@pytest.fixture
+def clock(monkeypatch) -> Clock:
+    """No sleep is as long as it was meant to be where others have the cores."""
+    clock = Clock()
+    monkeypatch.setattr(run, "time", clock)
+    return clock
+
+
+def test_a_processor_s_seconds_are_those_that_it_computed(clock):
     """Waiting costs none; neither do compiling and what is done between the steps."""
-    waited = Steps("cpu", idle)
+    waited = Steps("cpu", lambda: clock.idle(0.5))
     for _ in waited.steps():
-        burn(0.02)
-    assert waited.elapsed < 0.02
+        clock.burn(0.25)
+    assert waited.elapsed == 0
+    worked = Steps("cpu", lambda: clock.burn(0.5))
+    assert [now.elapsed for now in worked.steps()] == [0.5, 1.0, 1.5, 2.0, 2.5]
+    assert worked.elapsed == 2.5
+
+
+def test_a_processor_s_seconds_are_those_of_the_system():
+    """Without a clock of ours: none for a nap, and all of what is computed."""
+    assert run.clock_of(SimpleNamespace(kind="cpu")) is time.process_time
+    assert run.clock_of(SimpleNamespace(kind="gpu")) is time.perf_counter
     worked = Steps("cpu", lambda: burn(0.02))
-    told = [now.elapsed for now in worked.steps()]
-    assert 0.1 <= worked.elapsed < 0.15 and told == sorted(told) and told[-1] == worked.elapsed
+    assert all(now.elapsed >= 0.02 * now.iteration for now in worked.steps())
 
 
-def test_reading_photos_costs_none_of_the_budget():
+def test_reading_photos_costs_none_of_the_budget(clock):
     """Be it a step that reads or a thread beside it, which processor time counts with the step."""
     store = SimpleNamespace(read_s=0.0, waited_s=0.0, ahead=0, trouble="")
-    steps = Steps("cpu", lambda: read(store))
+    steps = Steps("cpu", lambda: read(store, clock.burn))
     steps.photos = TrainingPhotos([], [], store)
     for _ in steps.steps():
         pass
-    assert 0.05 <= steps.elapsed < 0.08
+    assert steps.elapsed == pytest.approx(0.05, abs=1e-9)
 
 
-def read(store) -> None:
+def read(store, burn) -> None:
     """A step of 10 ms in which a photo is read in 20."""
     burn(0.02)
     store.read_s += 0.02
     burn(0.01)
 
 
-def test_other_devices_are_timed_by_the_clock():
-    waited = Steps("gpu", idle)
+def test_other_devices_are_timed_by_the_clock(clock):
+    waited = Steps("gpu", lambda: clock.idle(0.5))
     for _ in waited.steps():
-        time.sleep(0.02)
-    assert 0.1 <= waited.elapsed < 0.18  # five naps in the steps, not those between them
+        clock.idle(0.25)
+    assert waited.elapsed == 2.5  # five naps in the steps, not those between them
 
 
-def test_a_budget_of_seconds_ends_a_run():
-    worked = Steps("cpu", lambda: burn(0.01), seconds=0.1)
-    steps = sum(1 for _ in worked.steps())
-    assert 8 <= steps <= 10 and 0.1 <= worked.elapsed < 0.13
+def test_a_budget_of_seconds_ends_a_run(clock):
+    worked = Steps("cpu", lambda: clock.burn(0.125), seconds=1.0)
+    assert sum(1 for _ in worked.steps()) == 8 and worked.elapsed == 1
 
 
 @pytest.mark.parametrize(
@@ -117,19 +149,19 @@ def test_what_other_processes_took_is_in_the_start():
     """The photos are matched in one; what comes after it is not, nor is reading.
 
     Their times come in ticks of 10 ms."""
-    steps = Steps("cpu", lambda: burn(0.01), seconds=2.0)
+    steps = Steps("cpu", lambda: burn(0.01), seconds=1.2)
     store = SimpleNamespace(read_s=0.0, waited_s=0.0, ahead=0, trouble="")
     steps.photos = TrainingPhotos([], [], store)
     code = "import time\nwhile time.process_time() < 0.3: pass"
     with steps.counted_start():
         burn(0.1)
         subprocess.run([sys.executable, "-S", "-c", code], check=True)
-        read(store)  # 20 ms that do not count, 10 that do
+        read(store, burn)  # 20 ms that do not count, 10 that do
     burn(0.1)
     assert 0.38 <= steps.start_s < 0.5 and steps.budget.start == steps.start_s
     for _ in steps.steps():
         pass
-    assert 2.0 <= steps.seconds < 2.05 and steps.seconds == steps.start_s + steps.elapsed
+    assert 1.2 <= steps.seconds < 1.25 and steps.seconds == steps.start_s + steps.elapsed
 
 
 def test_a_run_that_goes_on_has_the_start_it_had(device, tmp_path):
@@ -156,13 +188,13 @@ def test_the_pace_is_that_of_the_steps_before(monkeypatch):
     assert timed.run_length == pytest.approx(600, abs=1)
 
 
-def test_without_a_terminal_lines_say_steps_seconds_and_decibels(monkeypatch, capsys):
-    """The line a minute of every command, here one every 50 ms."""
-    monkeypatch.setattr(progress, "LINE_EVERY_S", 0.05)
+def test_without_a_terminal_lines_say_steps_seconds_and_decibels(monkeypatch):
+    """The line a minute of every command, here one every 10 ms; the last step waits for it."""
+    said = HeardLines(monkeypatch)
+    line = "train: 4 steps, 0 core s, 1 anchors, 80 %, RGB 20.00 dB (0 min)"
+    steps = Steps("cpu", lambda: steps.iteration == 4 and said.wait(line))
     with progress.lines("train"):
-        assert not train(Steps("cpu", lambda: time.sleep(0.2)), None)
-    said = capsys.readouterr().err.splitlines()
-    assert "train: 4 steps, 0 core s, 1 anchors, 80 %, RGB 20.00 dB (0 min)" in said
+        assert not train(steps, None)
     assert Progress(1, 0.5, None, 3, 1.0).rolled_back is False
 
 

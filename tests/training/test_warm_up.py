@@ -79,13 +79,14 @@ def test_shapes_apart_with_base_colours_for_each_stop_are_learned_at_once(device
 
 
 def test_a_capture_of_shapes_apart_is_turned_back_once_and_learned(device, apart, tmp_path):
-    whole = run(Trainer(device, apart, SETTINGS))
+    whole, file = Trainer(device, apart, SETTINGS), tmp_path / "c.npz"
+    for now in whole.steps():
+        if whole.lr_warmup.start is not None and now.iteration == whole.lr_warmup.start + 30:
+            write_checkpoint(file, *whole.checkpoint())  # while the rates rise
     assert whole.guard.rollbacks >= 1 and whole.lr_warmup.start is not None
     for name, psnr in whole.held_out_psnr(9).items():
         assert psnr > 20, (name, psnr)  # 13 dB is an empty picture
-    part = run(Trainer(device, apart, SETTINGS), steps=whole.lr_warmup.start + 30)
-    write_checkpoint(tmp_path / "c.npz", *part.checkpoint())  # while the rates rise
-    resumed = run(Trainer(device, apart, SETTINGS, read_checkpoint(tmp_path / "c.npz")))
+    resumed = run(Trainer(device, apart, SETTINGS, read_checkpoint(file)))
     assert resumed.lr_warmup == whole.lr_warmup
     for name, psnr in resumed.held_out_psnr(9).items():
         assert psnr > 20, (name, psnr)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import ConvexHull
 
 from shapeshift.runtime_models.model import BadFile
@@ -25,6 +26,7 @@ from shapeshift.scene.colliders.collider import (
     mesh_of_splats,
     parts_volume,
 )
+from shapeshift.scene.colliders.collider_wrap import squared_distances
 from shapeshift.scene.colliders.convex_parts import MOST_VERTICES, SEARCH, cut_into_parts
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from tests.support.models import make_random_model
@@ -156,19 +158,32 @@ def test_long_splats_that_stand_out_alone_leave_no_spikes():
 
 def test_faint_splats_count_where_they_add_up():
     shape = shapes()["sphere"]
-    cloud = splatted(shape, 6000)
-    opaque = splatted(shapes()["two spheres"], 3000, seed=3)
-    faint = np.full(6000, 0.05, np.float32)
+    cloud = splatted(shape, 2000)
+    opaque = splatted(shapes()["two spheres"], 1500, seed=3)
+    faint = np.full(2000, 0.05, np.float32)
     thick = [np.tile(c, (8, *[1] * (c.ndim - 1))) for c in (*cloud.columns[:3], faint)]
     one = collider_of_splats(
         *(np.concatenate(p) for p in zip(opaque.columns, thick, strict=True)), FRESH
     )
     assert np.ptp(one.mesh.vertices, axis=0)[1] == pytest.approx(0.2, abs=0.01)
-    thin = [*cloud.columns[:3], np.full(6000, 0.02, np.float32)]
+    thin = [*cloud.columns[:3], np.full(2000, 0.02, np.float32)]
     two = collider_of_splats(
         *(np.concatenate(p) for p in zip(opaque.columns, thin, strict=True)), FRESH
     )
     assert np.ptp(two.mesh.vertices, axis=0)[1] == pytest.approx(0.08, abs=0.01)
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1), (5, 1, 9), (20, 33, 17)])
+@pytest.mark.parametrize("share", [0.0, 0.002, 0.05, 1.0])
+def test_distances_within_reach_are_those_of_scipy(shape, share):
+    """Exactly, as they are whole numbers; 15 is the most whose square has a byte."""
+    taken = np.random.default_rng(0).random(shape) < share
+    taken.flat[-1] = True
+    whole = np.rint(distance_transform_edt(~taken) ** 2)
+    for reach in (1, 2, 4, 6, 15):
+        want = np.where(whole <= reach**2, whole, 255)
+        np.testing.assert_array_equal(squared_distances(taken, reach), want)
+    assert (squared_distances(np.zeros(shape, bool), 15) == 255).all()
 
 
 @pytest.fixture

@@ -28,11 +28,10 @@ from shapeshift.training.baselines.plain_density import (
 )
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.baselines.plain_step import GROUPS
-from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.first_anchors.first_anchors import neighbour_distance, photo_colors
 from shapeshift.training.synthetic.balls import STOPS, make_balls
-from tests.support.training.training_runs import run
+from tests.support.training.training_runs import run, run_keeping
 
 ROOT = Path(__file__).resolve().parents[3]
 SETTINGS = PlainSettings(iterations=100, splats=4000, max_splats=6000, grow_every=20, sh_degree=2)
@@ -43,9 +42,21 @@ def balls(tmp_path_factory):
     return make_balls(tmp_path_factory.mktemp("balls"), size=100, views=16, test_views=3)
 
 
+STEPS = (1, 20, 21, 60)  # 20: right after a change of the splats
+
+
 @pytest.fixture(scope="module")
-def trained(device, balls) -> list[PlainTrainer]:
-    return [run(PlainTrainer(device, one_modality(balls, s.name), SETTINGS)) for s in STOPS]
+def rgb(device, balls, tmp_path_factory) -> tuple[PlainTrainer, dict]:
+    """Trained, and the checkpoints after STEPS."""
+    begun = PlainTrainer(device, one_modality(balls, STOPS[0].name), SETTINGS)
+    whole, kept = run_keeping(begun, tmp_path_factory.mktemp("kept"), *STEPS)
+    return whole, dict(zip(STEPS, kept, strict=True))
+
+
+@pytest.fixture(scope="module")
+def trained(device, balls, rgb) -> list[PlainTrainer]:
+    others = [PlainTrainer(device, one_modality(balls, s.name), SETTINGS) for s in STOPS[1:]]
+    return [rgb[0], *map(run, others)]
 
 
 def state_of(count: int, scale: float = 0.01, seed: int = 0) -> dict[str, np.ndarray]:
@@ -178,19 +189,10 @@ def test_the_same_seed_gives_the_same_bits(device, balls, trained):
     assert not np.array_equal(other.adam.state()["base.value"], again["base.value"])
 
 
-def stopped_at(trainer, step: int, path):
-    for now in trainer.steps():
-        if now.iteration == step:
-            break
-    write_checkpoint(path, *trainer.checkpoint())
-    return read_checkpoint(path)
-
-
-@pytest.mark.parametrize("step", [1, 20, 21, 60])  # 20: right after a change of the splats
-def test_a_run_that_goes_on_ends_with_the_same_bits(device, balls, trained, tmp_path, step):
+@pytest.mark.parametrize("step", STEPS)
+def test_a_run_that_goes_on_ends_with_the_same_bits(device, balls, rgb, trained, step):
     capture = one_modality(balls, "RGB")
-    state = stopped_at(PlainTrainer(device, capture, SETTINGS), step, tmp_path / "a.npz")
-    again = PlainTrainer(device, capture, SETTINGS, resume=state)
+    again = PlainTrainer(device, capture, SETTINGS, resume=rgb[1][step])
     assert again.iteration == step and again.start_s > 0
     run(again)
     for name, values in trained[0].adam.state().items():
@@ -204,10 +206,8 @@ def test_a_run_that_goes_on_ends_with_the_same_bits(device, balls, trained, tmp_
     np.testing.assert_array_equal(done.splats().means, again.splats().means)
 
 
-def test_a_checkpoint_of_something_else_is_refused(device, balls, tmp_path):
-    state = stopped_at(
-        PlainTrainer(device, one_modality(balls, "RGB"), SETTINGS), 1, tmp_path / "a.npz"
-    )
+def test_a_checkpoint_of_something_else_is_refused(device, balls, rgb):
+    state = rgb[1][1][0], dict(rgb[1][1][1])
     with pytest.raises(BadFile, match="not of plain splats of 'Thermal'"):
         PlainTrainer(device, one_modality(balls, "Thermal"), SETTINGS, resume=state)
     del state[1]["plain_splats_of"]  # as those of anchors

@@ -24,7 +24,6 @@ from shapeshift.training.calibration.pose_refinement import (
     PoseGradient,
     PoseRefinement,
 )
-from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.optimizer import Adam
@@ -44,7 +43,7 @@ from tests.support.training.situations import (
     VOXEL,
     situation,
 )
-from tests.support.training.training_runs import bits, run
+from tests.support.training.training_runs import bits, run, run_keeping
 
 DISTANCE = 3.1  # metres
 
@@ -198,13 +197,11 @@ def pixels_off(trainer: Trainer, true) -> float:
 def test_wrong_poses_come_nearer_and_pictures_are_better(device, balls, tmp_path):
     wrong, true = balls
     plain = run(Trainer(device, wrong, replace(SETTINGS, poses="stated")))
-    refined = run(Trainer(device, wrong, SETTINGS))
+    refined, kept = run_keeping(Trainer(device, wrong, SETTINGS), tmp_path, 131)
     before, after = (pixels_off(trainer, true) for trainer in (plain, refined))
     gain = refined.held_out_psnr(9)["RGB"] - plain.held_out_psnr(9)["RGB"]
     assert after < before / 3, (before, after)  # 1.10 and 0.24 pixels
     assert gain > 2.5, gain  # 5.1 dB
     # Interrupted and resumed: the same bits.
-    part = run(Trainer(device, wrong, SETTINGS), steps=131)
-    write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
-    resumed = run(Trainer(device, wrong, SETTINGS, read_checkpoint(tmp_path / "c.npz")))
+    resumed = run(Trainer(device, wrong, SETTINGS, *kept))
     assert bits(resumed) == bits(refined)

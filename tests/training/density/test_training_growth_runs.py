@@ -24,7 +24,7 @@ from shapeshift.training.settings import ONE_MODALITY, TrainSettings
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import SETTLE, Trainer
-from tests.support.training.training_runs import bits
+from tests.support.training.training_runs import bits, run_keeping
 
 BASE = TrainSettings(iterations=120, grow_every=30, max_anchors=900)
 FIRST = 600  # points that the capture is left with
@@ -54,13 +54,12 @@ def run(trainer: Trainer, steps: int | None = None) -> Trainer:
 @pytest.mark.parametrize("way", WAYS)
 def test_a_way_to_grow_gives_the_same_bits_whole_and_resumed(device, balls, way, tmp_path):
     settings = replace(BASE, **WAYS[way])
-    whole = run(Trainer(device, balls, settings))
+    whole = Trainer(device, balls, settings)
+    _, kept = run_keeping(whole, tmp_path, 33, most=whole.anchor_cap)  # with some statistics
     cap = settings.max_anchors
     assert (cap == FIRST or whole.anchors_count > FIRST) and whole.anchors_count <= cap
     assert whole.densified_at > 0 and whole.guard.rollbacks == 0
-    part = run(Trainer(device, balls, settings), steps=33)  # with some statistics
-    write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
-    resumed = run(Trainer(device, balls, settings, read_checkpoint(tmp_path / "c.npz")))
+    resumed = run(Trainer(device, balls, settings, *kept))
     assert bits(resumed) == bits(whole)
     untrained = Trainer(device, balls, settings).held_out_psnr(9)
     for name, psnr in whole.held_out_psnr(9).items():

@@ -20,7 +20,7 @@ from shapeshift.training.update.begin_update import begin_update
 from shapeshift.training.update.regions import UpdateRegion
 from shapeshift.training.update.trainable import layout_of
 from shapeshift.training.update.update_trainer import UpdateBase
-from tests.support.training.training_runs import bits, run
+from tests.support.training.training_runs import bits, run, run_keeping
 
 BALL = (0.15, 0.18, 0.55)  # metres: the yellow one, which is gone at the second visit
 REGION = UpdateRegion((BoxShape(BALL, (0.32, 0.3, 0.32)),))
@@ -181,11 +181,12 @@ def test_light_that_a_network_mixes_with_others_is_refused(lit, where):
     layout_of(lit.model)
 
 
-def test_an_update_resumes_to_the_same_bits_and_with_its_own_scene_only(device, visits, base):
+def test_an_update_resumes_to_the_same_bits_and_with_its_own_scene_only(
+    device, visits, base, tmp_path
+):
     settings = replace(SETTINGS, iterations=60, grow_every=25)
-    whole = run(begin_update(device, base, visits[1], settings))
-    half = run(begin_update(device, base, visits[1], settings), steps=30)
-    state, notes = half.checkpoint()
+    begun = begin_update(device, base, visits[1], settings)
+    whole, ((state, notes),) = run_keeping(begun, tmp_path, 30)
     again = run(begin_update(device, base, visits[1], settings, (state, notes)))
     assert bits(again) == bits(whole)
     with pytest.raises(BadFile, match="another scene, capture or region"):

@@ -114,9 +114,8 @@ def test_points_in_the_world_fall_where_the_view_says(
         if not chosen or np.linalg.norm(at[chosen] - at[i], axis=1).min() > apart:
             chosen.append(i)
     points, at = points[chosen], at[chosen]
-    x, y = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
     sigma = 3.0 * factor
-    image = sum(np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * sigma**2)) for u, v in at)
+    image = discs(size, at, sigma)
     (tmp_path / "images").mkdir()
     pixels = np.rint(255 * np.minimum(image, 1)).astype(np.uint8)
     for name in ("0.png", "1.png"):
@@ -130,22 +129,39 @@ def test_points_in_the_world_fall_where_the_view_says(
     eye = points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
     want = eye[:, :2] / eye[:, 2:] * (fx, fy) + (cx, cy)
     width, height = photo.view.size
-    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     away, grey = [], photo.rgba[..., 0].astype(float)
     for u, v in want:
-        window = np.hypot(x - u, y - v) < 10
         if not (12 < u < width - 12 and 12 < v < height - 12):
             continue
         if not np.hypot((u - cx) / fx, (v - cy) / fy) < 0.9:  # there discs are as wide as windows
             continue
-        if photo.weight is not None and not photo.weight[window].all():
+        here, x, y = around((width, height), (u, v), 10)
+        window = np.hypot(x - u, y - v) < 10
+        if photo.weight is not None and not photo.weight[here][window].all():
             continue
-        weight = grey * window
+        weight = grey[here] * window
         centroid = np.array([(weight * x).sum(), (weight * y).sum()]) / weight.sum()
         slope = bend_of_disc(formula, numbers, (u, v), (fx, fy, cx, cy), sigma)
         away.append(np.abs(centroid - (u, v) - slope).max())
     # Pixels of the photo read: a mesh of quads and bytes, at its own size; less where it is shrunk.
     assert len(away) >= 3 and max(away) < 0.06
+
+
+def around(size: tuple[int, int], at: tuple[float, float], reach: float) -> tuple:
+    """Rows and columns of a picture that lie within `reach` of a place, and their x and y."""
+    first = np.maximum(np.floor(np.subtract(at, reach)), 0).astype(int)
+    after = np.minimum(np.ceil(np.add(at, reach)), size).astype(int)
+    x, y = np.meshgrid(*(np.arange(a, b) + 0.5 for a, b in zip(first, after, strict=True)))
+    return (slice(first[1], after[1]), slice(first[0], after[0])), x, y
+
+
+def discs(size: tuple[int, int], at: np.ndarray, sigma: float) -> np.ndarray:
+    """(H, W) sum of Gaussians around (N, 2); six sigma away one is 4 millionths of a byte."""
+    image = np.zeros(size[::-1])
+    for place in at:
+        here, x, y = around(size, place, 6 * sigma)
+        image[here] += np.exp(-((x - place[0]) ** 2 + (y - place[1]) ** 2) / (2 * sigma**2))
+    return image
 
 
 def bend_of_disc(formula, numbers, at, pinhole, sigma) -> np.ndarray:
