@@ -51,10 +51,8 @@ from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_contro
 from shapeshift.runtime_models.stop_weights import same_controls
 from shapeshift.scene.control import control_key, control_of
 from shapeshift.scene.metrics import psnr
-from shapeshift.scene.pose import View
+from shapeshift.scene.pose import View, pose_matrices
 from shapeshift.scene.scene import Scene
-
-HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
 
 
 class Renderer:
@@ -80,6 +78,7 @@ class Renderer:
         self.drawing = open_drawing(drawing, self.gpu, mlps, sort)
         self._timer = PassTimer(ctx)
         self._scene = self._given = Scene(())  # with the levels of detail in use, and as it came
+        self._poses = np.zeros((0, 4, 4))  # world_from_objects
         self.levels = LevelChoice()
         self._decoded: list[DecodedObject] = []
         self._false_key: list | None = None  # what the next was chosen for
@@ -128,8 +127,9 @@ class Renderer:
                 decoded.key = key
                 place_splats(self.drawing, i, obj, decoded)
             self._choose_false_colors(scene)
-        poses = [o.world_from_object.matrix() if o.seen else HIDDEN for o in scene.objects]
-        self.drawing.set_poses(poses)
+        self._poses = pose_matrices([obj.world_from_object for obj in scene.objects])
+        seen = np.array([obj.seen for obj in scene.objects], bool)[:, None, None]
+        self.drawing.set_poses(np.where(seen, self._poses, np.nan))  # no gate lets NaN pass
         self._scene = scene
 
     def _look_from(self, views: list[View]) -> None:
@@ -140,7 +140,7 @@ class Renderer:
                 scene = self.levels.shown(self._given)
                 self._decoded = exchange_levels(self.drawing, before, scene)
             self.update(self._given)
-        self.streaming.follow(self._scene, self._decoded, views, self._timer)
+        self.streaming.follow(self._scene, self._poses, self._decoded, views, self._timer)
 
     def _scaled(self, views: Sequence[View]) -> list[View]:
         return [scaled(view, self.settings.render_scale) for view in views]

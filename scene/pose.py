@@ -4,6 +4,7 @@ Name transforms by what they give and take:  p_world = world_from_object @ p_obj
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +64,21 @@ class HiddenMesh:
         self.triangles = np.asarray(triangles, np.float64)
         if self.triangles.shape[1:] != (3, 2) or not np.isfinite(self.triangles).all():
             raise ValueError("a hidden mesh has triangles (T, 3, 2) of finite tangents.")
+
+
+def pose_matrices(poses: Sequence[Pose]) -> np.ndarray:
+    """(n, 4, 4) float64: each pose's `matrix()`, to the bit, of many at once."""
+    out = np.tile(np.eye(4), (len(poses), 1, 1))
+    if len(poses):
+        w, x, y, z = np.array([pose.wxyz for pose in poses], np.float64).T
+        rows = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        out[:, :3, :3] = np.moveaxis(np.array(rows), 2, 0)
+        out[:, :3, 3] = [pose.position for pose in poses]
+    return out
 
 
 @dataclass(frozen=True)

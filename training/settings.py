@@ -149,8 +149,8 @@ class TrainSettings:
     """Let colours depend on the direction from which one looks."""
     anchor_attributes: str = "frame,stop_color"
     """What each anchor has besides its features, as frame,stop_color,light: sizes and axes; a base
-    colour, one for all stops (color) or one for each (stop_color); light by direction, which makes
-    it lighter or darker by the side it is seen from."""
+    colour, one for all stops (color) or one for each (stop_color); light by direction, which
+    changes its colour by the side it is seen from."""
     grow: bool = True
     """Add anchors and move the least useful ones to where pictures need them."""
     grow_every: int = 100

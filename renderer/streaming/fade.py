@@ -1,6 +1,7 @@
 """A leaf's old level goes as its new one comes: over some frames both are drawn, by parts.
 
-Parts add up to 1; what a part of a splat is, project_arena.cl says.
+Parts add up to 1; what a part of a splat is, project_arena.cl says.  A leaf that comes where none
+was, or goes and leaves nothing, fades against what is behind it.
 """
 
 import numpy as np
@@ -8,7 +9,10 @@ import numpy as np
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.streaming.pages import PageTable
 
-FRAMES = 3  # that show both levels: the new one is there alone in the frame after them
+# Of the finer level, frame by frame as it comes; what comes coarser is the rest, backwards.  A
+# quarter of fine splats changes a picture by 2.7 times what its last quarter does: with these parts
+# no step is much larger than another (docs/bench/switching.csv).
+PARTS = (0.10, 0.33, 0.66)
 
 
 class Fades:
@@ -17,23 +21,26 @@ class Fades:
     def __init__(self, drawing: Drawing, table: PageTable) -> None:
         self._drawing, self._table = drawing, table
         self._age = np.full(len(table.level), -1)  # frames that showed both; -1: one is there
+        self._finer = np.zeros(len(table.level), bool)  # what comes, than what goes
 
     @property
     def leaves(self) -> np.ndarray:
         """(L,) bool: those that change."""
         return self._age >= 0
 
-    def begin(self, leaves: np.ndarray) -> None:
-        """Of leaves (n,) with new pages in the table, and old ones that are leaving."""
+    def begin(self, leaves: np.ndarray, finer: np.ndarray) -> None:
+        """Of leaves (n,) with new pages in the table, old ones that are leaving, or both; finer:
+        (n,) bool, whether what comes is; of those that come alone it is, of those that go not.
+        """
         if len(leaves):
-            self._age[leaves] = 0
+            self._age[leaves], self._finer[leaves] = 0, finer
             self._weigh(leaves)
 
     def advance(self) -> np.ndarray:
-        """The next frame; what was shown FRAMES times is over: which leaves."""
+        """The next frame; what was shown as often as there are PARTS is over: which leaves."""
         leaves = np.flatnonzero(self.leaves)
         self._age[leaves] += 1
-        done = self._age[leaves] >= FRAMES
+        done = self._age[leaves] >= len(PARTS)
         self._weigh(leaves[~done])
         return self.end(leaves[done])
 
@@ -47,8 +54,14 @@ class Fades:
         return leaves
 
     def _weigh(self, leaves: np.ndarray) -> None:
-        for age in np.unique(self._age[leaves]):
-            part = (age + 1) / (FRAMES + 1)
-            mine = leaves[self._age[leaves] == age]
-            self._drawing.weigh_pages(self._table.pages_of(mine), part)
-            self._drawing.weigh_pages(self._table.leaving(mine), 1 - part)
+        new = parts_of(self._age[leaves], self._finer[leaves])
+        for part in np.unique(new):
+            mine = leaves[new == part]
+            self._drawing.weigh_pages(self._table.pages_of(mine), float(part))
+            self._drawing.weigh_pages(self._table.leaving(mine), 1 - float(part))
+
+
+def parts_of(age: np.ndarray, finer: np.ndarray) -> np.ndarray:
+    """(n,) the part of what comes, after so many frames (n,)."""
+    parts = np.array(PARTS)
+    return np.where(finer, parts[age], 1 - parts[::-1][age])

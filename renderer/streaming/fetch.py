@@ -12,6 +12,7 @@ MOST_WAITING = 16  # parts: those of later frames are asked for then
 THREAD = "leaves"  # its name
 PACE_S = 1.0  # longest wait for the next frame, between pictures of a part
 PIXELS = 1 << 18  # of pictures that a frame of a moving eye bears: 3 to 5 ms of a core
+RETURNED = 16  # parts, after which the heap is given back in motion, too: 7 to 20 ms of a core
 PATIENCE_S = 5.0  # longest wait at the end for a part that is being read
 
 
@@ -56,20 +57,28 @@ class Fetcher:
         return self.busy or bool(self._wanted)
 
     def _run(self) -> None:
+        decoded = 0  # parts, since the heap was given back
         while True:
             with self._wake:
                 self.busy = False
                 while not self._wanted and not self._ended:
-                    self._wake.wait()
+                    # Frames wake it; where none come for a while the eye rests.
+                    if not self._wake.wait(PACE_S if decoded else None):
+                        break
                 if self._ended:
                     return
-                source, part = self._wanted.pop(0)
-                self.busy = True
-            try:
-                source.load(part, self._pace)
-            except (BadFile, MemoryError):
-                pass  # the source says so, and asks no more for it
-            return_heap()
+                asked = self._wanted.pop(0) if self._wanted else None
+                self.busy = asked is not None
+            if asked is not None:
+                source, part = asked
+                try:
+                    source.load(part, self._pace)
+                except (BadFile, MemoryError):
+                    pass  # the source says so, and asks no more for it
+                decoded += 1
+            if asked is None or decoded >= RETURNED:
+                return_heap()
+                decoded = 0
 
     def close(self) -> None:
         with self._wake:

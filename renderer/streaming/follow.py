@@ -57,15 +57,18 @@ class Streaming:
         return self.stream is not None and self.stream.due
 
     def follow(
-        self, scene: Scene, decoded: Sequence[DecodedObject], views: Sequence[View],
-        timer: PassTimer,
+        self, scene: Scene, poses: np.ndarray, decoded: Sequence[DecodedObject],
+        views: Sequence[View], timer: PassTimer,
     ) -> None:  # fmt: skip
-        """What the views want is there afterwards, or on its way.  Raises BadFile."""
+        """What the views want is there afterwards, or on its way.  Raises BadFile.
+
+        poses: (O, 4, 4) world_from_object of all objects, hidden ones, too.
+        """
         if self.stream is not None:
             self.stream.converges = self.converges and self.reads
             self.stream.reads = self.reads
             with timer.time("stream", on_gpu=False):
-                follow(self._drawing, self.stream, scene, decoded, views)
+                follow(self._drawing, self.stream, scene, poses, decoded, views)
 
     def close(self) -> None:
         if self.stream is not None:
@@ -74,14 +77,14 @@ class Streaming:
 
 
 def follow(
-    drawing: Drawing, stream: Stream, scene: Scene, decoded: Sequence[DecodedObject],
-    views: Sequence[View],
+    drawing: Drawing, stream: Stream, scene: Scene, poses: np.ndarray,
+    decoded: Sequence[DecodedObject], views: Sequence[View],
 ) -> None:  # fmt: skip
     """Asks the stream, and gives what changed the look that its object has."""
     cut = [i for i in stream.objects if decoded[i].own is not None]
     before = {i: drawing.pages_of(i) for i in cut}
     stream.edit(cut)
-    for i in stream.follow(scene, views):
+    for i in stream.follow(scene, poses, views):
         obj, each = scene.objects[i], decoded[i]
         if i in before:
             keep_own(drawing, i, each, before[i], stream.placed)

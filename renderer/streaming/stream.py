@@ -22,6 +22,7 @@ from shapeshift.renderer.streaming.choose_tree import (
     choose_nodes,
     is_crowded,
     joined_trees,
+    upwards,
 )
 from shapeshift.renderer.streaming.fade import Fades
 from shapeshift.renderer.streaming.fetch import PIXELS, Fetcher
@@ -33,7 +34,7 @@ from shapeshift.renderer.streaming.pages import (
 from shapeshift.renderer.streaming.seen import CoarseLook
 from shapeshift.renderer.streaming.sight import LeafSight, sight_of
 from shapeshift.renderer.streaming.sources import Sources
-from shapeshift.renderer.streaming.swap import NONE, patient, swapped
+from shapeshift.renderer.streaming.swap import NONE, comes_finer, patient, swapped
 from shapeshift.renderer.streaming.upload import Uploader
 from shapeshift.renderer.streaming.weights import Weights, bytes_of
 from shapeshift.runtime_models.leaf_levels import LeafSource
@@ -100,15 +101,16 @@ class Stream:
         drawing.allocate_pages(list(models), pages, coefficients, stored)
         self.follows_eye = coefficients > 1  # then its colours are decoded a frame
         self.table = PageTable(pages, int(self.first[-1]))
-        self._fades = Fades(drawing, self.table)
+        self.fades = Fades(drawing, self.table)
         self._uploader = Uploader(drawing, self.table, self.objects, nodes, self.first)
         self.weights = Weights(int(self.first[-1]), self._look())
         self._fetcher = Fetcher()
         self._last: tuple = ()  # the views and poses that all is there for
         self._views: tuple[Sequence[View], Sequence[View]] = ((), ())  # of the last two frames
-        self._poses: list[np.ndarray] = []
+        self._poses = np.zeros((0, 4, 4))
         self._shown: list[bool] = []
         self._frame = self._decoded = 0  # frames; parts that were at hand in the last
+        self._held = np.zeros(int(self.first[-1]), bool)  # nodes in the picture of the last frame
         self.stats = StreamStats(self.budget, 0, 0, int(self._finest.sum()), 0, False, "")
         self.reads = True  # what is wanted and not at hand
         self.converges = True  # each frame gets all that it wants, and forgets the one before
@@ -135,14 +137,15 @@ class Stream:
             return None
         return CoarseLook(device, self._models, self.first)
 
-    def follow(self, scene: Scene, views: Sequence[View]) -> list[int]:
+    def follow(self, scene: Scene, poses: np.ndarray, views: Sequence[View]) -> list[int]:
         """Puts in what these views want; the objects whose splats have changed.
+
+        poses: (O, 4, 4) world_from_object of all objects of the scene.
 
         Raises BadFile where a part cannot be read, and all were to be there.
         """
-        mine = [scene.objects[i] for i in self.objects]
-        poses = [obj.world_from_object.matrix() for obj in mine]
-        shown = [obj.seen for obj in mine]
+        poses = poses[self.objects]
+        shown = [scene.objects[i].seen for i in self.objects]
         now = (*map(key_of, views), bytes_of(poses), *shown, self.converges)
         if now == self._last and not self.stats.pending:
             self.stats = self._stats(0, False, self.stats.in_sight)
@@ -156,10 +159,10 @@ class Stream:
         weight = self.weights.of(sight, views, poses, shown, fresh=self.converges)
         self._fetcher.tick(moving, 0 if self.weights.looked else PIXELS)  # one or the other
         wanted, worth = self._choose(weight, sight)
-        changed, moved = self._change(wanted, worth)
+        changed, moved = self._change(wanted, worth, self._held_nodes(sight))
         self._last = now
         splats = int(self.table.splats[changed].sum())
-        pending = bool((wanted != self.table.level).any() or self._fades.leaves.any())
+        pending = bool((wanted != self.table.level).any() or self.fades.leaves.any())
         self.stats = self._stats(splats, pending, int(self._finest[sight.held].sum()))
         return sorted({self.objects[i] for i in np.unique(self._object[moved])})
 
@@ -201,7 +204,7 @@ class Stream:
         )
 
     def find_sight(
-        self, poses: list[np.ndarray], shown: list[bool], views: Sequence[View]
+        self, poses: Sequence[np.ndarray], shown: list[bool], views: Sequence[View]
     ) -> LeafSight:
         """Of all leaves, one object after the other."""
         each: list[LeafSight] = []
@@ -214,17 +217,31 @@ class Stream:
         there = np.array(shown)[self._object] & self._is_leaf
         return LeafSight(held & there, wide & there, cover, distance)
 
-    def _change(self, wanted: np.ndarray, worth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _held_nodes(self, sight: LeafSight) -> np.ndarray:
+        """(N,) bool: in this picture and in the last one: what comes or goes there is seen to."""
+        now = sight.held
+        if self.tree is not None:
+            now = now | upwards(self.tree, np.logical_or, now)
+        stayed, self._held = now & self._held, now
+        return stayed
+
+    def _change(
+        self, wanted: np.ndarray, worth: np.ndarray, stayed: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Brings the arena nearer to the wanted levels; the leaves with other levels, and all that
-        have other pages.
+        have other pages.  stayed: (N,) bool, nodes whose place was in the last picture, too.
         """
-        table, fades = self.table, self._fades
+        table, fades = self.table, self.fades
         over = [fades.end(np.flatnonzero(fades.leaves))] if self.converges else []
         level = wanted = patient(self.tree, wanted, table.level, fades.leaves)
+        before = table.level.copy()
         gone = np.flatnonzero((wanted == NOT_DRAWN) & (table.level != NOT_DRAWN))
         out, into = NONE, NONE
         if not self.converges and self._drawing.weighs_pages:
             out, into = swapped(self.tree, wanted, table.level)
+            stayed = stayed & ~fades.leaves
+            out = np.union1d(out, gone[stayed[gone]])
+            into = np.union1d(into, np.flatnonzero(stayed & (table.level == NOT_DRAWN)))
         table.retire(out)
         over.append(fades.end(np.setdiff1d(gone, out)))
         over.append(fades.advance())
@@ -248,7 +265,9 @@ class Stream:
         table.retire(fading)
         pages.append(table.free(np.setdiff1d(due, fading)))
         self._drawing.clear_pages(np.concatenate(pages))
-        self._upload(due, level[due], np.concatenate([fading, out, np.intersect1d(due, into)]))
+        self._upload(due, level[due])
+        both = np.concatenate([fading, out, np.intersect1d(due, into)])
+        fades.begin(both, comes_finer(self.tree, table.level, before)[both])
         changed = np.concatenate([gone, due])
         return changed, np.concatenate([changed, *over])
 
@@ -259,11 +278,10 @@ class Stream:
             return None
         return due[self.table.level[due] != NOT_DRAWN]
 
-    def _upload(self, leaves: np.ndarray, levels: np.ndarray, fading: np.ndarray) -> None:
+    def _upload(self, leaves: np.ndarray, levels: np.ndarray) -> None:
         self._uploader.upload(leaves, levels)
         if not self.follows_eye:
             self._drawing.shade_pages(self.placed)
-        self._fades.begin(fading)
 
     def _missing(
         self, wanted: np.ndarray, worth: np.ndarray, at_hand: Sequence[np.ndarray]
@@ -292,7 +310,7 @@ class Stream:
         if not self.stats.pending:
             return False
         decoded = sum(int(np.count_nonzero(there)) for there in self._from.at_hand())
-        fades = bool(self._fades.leaves.any())
+        fades = bool(self.fades.leaves.any())
         return fades or self.stats.changed > 0 or decoded != self._decoded
 
     def _first_of(

@@ -33,6 +33,21 @@ def swapped(
     return np.flatnonzero(gone & related(tree, new)), np.flatnonzero(new & related(tree, gone))
 
 
+def comes_finer(tree: NodeTree | None, level: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """(N,) bool: a leaf at a finer level than before, a parent where its children come, a child
+    where its parents go, and what comes alone.
+    """
+    new, gone = (
+        (there != NOT_DRAWN) & (other == NOT_DRAWN)
+        for there, other in ((level, before), (before, level))
+    )
+    if tree is not None:
+        opened = gone & upwards(tree, np.logical_or, new)
+        new = new & ~upwards(tree, np.logical_or, gone)  # a parent that comes is coarser
+        return opened | new | ((level != NOT_DRAWN) & (level < before))
+    return new | ((level != NOT_DRAWN) & (level < before))
+
+
 def related(tree: NodeTree, nodes: np.ndarray) -> np.ndarray:
     """(N,) bool: above or below one of nodes (N,) bool, or one of them."""
     return upwards(tree, np.logical_or, nodes) | downwards(tree, np.logical_or, nodes)

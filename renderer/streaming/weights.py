@@ -93,4 +93,4 @@ def median_of(values: np.ndarray, weight: np.ndarray) -> float:
 
 
 def bytes_of(poses: Sequence[np.ndarray]) -> bytes:
-    return b"".join(np.asarray(pose, np.float64).tobytes() for pose in poses)
+    return np.asarray(poses, np.float64).tobytes()

@@ -5,7 +5,8 @@ python tools/renderer/switching.py FOLDER --view EX,EY,EZ,TX,TY,TZ --out docs/be
 FOLDER is streamed SOG, as launch.py lod writes it.  At rest under a budget one leaf after the other
 goes a level coarser, and back.  A change is the mean difference of the colours, of 255, over the
 pixels that show the leaf, each as far as it does, which is measured by drawing it black and
-white.  The worst and the mean of all leaves that were tried, of the frame that changes most.
+white.  The worst and the mean of all leaves that were tried, of the frame that changes most; and
+the mean of each frame as the finer level comes, the last one that which shows it alone.
 """
 
 import argparse
@@ -31,7 +32,16 @@ from shapeshift.scene.scene import Scene, SceneObject
 SIZE = (1280, 720)
 LEAVES = 12  # that are tried, of those seen in PIXELS or more
 PIXELS = 250
-COLUMNS = ("scene", "budget", "frames_of_both", "leaves", "mean_change", "worst_change")
+COLUMNS = (
+    "scene",
+    "budget",
+    "finer_parts",
+    "leaves",
+    "mean_change",
+    "worst_change",
+    "as_finer_comes",
+)
+PARTS = ((), (0.30,), (0.16, 0.50), (0.25, 0.50, 0.75), fade.PARTS)  # of the finer level
 
 
 def main() -> None:
@@ -70,17 +80,21 @@ def measure(folder: Path, view: View, budget: int) -> Iterator[dict]:
         leaves = np.random.default_rng(0).permutation(able)[:LEAVES]
         stream.converges = False
         shown = [weight_of(renderer, view, leaf) for leaf in leaves]
-        for both in (0, 1, 2, fade.FRAMES):
-            fade.FRAMES = both or 1
-            changes = []
+        for parts in PARTS:
+            fade.PARTS = parts or (0.5,)
+            changes = {1: [], -1: []}
             for leaf, weight in zip(leaves, shown, strict=True):
                 if weight.sum() > PIXELS / 4:
-                    for step in (1, -1):
-                        changes.append(change(renderer, view, leaf, step, weight, both == 0))
+                    for step, found in changes.items():
+                        found.append(change(renderer, view, leaf, step, weight, not parts))
+            both = np.max(changes[1] + changes[-1], axis=1)
+            finer = np.mean(changes[-1], axis=0)
             yield {
-                "scene": folder.name, "budget": budget, "frames_of_both": both,
-                "leaves": len(changes) // 2, "mean_change": round(float(np.mean(changes)), 2),
-                "worst_change": round(float(np.max(changes)), 2),
+                "scene": folder.name, "budget": budget,
+                "finer_parts": " ".join(f"{part:g}" for part in parts),
+                "leaves": len(changes[1]), "mean_change": round(float(both.mean()), 2),
+                "worst_change": round(float(both.max()), 2),
+                "as_finer_comes": " ".join(f"{step:.2f}" for step in finer),
             }  # fmt: skip
 
 
@@ -103,22 +117,23 @@ def weight_of(renderer: Renderer, view: View, leaf: int) -> np.ndarray:
 
 def change(
     renderer: Renderer, view: View, leaf: int, step: int, weight: np.ndarray, at_once: bool
-) -> float:
-    """Of the frame that changes most, as a leaf goes `step` levels."""
+) -> list[float]:
+    """Of each frame, as a leaf goes `step` levels."""
     stream, one = renderer.streaming.stream, np.array([leaf])
     pictures = [picture(renderer, view)]
     level = stream.table.level[one] + step
     stream.table.retire(one)
-    stream._upload(one, level, one)
+    stream._upload(one, level)
+    stream.fades.begin(one, np.array([step < 0]))
     if at_once:
-        stream._fades.end(one)
+        stream.fades.end(one)
     while True:
         pictures.append(picture(renderer, view))
-        if not stream._fades.leaves.any():
+        if not stream.fades.leaves.any():
             break
-        stream._fades.advance()
+        stream.fades.advance()
     differences = [np.abs(b - a).mean(axis=2) for a, b in pairwise(pictures)]
-    return max(255 * float((d * weight).sum() / weight.sum()) for d in differences)
+    return [255 * float((d * weight).sum() / weight.sum()) for d in differences]
 
 
 if __name__ == "__main__":

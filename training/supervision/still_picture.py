@@ -85,7 +85,17 @@ def subject_mask(rgb: np.ndarray, still: StillPicture) -> np.ndarray:
 
 
 def cut_out(photo: LoadedPhoto, still: StillPicture) -> LoadedPhoto:
-    """The photo with an alpha that leaves the subject alone."""
+    """The photo with an alpha that leaves the subject alone; of the rest nothing else is known.
+
+    What does not count, as beyond a lens's edge, is no background.
+    """
     rgba = photo.rgba.copy()
-    rgba[..., 3] = np.where(subject_mask(rgba[..., :3], still), np.uint8(255), np.uint8(0))
-    return replace(photo, rgba=rgba, masked=True)
+    mask = subject_mask(rgba[..., :3], still)
+    nothing = photo.weight is not None and ~(photo.weight > 0)
+    rgba[..., 3] = np.where(mask | nothing, np.uint8(255), np.uint8(0))
+    depth, normals = photo.depth, photo.normals
+    if depth is not None:
+        depth = np.where(mask, depth, np.float32(0))
+    if normals is not None:
+        normals = np.where(mask[..., None], normals, np.int8(0))
+    return replace(photo, rgba=rgba, masked=True, depth=depth, normals=normals)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.streaming.fade import FRAMES
+from shapeshift.renderer.streaming.fade import PARTS, parts_of
 from tests.support.splat_scenes import shell
 from tests.support.streamed_scenes import open_levels, rest, scene_of, view_at, write_levels
 
@@ -25,29 +25,41 @@ def moving(folder):
         yield renderer
 
 
+def test_parts_are_even_steps_to_the_finer_level_and_back():
+    ages = np.arange(len(PARTS))
+    finer, coarser = (parts_of(ages, np.full(len(ages), way)) for way in (True, False))
+    np.testing.assert_array_equal(finer, PARTS)
+    np.testing.assert_allclose(1 - coarser[::-1], PARTS)  # the same pictures, backwards
+    assert (np.diff([0, *finer, 1]) > 0).all() and (np.diff([0, *coarser, 1]) > 0).all()
+
+
 def test_both_levels_are_drawn_for_so_many_frames_and_then_one(moving):
     rest(moving, NEAR)
     stream, pages = moving.streaming.stream, moving.drawing.paged
-    most = 0
-    ages = np.zeros(len(stream.table.level), int)
+    seen, levels = set(), stream.table.level.copy()
+    ages, finer = np.zeros(len(levels), int), np.zeros(len(levels), bool)
     for turn in np.linspace(0, 1.5, 40):
         view = view_at((3.5 * np.sin(turn), 0.5, 3.5 * np.cos(turn)))
         moving.draw([view])
         table = stream.table
-        leaving = np.unique(table.left[table.left >= 0])
-        most = max(most, len(leaving))
         before, ages = ages, np.zeros_like(ages)
-        for leaf in leaving:
+        for leaf in np.flatnonzero(stream.fades.leaves):
             new = pages.weight[table.pages_of(np.array([leaf]))]
             old = pages.weight[table.leaving(np.array([leaf]))]
-            ages[leaf] = round((FRAMES + 1) * new[0])
-            # Frame by frame; the one after the last may begin another change.
-            assert ages[leaf] == before[leaf] % FRAMES + 1
-            np.testing.assert_allclose(new, ages[leaf] / (FRAMES + 1), atol=1e-6)
-            np.testing.assert_allclose(old, 1 - ages[leaf] / (FRAMES + 1), atol=1e-6)
-        others = np.setdiff1d(np.flatnonzero(table.leaf_of >= 0), table.pages_of(leaving))
+            ages[leaf] = before[leaf] % len(PARTS) + 1  # frame by frame; then perhaps again
+            if ages[leaf] == 1:
+                alone = levels[leaf] if len(new) == 0 else -2 if len(old) == 0 else None
+                finer[leaf] = table.level[leaf] < levels[leaf] if alone is None else alone == -2
+            part = parts_of(ages[[leaf]] - 1, finer[[leaf]])[0]
+            np.testing.assert_allclose(new, part, atol=1e-6)
+            np.testing.assert_allclose(old, 1 - part, atol=1e-6)
+            seen.add((bool(finer[leaf]), len(new) > 0, len(old) > 0))
+        fading = np.flatnonzero(stream.fades.leaves)
+        others = np.setdiff1d(np.flatnonzero(table.leaf_of >= 0), table.pages_of(fading))
         assert (pages.weight[others] == 1).all()
-    assert most > 0  # or nothing was tested
+        assert set(np.unique(table.left[table.left >= 0])) <= set(fading)
+        levels = table.level.copy()
+    assert {(True, True, True), (False, True, True)} <= seen  # or nothing was tested
     rest(moving, view)
     assert (pages.weight[pages.stored >= 0] == 1).all() and (table.left < 0).all()
 
@@ -81,7 +93,7 @@ def test_a_picture_of_its_own_ends_what_fades(moving):
 
 
 @pytest.mark.parametrize("opacity", [0.004, 0.05, 0.5, 0.9, 0.99, 1.0])
-@pytest.mark.parametrize("part", [0.25, 0.5, 0.75])
+@pytest.mark.parametrize("part", sorted({0.25, 0.5, 0.75, *PARTS}))
 def test_two_parts_hide_about_what_the_whole_hides(opacity, part):
     """By another formula: over a Gaussian's area, one part before the other, beside one whole."""
     falloff = np.exp(-0.5 * np.linspace(0, 3, 400) ** 2)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.baselines.plain import PlainTrainer
 from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.blocks import begin_block
 from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.photo_store.open_photos import PhotoRoom, open_photos
@@ -286,3 +288,16 @@ def test_scores_are_of_the_subject_and_of_whole_photos(turntable):
     assert evaluate_model(device, unsaid, capture)["RGB"].whole_db == score.whole_db
     without = replace(model, provenance={"still_background": False})
     assert evaluate_model(device, without, capture)["RGB"].whole_db is None
+
+
+@pytest.mark.parametrize("said, background", [(True, "auto"), (False, "random"), (None, "random")])
+def test_blocks_look_for_it_where_the_coarse_run_found_it(turntable, monkeypatch, said, background):
+    """A part of the photos may look otherwise than all do: elsewhere nothing is looked for."""
+
+    known = {"background": None, "downscale": 1, "still_background": said}
+    start = SimpleNamespace(notes={}, provenance=known)
+    monkeypatch.setattr(begin_block, "BlockTrainer", lambda device, start, of, given, *_: given)
+    capture = read_capture(turntable[0])
+    asked = TrainSettings(iterations=1)
+    given = begin_block.begin_block(open_device("cpu"), start, capture, asked)
+    assert given.background == background

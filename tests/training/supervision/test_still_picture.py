@@ -17,10 +17,11 @@ from shapeshift.training.supervision.still_picture import (
     subject_mask,
     tolerance_of,
 )
-from shapeshift.training.synthetic.strangers import make_stranger, mask_of
+from shapeshift.training.synthetic.strangers import KINDS, make_stranger, mask_of
 
 RNG = np.random.default_rng
 SIZE = (24, 32)  # rows, columns
+VIEW = KINDS["turntable"].views(1, SIZE[::-1])[0]
 
 
 def before_wall(count: int, covers: int) -> tuple[np.ndarray, np.ndarray]:
@@ -111,10 +112,28 @@ def test_what_is_cut_keeps_its_colours():
     rgb = wall.copy()
     rgb[6:18, 6:22] = 255 - wall[6:18, 6:22]
     rgba = np.concatenate([rgb, np.full((*SIZE, 1), 255, np.uint8)], axis=2)
-    photo = LoadedPhoto(None, "RGB", rgba, None, "a")  # ty: ignore
+    photo = LoadedPhoto(VIEW, "RGB", rgba, None, "a")
     out = cut_out(photo, still_picture(list(photos)))
     assert out.masked and (out.rgba[..., :3] == rgb).all() and (rgba[..., 3] == 255).all()
     assert set(np.unique(out.rgba[..., 3])) == {0, 255}
+
+
+def test_of_what_is_cut_away_no_shape_is_known_and_of_a_lens_edge_nothing():
+    photos, wall = before_wall(20, 0)
+    rgb = wall.copy()
+    rgb[6:18, 6:22] = 255 - wall[6:18, 6:22]
+    rgba = np.concatenate([rgb, np.full((*SIZE, 1), 255, np.uint8)], axis=2)
+    weight = np.ones(SIZE, np.float32)
+    weight[:, 28:], weight[0, 0] = 0, 1e-6
+    depth, normals = np.full(SIZE, 2, np.float32), np.full((*SIZE, 4), 7, np.int8)
+    whole = LoadedPhoto(VIEW, "RGB", rgba, weight, "a", depth, False, normals)
+    still = still_picture(list(photos))
+    out, mask = cut_out(whole, still), subject_mask(rgb, still)
+    assert (out.rgba[:, 28:, 3] == 255).all() and (out.rgba[:, :28, 3] == 255 * mask[:, :28]).all()
+    assert out.weight is weight
+    assert (out.depth == 2 * mask).all() and (out.normals == 7 * mask[..., None]).all()
+    assert out.depth.dtype == np.float32 and out.normals.dtype == np.int8
+    assert (depth == 2).all() and (normals == 7).all(), "those of the photo stay"
 
 
 def test_half_the_photos_by_chance_need_not_be_still():
