@@ -48,7 +48,7 @@ def print_table(facts: dict) -> None:
             value = "\n".join(f"{s['x']:.3f}  {s['name']} ({s['kind']})" for s in value)
         elif key == "heads":
             value = "\n".join(
-                f"{name}: {' → '.join(map(str, head['layers']))}, {head['activation']}"
+                f"{name}: {' to '.join(map(str, head['layers']))}, {head['activation']}"
                 for name, head in value.items()
             )
         elif key == "coarser_levels":

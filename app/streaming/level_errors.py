@@ -16,6 +16,7 @@ VIEWS = 4  # about it
 TURN = 0.3  # radians: of the first
 LEAST_DB = {"stops": 40.0, "between": 36.0}  # of a level where it begins, to all there is
 MOST_CHANGE = 6.0  # of 255, in the mean of the model's pixels, as one level follows another
+WHERE = {"stops": "at stops", "between": "between them"}  # in words
 COVERED = 0.02  # of a pixel, from which on it is the model's
 STEP = 2**0.25  # from one size that is tried to the next ...
 TRIES = 8  # ... so often: down to 0.3 times the first
@@ -34,7 +35,20 @@ class LevelErrors:
 
     @property
     def good(self) -> bool:
-        return self.change <= MOST_CHANGE and all(self.db[at] >= LEAST_DB[at] for at in self.db)
+        return not self.lacks
+
+    @property
+    def lacks(self) -> list[str]:
+        """What keeps it from being good, each with the bound."""
+        found = [
+            f"{self.db[at]:.1f} dB {WHERE[at]} ({LEAST_DB[at]:.0f} wanted)"
+            for at in self.db if not self.db[at] >= LEAST_DB[at]
+        ]  # fmt: skip
+        if not self.change <= MOST_CHANGE:
+            found.append(
+                f"a switch changes its pixels by {self.change:.1f}/255 (at most {MOST_CHANGE:.0f})"
+            )
+        return found
 
 
 class LevelMeter:
@@ -79,14 +93,14 @@ class LevelMeter:
         db = {at: psnr_of(mine[at], whole[at]) for at in whole}
         return LevelErrors(pixels, db, max(change_of(mine[at], last[at]) for at in whole))
 
-    def largest_good(
-        self, level: AnchorModel, before: AnchorModel, below: float
-    ) -> LevelErrors | None:
-        """The errors at the largest size up to `below` where the level is good; None: at none."""
+    def largest_good(self, level: AnchorModel, before: AnchorModel, below: float) -> LevelErrors:
+        """The errors at the largest size up to `below` where the level is good; at the smallest
+        that was tried, where it is good at none.
+        """
         for number in range(TRIES):
             if (found := self.errors(level, before, below / STEP**number)).good:
-                return found
-        return None
+                break
+        return found
 
     def __enter__(self) -> "LevelMeter":
         return self

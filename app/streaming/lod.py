@@ -19,7 +19,6 @@ LEAST_LEAF = 64  # splats: of smaller ones the tree would take more bytes than t
 MOST_LEAF = 1 << 19  # a leaf lies in one file
 BAKED = 0.01  # of the time: colours of splats are copied
 FITTED = 0.3  # those of anchors are fitted
-WHERE = {"stops": "at stops", "between": "between them"}
 PACKAGE_LEVELS = ".lod"  # as level_files.py has it, which is loaded when it is asked for
 
 
@@ -102,6 +101,7 @@ def write_package_levels(options: Options) -> int:
     from shapeshift.app.commands.exported import check_output
     from shapeshift.app.errors import UsageError
     from shapeshift.app.opening import open_model
+    from shapeshift.app.streaming.level_errors import WHERE
     from shapeshift.app.streaming.package_levels import (
         make_levels,
         refuse_foreign_folder,
@@ -125,15 +125,18 @@ def write_package_levels(options: Options) -> int:
     size = write_made(made, options.scene, options.out)
     for level in made.levels:
         errors, steps = level.errors, level.steps
-        assert errors is not None, "levels that are good nowhere are left out"
         db = ", ".join(f"{value:.1f} dB {WHERE[at]}" for at, value in errors.db.items())
         say(
             f"{len(level.anchors.anchors):,} anchors where the scene is up to {errors.pixels:.0f} "
             f"pixels across: {db}, a switch changes its pixels by {errors.change:.1f}/255 in the "
             f"mean ({steps:,} steps)."
         )
-    for count in made.left_out:
-        say(f"{count:,} anchors are good enough at no size: that level is left out.")
+    for level in made.left_out:
+        say(
+            f"{len(level.anchors.anchors):,} anchors are good enough at no size, and left out: at "
+            f"{level.errors.pixels:.0f} pixels {' and '.join(level.errors.lacks)}, after "
+            f"{level.steps:,} steps; --distill with more seconds lets them learn longer."
+        )
     seconds = process_time() - start
     say(f"{full(options.out)}: {size:,} bytes, {seconds:.0f} s of processor time.")
     return 0

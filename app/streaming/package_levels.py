@@ -46,7 +46,7 @@ class MadeLevel:
 
     table: bytes
     anchors: CoarserAnchors
-    errors: LevelErrors | None  # None: it is good at no size
+    errors: LevelErrors  # at the largest size where it is good, or at the smallest of all
     steps: int  # that it has learned
 
 
@@ -56,7 +56,7 @@ class MadeLevels:
 
     model: AnchorModel
     levels: tuple[MadeLevel, ...]  # that are good somewhere
-    left_out: tuple[int, ...]  # anchors of those that are not
+    left_out: tuple[MadeLevel, ...]  # that are not
 
 
 def make_levels(model: AnchorModel, seconds: float, progress: Progress) -> MadeLevels:
@@ -65,10 +65,10 @@ def make_levels(model: AnchorModel, seconds: float, progress: Progress) -> MadeL
         made: list[MadeLevel] = []
         for number, share in enumerate(SHARES):
             if share * len(model.anchors) >= LEAST_ANCHORS:
-                good = [each for each in made if each.errors is not None]
+                good = [each for each in made if each.errors.good]
                 made.append(make_level(meter, number, good[-1:], seconds, progress))
-    good = [each for each in made if each.errors is not None]
-    left_out = tuple(len(each.anchors.anchors) for each in made if each.errors is None)
+    good = [each for each in made if each.errors.good]
+    left_out = tuple(each for each in made if not each.errors.good)
     return MadeLevels(
         model.with_coarser(tuple(each.anchors for each in good)), tuple(good), left_out
     )
@@ -94,7 +94,7 @@ def make_level(
         last = standing(meter.model, one.anchors)
         first_size = min(first_size, one.anchors.from_pixels / APART)
     errors = meter.largest_good(standing(meter.model, stored), last, first_size)
-    if errors is not None:
+    if errors.good:
         stored = replace(stored, from_pixels=errors.pixels, error_db=errors.db)
     return MadeLevel(table, replace(stored, cell_m=cell), errors, steps)
 
@@ -172,7 +172,7 @@ def package_bytes(path: Path) -> bytes:
 def write_made(made: MadeLevels, source: Path, out: Path) -> int:
     """The folder, all or nothing; its bytes.  Raises BadFile, also where no level is good."""
     if not made.model.coarser:
-        counts = " and ".join(f"{count:,}" for count in made.left_out) or "none"
+        counts = " and ".join(f"{len(each.anchors.anchors):,}" for each in made.left_out) or "none"
         raise BadFile(
             f"{source}: no coarser level is good enough at any size (tried: {counts} anchors); let "
             "them learn longer with --distill, or show the package as it is."

@@ -12,7 +12,7 @@ MOST_WAITING = 16  # parts: those of later frames are asked for then
 THREAD = "leaves"  # its name
 PACE_S = 1.0  # longest wait for the next frame, between pictures of a part
 PIXELS = 1 << 18  # of pictures that a frame of a moving eye bears: 3 to 5 ms of a core
-RETURNED = 16  # parts, after which the heap is given back in motion, too: 7 to 20 ms of a core
+RETURNED = 64  # parts, after which the heap is given back in motion, too: 7 to 20 ms of a core
 PATIENCE_S = 5.0  # longest wait at the end for a part that is being read
 
 

@@ -256,14 +256,18 @@ class Heads:
     """Runs the heads; device buffers are kept from call to call and grow with the anchors.
 
     form: "cpu" or "gpu", by default the device's kind.  Sums are made in another order: their
-    results agree to about 1e-6 of the largest.
+    results agree to about 1e-6 of the largest.  lanes: 16 or 8 floats of a vector in heads.cl, by
+    default as the device has them; the same bits.
     """
 
-    def __init__(self, device, layout: HeadLayout, form: str | None = None) -> None:
+    def __init__(
+        self, device, layout: HeadLayout, form: str | None = None, lanes: int | None = None
+    ) -> None:
         self.device, self.layout = device, layout
         self.form = form or device.kind
         file = {"cpu": "heads.cl", "gpu": "heads_gpu.cl"}[self.form]
-        self.kernels = device.program(KERNELS / file, **layout.defines())
+        self.lanes = lanes or (16 if device.lanes >= 16 else 8)
+        self.kernels = device.program(KERNELS / file, LANES=self.lanes, **layout.defines())
         hidden, features = padded(layout.hidden), padded(layout.features)
         # Each chunk sums its own weight gradients.  The number is fixed a form, never taken from
         # the cores: the order of additions, so every bit, would depend on it.
@@ -302,7 +306,8 @@ class Heads:
             self.kernels["prepare_weights"], 5 * padded(layout.hidden), 8,
             weights, self.control, self.bias, self.first_t, self.second_t,
         )  # fmt: skip
-        items, group = ((self.count + 3) // 4, 1) if self.form == "cpu" else (5 * self.count, 64)
+        each = self.lanes // 2  # anchors of a work-item of heads.cl
+        items, group = (-(-self.count // each), 1) if self.form == "cpu" else (5 * self.count, 64)
         self.device.launch(
             self.kernels["heads_forward"], items, group,
             self.count, *self.eye, weights, self.bias, anchors, features, self.hidden, self.raw,

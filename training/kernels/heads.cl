@@ -1,5 +1,6 @@
 // heads: the five heads, forward and backward: anchor features -> raw outputs (paper section 3.2,
-// eq. 5). CPU form: vectors of eight units, a few anchors at a time; heads_gpu.cl is the other.
+// eq. 5). CPU form: vectors of LANES (16 or 8) units, a few anchors at a time; heads_gpu.cl is the
+// other.
 //  unit = ReLU(W1^T (f, delta, Psi) + b1), raw = W2^T unit + b2
 // Reads:   weights, bias, anchors (A, 3), features (A, FEATURES), the eye; backward hidden and
 //          grad_raw.
@@ -7,28 +8,39 @@
 //          grad_chunks, the weights' gradients of each chunk.
 // Units:   anchors and eye in metres; features, Psi and units have none.
 #include "heads_shared.cl"
-#define BLOCK 8  // anchors that share one pass over the weights in the backward kernel
+#define BLOCK LANES  // anchors that share one pass over the weights in the backward kernel
 
 // Loops over a block's anchors are unrolled: only then are their sums kept in registers.  A sum in
 // memory is stored and loaded again for every multiply-add, which takes three times as long.
 #define UNROLL _Pragma("unroll")
-#define ROWS 4  // anchors of a work-item of the forward kernel
+// Anchors of a work-item of the forward kernel: as many as give eight sums of a register each, so
+// that no multiply-add waits for the one before.
+#define ROWS (LANES / 2)
+// BODY(16) or BODY(8) for vectors of `count` neighbours (a multiple of 8) from `at` on.  No lane
+// meets another, so the same bits come of either.
+#if LANES == 16
+#define IN_VECTORS(BODY, count)                           \
+  {                                                       \
+    int at = 0;                                           \
+    for (; at + 16 <= (count); at += 16) { BODY(16) }     \
+    for (; at < (count); at += 8) { BODY(8) }             \
+  }
+#else
+#define IN_VECTORS(BODY, count) \
+  for (int at = 0; at < (count); at += 8) { BODY(8) }
+#endif
 
-// A layer of ROWS anchors: what `takes` inputs add to two vectors of outputs of each.  With two
-// there are enough sums on their way to hide how long each multiply-add takes.
-inline void add_pair(float8 *low, float8 *high, const float *in, int stride, int takes,
+// A layer of ROWS anchors: what `takes` inputs add to sixteen outputs of each.
+inline void add_wide(float16 *sum, const float *in, int stride, int takes,
                      __global const float *weights, int gives) {
   for (int i = 0; i < takes; i++) {
     // One row of weights serves all anchors.
-    const float8 w_low = vload8(0, weights + i * gives), w_high = vload8(1, weights + i * gives);
-    UNROLL for (int b = 0; b < ROWS; b++) {
-      low[b] += in[b * stride + i] * w_low;
-      high[b] += in[b * stride + i] * w_high;
-    }
+    const float16 w = vload16(0, weights + i * gives);
+    UNROLL for (int b = 0; b < ROWS; b++) sum[b] += in[b * stride + i] * w;
   }
 }
 
-// The last vector of a layer with an odd number of them.
+// The last vector of a layer with an odd number of eights.
 inline void add_one(float8 *sum, const float *in, int stride, int takes,
                     __global const float *weights, int gives) {
   for (int i = 0; i < takes; i++) {
@@ -43,57 +55,51 @@ typedef struct {
   float feature[ROWS][FEATURES], direction[ROWS][3], unit[ROWS][HIDDEN];
 } Rows;
 
-// Hidden units of head m: vectors j and, where `pair`, j + 1.
+// Hidden units of head m: sixteen from 8 j on where `pair`, else eight.
 inline void first_layer(Rows *k, int m, int j, int pair, __global const float *weights,
                         __global const float *bias, __global float *hidden) {
   // Columns 8 j and on of the rows of W1 that meet the features, and of those that meet delta.
   __global const float *by_feature = weights + WEIGHTS_AT[m] + 8 * j;
   __global const float *by_direction = by_feature + DIRECTION_ROW * HIDDEN;
   const int looks = m == COLOR && VIEW_COLOR ? 3 : 0;  // only the colour looks at the direction
-  float8 low[ROWS], high[ROWS];
   // b1 with W1_control . Psi in it: Psi costs nothing an anchor.
-  UNROLL for (int b = 0; b < ROWS; b++) low[b] = vload8(j, bias + m * HIDDEN);
-  if (pair) {
-    UNROLL for (int b = 0; b < ROWS; b++) high[b] = vload8(j + 1, bias + m * HIDDEN);
-    add_pair(low, high, k->feature[0], FEATURES, FEATURES, by_feature, HIDDEN);
-    add_pair(low, high, k->direction[0], 3, looks, by_direction, HIDDEN);
-    UNROLL for (int b = 0; b < ROWS; b++) {
-      const float8 y = fmax(high[b], (float8)(0.0f));
-      vstore8(y, j + 1, k->unit[b]);
-      vstore8(y, j + 1, hidden + UNITS_OF(k->anchor[b], m));
-    }
-  } else {
-    add_one(low, k->feature[0], FEATURES, FEATURES, by_feature, HIDDEN);
-    add_one(low, k->direction[0], 3, looks, by_direction, HIDDEN);
+  __global const float *biases = bias + m * HIDDEN + 8 * j;
+#define FIRST_LAYER(N, ADD)                                                              \
+  {                                                                                      \
+    float##N sum[ROWS];                                                                  \
+    UNROLL for (int b = 0; b < ROWS; b++) sum[b] = vload##N(0, biases);                  \
+    ADD(sum, k->feature[0], FEATURES, FEATURES, by_feature, HIDDEN);                     \
+    ADD(sum, k->direction[0], 3, looks, by_direction, HIDDEN);                           \
+    UNROLL for (int b = 0; b < ROWS; b++) {                                              \
+      const float##N y = fmax(sum[b], (float##N)(0.0f));                                 \
+      vstore##N(y, 0, k->unit[b] + 8 * j);                                               \
+      vstore##N(y, 0, hidden + UNITS_OF(k->anchor[b], m) + 8 * j);                       \
+    }                                                                                    \
   }
-  UNROLL for (int b = 0; b < ROWS; b++) {
-    const float8 y = fmax(low[b], (float8)(0.0f));
-    vstore8(y, j, k->unit[b]);
-    vstore8(y, j, hidden + UNITS_OF(k->anchor[b], m));
-  }
+  if (pair) FIRST_LAYER(16, add_wide)
+  else FIRST_LAYER(8, add_one)
 }
 
-// Raw outputs of head m, linear in its units: vectors c and, where `pair`, c + 1.
+// Raw outputs of head m, linear in its units: sixteen from 8 c on where `pair`, else eight.
 inline void second_layer(const Rows *k, int m, int c, int pair, __global const float *weights,
                          __global float *raw) {
   const int outs = OUT[m];
   // A head's weights: W1, b1, W2, b2 (heads_shared.cl).
   __global const float *second = weights + WEIGHTS_AT[m] + LAST_AT;
-  __global const float *biases = second + HIDDEN * outs;
-  float8 low[ROWS], high[ROWS];
-  UNROLL for (int b = 0; b < ROWS; b++) low[b] = vload8(c, biases);
-  if (pair) {
-    UNROLL for (int b = 0; b < ROWS; b++) high[b] = vload8(c + 1, biases);
-    add_pair(low, high, k->unit[0], HIDDEN, HIDDEN, second + 8 * c, outs);
-    UNROLL for (int b = 0; b < ROWS; b++)
-      vstore8(high[b], c + 1, raw + k->anchor[b] * RAW + OUT_AT[m]);
-  } else {
-    add_one(low, k->unit[0], HIDDEN, HIDDEN, second + 8 * c, outs);
+  __global const float *biases = second + HIDDEN * outs + 8 * c;
+#define SECOND_LAYER(N, ADD)                                                             \
+  {                                                                                      \
+    float##N sum[ROWS];                                                                  \
+    UNROLL for (int b = 0; b < ROWS; b++) sum[b] = vload##N(0, biases);                  \
+    ADD(sum, k->unit[0], HIDDEN, HIDDEN, second + 8 * c, outs);                          \
+    UNROLL for (int b = 0; b < ROWS; b++)                                                \
+      vstore##N(sum[b], 0, raw + k->anchor[b] * RAW + OUT_AT[m] + 8 * c);                \
   }
-  UNROLL for (int b = 0; b < ROWS; b++) vstore8(low[b], c, raw + k->anchor[b] * RAW + OUT_AT[m]);
+  if (pair) SECOND_LAYER(16, add_wide)
+  else SECOND_LAYER(8, add_one)
 }
 
-// One work-item four anchors: every weight row is loaded once for the four.
+// One work-item ROWS anchors: every weight row is loaded once for them.
 __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float eye_z,
                             __global const float *weights, __global const float *bias,
                             __global const float *anchors, __global const float *features,
@@ -124,7 +130,7 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
 // Everything is private: a block's numbers are used for hundreds of weights each.
 typedef struct {
   float input[BLOCK][FEATURES], unit[BLOCK][HIDDEN], d_out[BLOCK][MAX_OUT], d_unit[BLOCK][HIDDEN];
-  float8 d_input[BLOCK][FEATURES8];
+  float d_input[BLOCK][FEATURES];
   float4 direction[BLOCK];  // unit vector, 1 / distance
 } Block;
 
@@ -136,7 +142,7 @@ inline void load_anchors(Block *k, int base, int count, float3 eye, __global con
     int a = base + min(b, count - 1);
     for (int i = 0; i < FEATURES; i++) k->input[b][i] = features[a * FEATURES + i];
     // All five heads add to the gradient of the same features.
-    for (int i = 0; i < FEATURES8; i++) k->d_input[b][i] = 0;
+    for (int i = 0; i < FEATURES; i++) k->d_input[b][i] = 0;
     k->direction[b] = direction_and_inverse(eye, anchors + 3 * a);
   }
 }
@@ -157,82 +163,83 @@ inline void load_head(Block *k, int m, int base, int count, __global const float
 
 // b2 and W2 of a head with `outs` outputs.
 inline void second_layer_gradient(const Block *k, int outs, __global float *grad) {
-  for (int c = 0; c < outs / 8; c++) {
-    // db2 = sum of d, dW2 = sum of unit d, over the block's anchors.
-    float8 d[BLOCK], sum = vload8(c, grad + HIDDEN * outs);
-    UNROLL for (int b = 0; b < BLOCK; b++) { d[b] = vload8(c, k->d_out[b]); sum += d[b]; }
-    vstore8(sum, c, grad + HIDDEN * outs);
-    for (int j = 0; j < HIDDEN; j++) {
-      // Row j of W2, for all of the block's anchors: one load and store of the gradient for eight.
-      float8 g = vload8(c, grad + j * outs);
-      UNROLL for (int b = 0; b < BLOCK; b++) g += k->unit[b][j] * d[b];
-      vstore8(g, c, grad + j * outs);
-    }
+  __global float *biases = grad + HIDDEN * outs;
+  // db2 = sum of d, dW2 = sum of unit d, over the block's anchors.  Row j of W2, for all of them:
+  // one load and store of the gradient for all.
+#define OUTPUTS(N)                                                                       \
+  float##N d[BLOCK], sum = vload##N(0, biases + at);                                     \
+  UNROLL for (int b = 0; b < BLOCK; b++) { d[b] = vload##N(0, k->d_out[b] + at); sum += d[b]; } \
+  vstore##N(sum, 0, biases + at);                                                        \
+  for (int j = 0; j < HIDDEN; j++) {                                                     \
+    float##N g = vload##N(0, grad + j * outs + at);                                      \
+    UNROLL for (int b = 0; b < BLOCK; b++) g += k->unit[b][j] * d[b];                    \
+    vstore##N(g, 0, grad + j * outs + at);                                               \
   }
+  IN_VECTORS(OUTPUTS, outs)
 }
 
 // Through the last layer and the ReLU into the hidden units.
 inline void units_gradient(Block *k, int m, __global const float *second_t) {
-  for (int j = 0; j < HIDDEN8; j++) {
-    // Eight hidden units of every anchor in the block.
-    float8 d[BLOCK];
-    UNROLL for (int b = 0; b < BLOCK; b++) d[b] = 0;
-    // d_unit = W2 d_out.
-    for (int c = 0; c < OUT[m]; c++) {
-      // Row c of W2^T: how output c moves the units.
-      const float8 w = vload8(j, second_t + c * HIDDEN);
-      UNROLL for (int b = 0; b < BLOCK; b++) d[b] += k->d_out[b][c] * w;
-    }
-    UNROLL for (int b = 0; b < BLOCK; b++) {
-      // ReLU lets nothing back where it was 0.
-      d[b] = select((float8)(0.0f), d[b], isgreater(vload8(j, k->unit[b]), (float8)(0.0f)));
-      vstore8(d[b], j, k->d_unit[b]);
-    }
+  // d_unit = W2 d_out; row c of W2^T: how output c moves the units.  ReLU lets nothing back where
+  // it was 0.
+#define UNITS(N)                                                                         \
+  float##N d[BLOCK];                                                                     \
+  UNROLL for (int b = 0; b < BLOCK; b++) d[b] = 0;                                       \
+  for (int c = 0; c < OUT[m]; c++) {                                                     \
+    const float##N w = vload##N(0, second_t + c * HIDDEN + at);                          \
+    UNROLL for (int b = 0; b < BLOCK; b++) d[b] += k->d_out[b][c] * w;                   \
+  }                                                                                      \
+  UNROLL for (int b = 0; b < BLOCK; b++) {                                               \
+    const float##N unit = vload##N(0, k->unit[b] + at), none = 0;                        \
+    vstore##N(select(none, d[b], isgreater(unit, none)), 0, k->d_unit[b] + at);          \
   }
+  IN_VECTORS(UNITS, HIDDEN)
 }
 
 // b1 and W1 of the features (and of the direction).
 inline void first_layer_gradient(const Block *k, int m, __global float *grad) {
-  for (int j = 0; j < HIDDEN8; j++) {
-    // db1 and the features' rows of dW1; Psi's rows follow from db1 at the end (control_gradient).
-    float8 d[BLOCK], sum = vload8(j, grad + INPUTS * HIDDEN);
-    UNROLL for (int b = 0; b < BLOCK; b++) { d[b] = vload8(j, k->d_unit[b]); sum += d[b]; }
-    // The gradient of the folded bias.
-    vstore8(sum, j, grad + INPUTS * HIDDEN);
-    for (int i = 0; i < FEATURES; i++) {
-      float8 g = vload8(j, grad + i * HIDDEN);
-      UNROLL for (int b = 0; b < BLOCK; b++) g += k->input[b][i] * d[b];
-      vstore8(g, j, grad + i * HIDDEN);
-    }
-    // Only the colour head has seen the direction.
-    if (!(m == COLOR && VIEW_COLOR)) continue;
-    // The three rows that meet the direction.
-    __global float *by_direction = grad + DIRECTION_ROW * HIDDEN;
-    float8 x = vload8(j, by_direction), y = vload8(j, by_direction + HIDDEN);
-    float8 z = vload8(j, by_direction + 2 * HIDDEN);
-    UNROLL for (int b = 0; b < BLOCK; b++) {
-      x += k->direction[b].x * d[b];
-      y += k->direction[b].y * d[b];
-      z += k->direction[b].z * d[b];
-    }
-    vstore8(x, j, by_direction);
-    vstore8(y, j, by_direction + HIDDEN);
-    vstore8(z, j, by_direction + 2 * HIDDEN);
+  __global float *biases = grad + INPUTS * HIDDEN;
+  // Only the colour head has seen the direction: the three rows that meet it.
+  const int looks = m == COLOR && VIEW_COLOR;
+  // db1 (the gradient of the folded bias) and the features' rows of dW1; Psi's rows follow from
+  // db1 at the end (control_gradient).
+#define INPUTS_OF(N)                                                                     \
+  float##N d[BLOCK], sum = vload##N(0, biases + at);                                     \
+  UNROLL for (int b = 0; b < BLOCK; b++) { d[b] = vload##N(0, k->d_unit[b] + at); sum += d[b]; } \
+  vstore##N(sum, 0, biases + at);                                                        \
+  for (int i = 0; i < FEATURES; i++) {                                                   \
+    float##N g = vload##N(0, grad + i * HIDDEN + at);                                    \
+    UNROLL for (int b = 0; b < BLOCK; b++) g += k->input[b][i] * d[b];                   \
+    vstore##N(g, 0, grad + i * HIDDEN + at);                                             \
+  }                                                                                      \
+  if (looks) {                                                                           \
+    __global float *by_direction = grad + DIRECTION_ROW * HIDDEN + at;                   \
+    float##N x = vload##N(0, by_direction), y = vload##N(0, by_direction + HIDDEN);      \
+    float##N z = vload##N(0, by_direction + 2 * HIDDEN);                                 \
+    UNROLL for (int b = 0; b < BLOCK; b++) {                                             \
+      x += k->direction[b].x * d[b];                                                     \
+      y += k->direction[b].y * d[b];                                                     \
+      z += k->direction[b].z * d[b];                                                     \
+    }                                                                                    \
+    vstore##N(x, 0, by_direction);                                                       \
+    vstore##N(y, 0, by_direction + HIDDEN);                                              \
+    vstore##N(z, 0, by_direction + 2 * HIDDEN);                                          \
   }
+  IN_VECTORS(INPUTS_OF, HIDDEN)
 }
 
 // dL / d feature = W1 d, summed over heads.
 inline void add_input_gradient(Block *k, __global const float *first_t) {
-  for (int i = 0; i < FEATURES8; i++) {
-    float8 sum[BLOCK];
-    UNROLL for (int b = 0; b < BLOCK; b++) sum[b] = k->d_input[b][i];
-    for (int j = 0; j < HIDDEN; j++) {
-      // Row j of W1^T: how unit j moves the features.
-      const float8 w = vload8(i, first_t + j * FEATURES);
-      UNROLL for (int b = 0; b < BLOCK; b++) sum[b] += k->d_unit[b][j] * w;
-    }
-    UNROLL for (int b = 0; b < BLOCK; b++) k->d_input[b][i] = sum[b];
-  }
+  // Row j of W1^T: how unit j moves the features.
+#define FEATURES_OF(N)                                                                   \
+  float##N sum[BLOCK];                                                                   \
+  UNROLL for (int b = 0; b < BLOCK; b++) sum[b] = vload##N(0, k->d_input[b] + at);       \
+  for (int j = 0; j < HIDDEN; j++) {                                                     \
+    const float##N w = vload##N(0, first_t + j * FEATURES + at);                         \
+    UNROLL for (int b = 0; b < BLOCK; b++) sum[b] += k->d_unit[b][j] * w;                \
+  }                                                                                      \
+  UNROLL for (int b = 0; b < BLOCK; b++) vstore##N(sum[b], 0, k->d_input[b] + at);
+  IN_VECTORS(FEATURES_OF, FEATURES)
 }
 
 // Over the lanes, by halves: the same order always.
@@ -300,6 +307,6 @@ __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float e
     // All heads have added: the features' gradient is complete.
     for (int b = 0; b < count; b++)
       for (int i = 0; i < FEATURES8; i++)
-        vstore8(k.d_input[b][i], i, grad_features + (base + b) * FEATURES);
+        vstore8(vload8(i, k.d_input[b]), i, grad_features + (base + b) * FEATURES);
   }
 }

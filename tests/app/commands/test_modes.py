@@ -1,6 +1,8 @@
 """info, render, bench and headless as a person runs them, and what they refuse."""
 
 import json
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -38,6 +40,14 @@ def test_info_json_is_alone_on_standard_output(scene):
 
 def test_info_table_names_the_stops(scene):
     assert "Thermal (thermal)" in launch("info", scene).stdout
+
+
+def test_info_table_is_readable_where_letters_are_few(scene):
+    """As where Windows sends output into a file, in cp1252: an arrow was written as a code."""
+    few = os.environ | {"PYTHONIOENCODING": "cp1252"}
+    done = launch("info", scene, env=few)
+    assert done.returncode == 0 and "\\u" not in done.stdout
+    assert re.search(r"color: \d+ to \d+ to \d+", done.stdout)
 
 
 def test_render_draws_every_view_at_every_x(scene, tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app import cli
+from shapeshift.app.streaming import package_levels
 from shapeshift.app.streaming.level_errors import LevelErrors, LevelMeter, change_of, psnr_of
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
@@ -120,6 +121,26 @@ def test_splats_and_rough_packages_are_refused(tmp_path, capsys):
     assert "no coarser level is good enough" in capsys.readouterr().err
 
 
+def test_a_level_that_is_good_at_no_size_is_left_out_and_said(
+    clumps, tmp_path, capsys, monkeypatch
+):
+    made_level = package_levels.make_level
+
+    def spoiled(meter, number, *rest):
+        made = made_level(meter, number, *rest)
+        bad = LevelErrors(34.0, {"stops": 41.24, "between": 35.0}, 7.24)
+        return replace(made, errors=bad) if number else made
+
+    monkeypatch.setattr(package_levels, "make_level", spoiled)
+    monkeypatch.setattr(package_levels, "LEAST_ANCHORS", 5)  # so that a second level is tried
+    out = tmp_path / "a.lod"
+    assert cli.main(["lod", str(clumps), "--out", str(out), "--distill", "0"]) == 0
+    assert len(read_model(out).coarser) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    lacks = "35.0 dB between them (36 wanted) and a switch changes its pixels by 7.2/255"
+    assert f"are good enough at no size, and left out: at 34 pixels {lacks} (at most 6)" in said
+
+
 def test_errors_are_those_of_formulas():
     rng = np.random.default_rng(0)
     one = [(rng.random((6, 8, 3)), np.ones((6, 8))) for _ in range(2)]
@@ -138,6 +159,10 @@ def test_errors_are_those_of_formulas():
     assert not LevelErrors(50, {"stops": 39.999, "between": 60.0}, 1.0).good
     assert not LevelErrors(50, {"stops": 60.0, "between": np.nan}, 1.0).good
     assert not LevelErrors(50, {"stops": 60.0}, 6.001).good
+    assert LevelErrors(50, {"stops": 40.0, "between": 36.0}, 6.0).lacks == []
+    assert LevelErrors(50, {"stops": 60.0}, np.nan).lacks == [
+        "a switch changes its pixels by nan/255 (at most 6)"
+    ]
 
 
 def test_views_show_the_bounds_as_large_as_asked_for(clumps):

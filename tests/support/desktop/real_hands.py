@@ -12,6 +12,7 @@ from Xlib import XK, X
 from Xlib.display import Display
 from Xlib.ext import xtest
 
+from shapeshift.app.editor.window import window
 from tests.support.desktop.desktop_stand import run_frames
 
 PATIENCE_S = 5.0  # longest wait until an event has come through
@@ -19,7 +20,11 @@ BUTTONS = {"left": 1, "middle": 2, "right": 3}
 
 
 class RealHands:
-    """The pointer and the keys of the display on which a viewer's window lies."""
+    """The pointer and the keys of the display on which a viewer's window lies.
+
+    Its clicks are clicks however quickly they come: on a fast machine two at one place would be a
+    double click, on a slow one not.
+    """
 
     def __init__(self, viewer, display: str) -> None:
         self.viewer = viewer
@@ -28,11 +33,13 @@ class RealHands:
         self._display.change_keyboard_control(auto_repeat_mode=X.AutoRepeatModeOff)
 
     def __enter__(self) -> "RealHands":
+        self._usual_s, window.DOUBLE_CLICK_S = window.DOUBLE_CLICK_S, -1.0
         return self
 
     def __exit__(
         self, kind: type | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        window.DOUBLE_CLICK_S = self._usual_s
         self._display.close()
 
     def move(self, x: float, y: float) -> None:
