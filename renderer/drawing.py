@@ -146,8 +146,8 @@ class Drawing(ABC):
         """Returns when what was decoded is there, or when what follows waits for it anyway."""
 
     @abstractmethod
-    def set_poses(self, world_from_objects: Sequence[np.ndarray]) -> None:
-        """Poses (4, 4) of all objects; one full of NaN hides its object."""
+    def set_poses(self, world_from_objects: np.ndarray) -> None:
+        """Poses (O, 4, 4) of all objects; one full of NaN hides its object."""
 
     @abstractmethod
     def draw(

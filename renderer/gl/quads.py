@@ -126,7 +126,7 @@ class QuadsDrawing(Drawing):
     def wait_decoded(self) -> None:
         """Nothing: GL keeps the order of the passes itself."""
 
-    def set_poses(self, world_from_objects: Sequence[np.ndarray]) -> None:
+    def set_poses(self, world_from_objects: np.ndarray) -> None:
         poses = np.reshape(world_from_objects, (-1, 4, 4))
         if not np.array_equal(poses, self.arena.world_from_object, equal_nan=True):
             self._changed = True

@@ -203,9 +203,7 @@ class Stream:
             self.budget, shown, in_sight, self.stats.whole, changed, pending, self._from.problem
         )
 
-    def find_sight(
-        self, poses: Sequence[np.ndarray], shown: list[bool], views: Sequence[View]
-    ) -> LeafSight:
+    def find_sight(self, poses: np.ndarray, shown: list[bool], views: Sequence[View]) -> LeafSight:
         """Of all leaves, one object after the other."""
         each: list[LeafSight] = []
         for source, run in groupby(zip(self._sources, poses, strict=True), lambda pair: pair[0]):

@@ -30,7 +30,7 @@ class Weights:
         self._age = 0  # frames
 
     def of(
-        self, sight: LeafSight, views: Sequence[View], poses: Sequence[np.ndarray],
+        self, sight: LeafSight, views: Sequence[View], poses: np.ndarray,
         shown: Sequence[bool], fresh: bool,
     ) -> np.ndarray:  # fmt: skip
         """(L,) pixels, 0 of what is in no picture.  fresh: a look of these views and nothing else.
@@ -53,7 +53,7 @@ class Weights:
         part = min(seen / cover, 1.0) if 0 < seen and 0 < cover else 1.0
         return np.maximum(part * sight.cover, FLOOR)
 
-    def _is_stale(self, views: Sequence[View], poses: Sequence[np.ndarray]) -> bool:
+    def _is_stale(self, views: Sequence[View], poses: np.ndarray) -> bool:
         if len(views) != len(self._looked) or not self._looked:
             return True
         for now, before in zip(views, self._looked, strict=True):
@@ -68,7 +68,7 @@ class Weights:
         return self._poses != bytes_of(poses) and self._age >= PATIENCE
 
     def _look_again(
-        self, sight: LeafSight, views: Sequence[View], poses: Sequence[np.ndarray],
+        self, sight: LeafSight, views: Sequence[View], poses: np.ndarray,
         shown: Sequence[bool], fresh: bool,
     ) -> None:  # fmt: skip
         assert self._look is not None
@@ -92,5 +92,5 @@ def median_of(values: np.ndarray, weight: np.ndarray) -> float:
     return float(values[order[int(np.searchsorted(part, part[-1] / 2))]])
 
 
-def bytes_of(poses: Sequence[np.ndarray]) -> bytes:
+def bytes_of(poses: np.ndarray) -> bytes:
     return np.asarray(poses, np.float64).tobytes()

@@ -163,7 +163,7 @@ class TilesArena(Drawing):
         """Returns when what was decoded is there: once for all objects, not after each."""
         self.device.queue.finish()
 
-    def set_poses(self, world_from_objects: Sequence[np.ndarray]) -> None:
+    def set_poses(self, world_from_objects: np.ndarray) -> None:
         poses = np.reshape(world_from_objects, (-1, 4, 4))
         if not np.array_equal(poses, self._world_from_objects, equal_nan=True):
             self._world_from_objects, self._changed = poses, True
