@@ -137,5 +137,6 @@ def drawn_splats(arena: Arena) -> np.ndarray:
     place = 4 * COUNTS["SORTED"]
     (count,) = np.frombuffer(arena.counts.read(4, offset=place), np.uint32).tolist()
     drawn = np.zeros(arena.count, bool)
-    drawn[np.frombuffer(arena.order.read(4 * count), np.uint32)] = True
+    if count:  # GL maps no empty part of a buffer
+        drawn[np.frombuffer(arena.order.read(4 * count), np.uint32)] = True
     return drawn
