@@ -26,9 +26,9 @@ from shapeshift.runtime_models.model import (
     ScaffoldModel,
     SplatLayers,
 )
-from shapeshift.runtime_models.package.feature_codes import encode_features, exact_kind
+from shapeshift.runtime_models.package.feature_codes import EXACT, encode_light
 from shapeshift.runtime_models.package.lint_package import refuse_filling
-from shapeshift.runtime_models.package.package_files import ANCHORS, LIGHT, MANIFEST, format_name
+from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, format_name
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.refit_encoding import encoding_findings
 from shapeshift.runtime_models.parts import splat_labels
@@ -255,7 +255,7 @@ def describe_light(model: AnchorModel) -> dict:
     """Bytes of anchors' light by direction before they are deflated, where they have such."""
     if model.light is None:
         return {}
-    stored = encode_features(model.light, exact_kind(model.light), LIGHT)
+    stored = encode_light(model.light, EXACT)
     size = sum(array.nbytes for array in stored.values())
     return {"light_by_direction_bytes": size}
 

@@ -276,7 +276,8 @@ def export_package(options: Options, opened: list) -> int:
 
     from shapeshift.app.errors import UsageError
     from shapeshift.runtime_models.model import AnchorModel
-    from shapeshift.runtime_models.package.write_package import EXACT, write_package
+    from shapeshift.runtime_models.package.feature_codes import EXACT
+    from shapeshift.runtime_models.package.write_package import write_package
 
     asked = {
         "--x": options.x, "--select": options.select, "--only": options.only,

@@ -140,8 +140,9 @@ def finish(
     from shapeshift.app.progress import working
     from shapeshift.app.training.style_report import report, write_sheet
     from shapeshift.rasterizer.device import open_device
+    from shapeshift.runtime_models.package.feature_codes import EXACT
     from shapeshift.runtime_models.package.read_package import read_package
-    from shapeshift.runtime_models.package.write_package import EXACT, write_package
+    from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.training.styles.add_style import drift_db
 
     if options.pace:

@@ -7,7 +7,8 @@ from pathlib import Path
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.model import AnchorModel, Model
-from shapeshift.runtime_models.package.write_package import EXACT, package_files
+from shapeshift.runtime_models.package.feature_codes import EXACT
+from shapeshift.runtime_models.package.write_package import package_files
 from shapeshift.scene.change.read_change import read_change
 from shapeshift.scene.change.similarity import Similarity
 from shapeshift.scene.sections.read_section import read_box

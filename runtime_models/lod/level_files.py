@@ -14,8 +14,8 @@ from shapeshift.runtime_models.files.npy import write_arrays
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder
 from shapeshift.runtime_models.model import AnchorModel, BadFile, CoarserAnchors
-from shapeshift.runtime_models.package.feature_codes import encode_features
-from shapeshift.runtime_models.package.package_files import LABELS, LIGHT
+from shapeshift.runtime_models.package.feature_codes import encode_features, encode_light
+from shapeshift.runtime_models.package.package_files import LABELS
 from shapeshift.runtime_models.package.read_package import (
     SHOWN,
     read_anchors,
@@ -168,7 +168,7 @@ def level_table(level: AnchorModel) -> bytes:
     tables |= encode_features(logs, STORED, "frame_log_scales")
     tables |= encode_features(level.frames.wxyz, STORED, "frame_rotations")
     if level.light is not None:
-        tables |= encode_features(level.light, STORED, LIGHT)
+        tables |= encode_light(level.light, STORED)
     if level.labels is not None:
         tables[LABELS] = level.labels
     out = io.BytesIO()

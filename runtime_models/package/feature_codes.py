@@ -4,10 +4,14 @@ import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.model import AnchorFrames, BadFile
+from shapeshift.runtime_models.package.package_files import LIGHT
 from shapeshift.runtime_models.rotation import normalize
 
 FEATURES = ("float32", "float16", "uint8")  # kinds of storage
 STEPS = 255  # of a byte
+MOST_CODE = 127  # the largest number of light, in steps of its column
+LEAST_EXPONENT = -140  # of two, of such a step: float32 has it
+EXACT = "exact"  # a kind of storage besides FEATURES
 HALF_STEPS = 3  # halves of a unit quaternion change its length by less than 3 steps of the largest
 
 
@@ -47,6 +51,28 @@ def encode_features(
     width = np.where(high > low, high - low, 1.0)
     codes = np.rint((features - low) * (STEPS / width))
     return {name: codes.astype(np.uint8), range_of(name): ends}
+
+
+def encode_light(light: np.ndarray, kind: str) -> dict[str, np.ndarray]:
+    """Arrays of the npz for light by direction (A, L): bytes, unless floats are wanted.
+
+    Each column has steps of a power of two, no more than it needs for its largest number: then
+    what is written again, also with fewer anchors, is the same numbers in bytes.  EXACT keeps
+    numbers that have no such steps as halves or floats.
+    """
+    if kind == "float32" or not np.isfinite(light).all():
+        return encode_features(light, "float32", LIGHT)
+    half, exponent = np.frexp(np.abs(light).max(axis=0, initial=0).astype(np.float64) / MOST_CODE)
+    exponent = np.maximum(exponent - (half == 0.5), LEAST_EXPONENT)
+    step = np.ldexp(1.0, exponent)
+    codes = np.rint(light / step)
+    if kind == EXACT and not np.array_equal(codes * step, light):
+        return encode_features(light, exact_kind(light), LIGHT)
+    ends = step * np.array([[-MOST_CODE - 1], [MOST_CODE]])
+    return {
+        LIGHT: (codes + MOST_CODE + 1).astype(np.uint8),
+        range_of(LIGHT): ends.astype(np.float32),
+    }
 
 
 def decode_features(

@@ -15,7 +15,9 @@ from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Stop
 from shapeshift.runtime_models.package.feature_codes import (
+    EXACT,
     encode_features,
+    encode_light,
     exact_frames,
     exact_kind,
 )
@@ -23,7 +25,6 @@ from shapeshift.runtime_models.package.package_files import (
     ANCHORS,
     FORMAT,
     LABELS,
-    LIGHT,
     MANIFEST,
     format_name,
     open_package,
@@ -31,7 +32,6 @@ from shapeshift.runtime_models.package.package_files import (
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_onnx import write_onnx
 
-EXACT = "exact"  # a kind of storage besides FEATURES
 DATE = (1980, 1, 1, 0, 0, 0)  # of every zip entry: the same model gives the same bytes
 
 
@@ -70,8 +70,7 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
         tables |= encode_features(log_scales, features, "frame_log_scales")
         tables |= encode_features(model.frames.wxyz, features, "frame_rotations")
     if model.light is not None:
-        kind = exact_kind(model.light) if exact else features
-        tables |= encode_features(model.light, kind, LIGHT)
+        tables |= encode_light(model.light, features)
     if model.labels is not None:
         tables[LABELS] = model.labels
     write_arrays(arrays, {"positions": model.anchors, **tables})

@@ -96,7 +96,8 @@ def save(
 ) -> Exported:
     """What Scene.save does; label: of the anchors of that object alone."""
     from shapeshift.app.commands.exported import label_of
-    from shapeshift.runtime_models.package.write_package import EXACT, write_package
+    from shapeshift.runtime_models.package.feature_codes import EXACT
+    from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.runtime_models.parts import labelled_anchors
 
     path = plain(path)

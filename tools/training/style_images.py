@@ -24,8 +24,9 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "scene")]
 from film import warp_rmse  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.runtime_models.package.feature_codes import EXACT  # noqa: E402
 from shapeshift.runtime_models.package.read_package import read_package  # noqa: E402
-from shapeshift.runtime_models.package.write_package import EXACT, write_package  # noqa: E402
+from shapeshift.runtime_models.package.write_package import write_package  # noqa: E402
 from shapeshift.scene.cameras.framing import default_background, orbit_path  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.training.evaluation.evaluate import ModelRenderer  # noqa: E402

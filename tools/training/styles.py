@@ -23,8 +23,9 @@ sys.path[:0] = [str(HERE.parents[1])]
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.rasterizer.surface import rasterize_depth, surface  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
+from shapeshift.runtime_models.package.feature_codes import EXACT  # noqa: E402
 from shapeshift.runtime_models.package.read_package import read_package  # noqa: E402
-from shapeshift.runtime_models.package.write_package import EXACT, write_package  # noqa: E402
+from shapeshift.runtime_models.package.write_package import write_package  # noqa: E402
 from shapeshift.scene.cameras.camera_list import CameraReading  # noqa: E402
 from shapeshift.scene.cameras.framing import default_background, orbit_path  # noqa: E402
 from shapeshift.scene.cameras.read_cameras import read_camera_list  # noqa: E402

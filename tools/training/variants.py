@@ -28,7 +28,8 @@ from ways import add_sweep, sweep  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, Stop  # noqa: E402
-from shapeshift.runtime_models.package.write_package import EXACT, write_package  # noqa: E402
+from shapeshift.runtime_models.package.feature_codes import EXACT  # noqa: E402
+from shapeshift.runtime_models.package.write_package import write_package  # noqa: E402
 from shapeshift.scene.captures.capture import Capture, Photo  # noqa: E402
 from shapeshift.training.evaluation.evaluate import evaluate_model  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402

@@ -14,8 +14,9 @@ from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import AnchorModel, BadFile
+from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
-from shapeshift.runtime_models.package.write_package import EXACT, write_package
+from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blocks.block_start import (
     ADVICE,

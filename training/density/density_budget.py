@@ -3,12 +3,13 @@
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
+from shapeshift.runtime_models.package.package_files import LIGHT
 from shapeshift.runtime_models.package.write_package import package_files, zip_files
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
 from shapeshift.training.settings import TrainSettings
 
-POSITION_BYTES, NUMBER_BYTES = 12, 2  # of an anchor, and of each of its other numbers
+POSITION_BYTES, NUMBER_BYTES = 12, 2  # of an anchor, and of each of its other numbers but light
 NOTES_BYTES = 4096  # provenance and names in the manifest
 GROWN = 1.02  # times the networks of the start: trained weights may compress less
 
@@ -41,8 +42,10 @@ def anchor_cap(
     if settings.max_mb is None:
         return settings.max_anchors
     fixed = bytes_without_anchors(layout, encoding, stops)
-    numbers = layout.features + sum(layout.own_widths.values())
-    fits = int((settings.max_mb * 1e6 - fixed) // (POSITION_BYTES + NUMBER_BYTES * numbers))
+    widths = layout.own_widths
+    numbers = layout.features + sum(width for name, width in widths.items() if name != LIGHT)
+    size = POSITION_BYTES + NUMBER_BYTES * numbers + widths.get(LIGHT, 0)  # light: a byte each
+    fits = int((settings.max_mb * 1e6 - fixed) // size)
     if fits < 1:
         raise BadFile(
             f"--max-mb {settings.max_mb:g} leaves no room for anchors: the networks alone take up "

@@ -11,7 +11,7 @@ import numpy as np
 
 from shapeshift.runtime_models.eyes import EYES, spread_eyes
 from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, BadFile
-from shapeshift.runtime_models.package.write_package import EXACT
+from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.rotation import normalize
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.density.densify import NewAnchors

@@ -22,11 +22,17 @@ from shapeshift.runtime_models.colors.light_harmonics import (
 )
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.drop_unused import drop_unused
-from shapeshift.runtime_models.package.feature_codes import FEATURES
+from shapeshift.runtime_models.package.feature_codes import (
+    EXACT,
+    FEATURES,
+    decode_features,
+    encode_light,
+)
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST
 from shapeshift.runtime_models.package.read_package import read_files, read_package
-from shapeshift.runtime_models.package.write_package import EXACT, package_files, write_package
+from shapeshift.runtime_models.package.write_package import package_files, write_package
 from shapeshift.runtime_models.read_scene import describe
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.runtime_models.stops.insert_stop import NewUnits, add_units, insert_stop
@@ -219,17 +225,58 @@ def test_a_package_gives_back_the_light(tmp_path, kind, frames, channels):
     write_package(model, tmp_path / "a.shift", kind)
     back = read_package(tmp_path / "a.shift")
     assert (back.frames is not None) == frames
-    # float16: 11 bits of at most 2 or 3; a byte: half of a 255th of what a column spans
-    wide = np.ptp(model.light, axis=0).max()
-    most = {"float32": 0, EXACT: 0, "float16": 2**-10, "uint8": 0.501 * wide / 255}[kind]
-    assert np.abs(back.light - model.light).max() <= most
+    # A byte: half of the least power of two of which 127 reach the column's largest number.
+    step = 2.0 ** np.ceil(np.log2(np.abs(model.light).max(axis=0) / 127))
+    exact = kind in ("float32", EXACT)
+    assert (np.abs(back.light - model.light) <= (0 if exact else step / 2)).all()
     facts = describe(back, tmp_path / "a.shift")
-    size = {"float32": 4, EXACT: 4, "float16": 2, "uint8": 1}[kind]
-    ends = 64 if kind == "uint8" else 0
+    size, ends = (4, 0) if exact else (1, 64)
     assert facts["format"] == {1: "shapeshift 3", 3: "shapeshift 4"}[channels]
     assert facts["light_by_direction_bytes"] == channels * (300 * 8 * size + ends)
     write_package(back, tmp_path / "b.shift", EXACT)
     np.testing.assert_array_equal(read_package(tmp_path / "b.shift").light, back.light)
+    fewer = back.with_anchors(np.arange(0, 300, 7))
+    write_package(fewer, tmp_path / "c.shift", EXACT)
+    again = read_package(tmp_path / "c.shift")
+    np.testing.assert_array_equal(again.light, fewer.light)
+    assert written_kind(again) == (np.float32 if exact else np.uint8)
+
+
+def written_kind(model) -> np.dtype:
+    with np.load(io.BytesIO(package_files(model, EXACT)[ANCHORS])) as arrays:
+        return arrays["light"].dtype
+
+
+@pytest.mark.parametrize(
+    "largest, step",
+    [
+        (0, 1), (1e-45, 2.0**-140), (127, 1), (np.nextafter(np.float32(127), np.float32(200)), 2),
+        (np.nextafter(np.float32(127), np.float32(0)), 1), (128, 2), (63.5, 0.5), (10_000, 128),
+    ],
+)  # fmt: skip
+def test_steps_of_light_are_the_least_powers_of_two(largest, step):
+    """Where 127 steps reach the largest number exactly, no more are taken."""
+    light = np.zeros((3, 8), np.float32)
+    light[1, 2] = -largest
+    found = encode_light(light, "float16")
+    assert found["light_range"][:, 2].tolist() == [-128 * step, 127 * step]
+    back = decode_features(found["light"], found["light_range"], "here", "light")
+    assert abs(back[1, 2] + largest) <= step / 2
+    assert not np.delete(back.ravel(), 10).any()  # 0 stays 0
+    again = encode_light(back, EXACT)
+    np.testing.assert_array_equal(
+        decode_features(again["light"], again["light_range"], "here", "light"), back
+    )
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("kind", [*FEATURES, EXACT])
+def test_light_that_is_no_number_is_not_written_as_one(tmp_path, value, kind):
+    model = with_light(make_random_model(10))
+    model.light[3, 4] = value
+    with pytest.raises(BadFile, match="light"):
+        write_package(model, tmp_path / "a.shift", kind)
+    assert not (tmp_path / "a.shift").exists()
 
 
 def test_a_package_without_light_is_as_it_was(tmp_path):

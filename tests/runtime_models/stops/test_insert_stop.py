@@ -7,9 +7,9 @@ import pytest
 
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
-from shapeshift.runtime_models.package.feature_codes import decode_features, encode_features
+from shapeshift.runtime_models.package.feature_codes import EXACT, decode_features, encode_features
 from shapeshift.runtime_models.package.read_package import read_package
-from shapeshift.runtime_models.package.write_package import EXACT, write_package
+from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.runtime_models.stops.insert_stop import MOST_STOPS, insert_stop
 from shapeshift.runtime_models.stops.remove_stop import remove_stop

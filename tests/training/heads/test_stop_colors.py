@@ -9,9 +9,10 @@ from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.renderer.tiles.heads import uncovered
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import ControlEncoding, Stop
+from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
-from shapeshift.runtime_models.package.write_package import EXACT, package_files
+from shapeshift.runtime_models.package.write_package import package_files
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.pose import View
 from shapeshift.training.drawing import camera_of
