@@ -97,7 +97,9 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         where,
     )
     lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
-    photos, rescaled, turned, no_depth, no_normals = [], [], [], [], []
+    photos, no_depth, no_normals = [], [], []
+    rescaled: list[str] = []
+    turned: list[str] = []
     for shot, lens in zip(shots, lenses, strict=True):
         photos += (made := photos_of(shot, lens, world, folder))
         if made[0].file_size != lens.size:

@@ -138,7 +138,11 @@ class InspectedScene(OpenedScene):
         if marks is None and self.path is None:
             raise UsageError("this scene lies in no file, so no marks lie beside it; give them.")
         if marks is None or not isinstance(marks, Iterable) or isinstance(marks, str):
-            path = marks_path(self.path) if marks is None and self.path else plain(marks)
+            if marks is None:
+                assert self.path is not None, "refused above"
+                path = marks_path(self.path)
+            else:
+                path = plain(marks)
             file = moved_marks(read_marks_file(path), -self.origin)
             marks, emission = file.marks, file.emission
         picture = self.values(camera, size, **choice)  # type: ignore[arg-type]  # as above
