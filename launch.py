@@ -93,9 +93,8 @@ def main(arguments):
     if arguments and arguments[0] in ASKING and len(arguments) == 1:
         return hand_over(sys.executable, [CLI, *arguments])
     try:
-        if testing or not is_ready(testing):
-            hold_interrupts(False)
-            make_environment(testing)
+        hold_interrupts(not testing and is_ready(testing))
+        make_environment(testing)
     except KeyboardInterrupt:
         stop("Interrupted; the next start makes the environment.")
     except OSError as error:

@@ -3,6 +3,7 @@
 import ast
 import importlib.util
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -15,11 +16,12 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture
 def launch():
-    """launch.py as a module."""
+    """launch.py as a module; Ctrl-C, which it holds back, is let in again after the test."""
     spec = importlib.util.spec_from_file_location("launch", ROOT / "launch.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module
+    yield module
+    module.hold_interrupts(False)
 
 
 @pytest.fixture
@@ -46,7 +48,8 @@ def test_pythons_that_are_refused_can_read_the_refusal():
             arguments = [node.returns, *(a.annotation for a in node.args.args)]
             assert not any(arguments), f"{node.name}: annotations are evaluated there"
     loaded = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert [alias.name for node in loaded for alias in node.names] == ["os", "subprocess", "sys"]
+    assert [alias.name for node in loaded for alias in node.names] == [
+        "os", "signal", "subprocess", "sys"]  # fmt: skip
 
 
 @pytest.mark.parametrize("failure", [KeyboardInterrupt, OSError(30, "Read-only file system", "x")])
@@ -132,3 +135,24 @@ def test_the_whole_suite_runs_in_two_processes_and_a_choice_of_it_in_one(launch,
     for cores in (1, None):  # None: not known
         monkeypatch.setattr(launch.os, "cpu_count", lambda cores=cores: cores)
         assert launch.pytest_words(["-q"]) == ["-m", "pytest", "-q"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals of POSIX")
+@pytest.mark.parametrize("ready", [False, True])
+@pytest.mark.parametrize("words", [["info"], ["test"]])
+def test_an_interrupt_waits_for_the_program_and_ends_a_set_up(launch, monkeypatch, words, ready):
+    """A set-up and pytest answer by themselves; the program, once its modules are there."""
+    from shapeshift.app import first_start
+
+    held = []
+
+    def note(*_):
+        held.append(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+        return 0
+
+    monkeypatch.setattr(first_start, "is_ready", lambda testing: ready)
+    monkeypatch.setattr(first_start, "make_environment", note)
+    monkeypatch.setattr(launch, "hand_over", note)
+    monkeypatch.setattr(launch.os, "chdir", lambda folder: None)
+    assert launch.main(words) == 0
+    assert held == ([ready, True] if words == ["info"] else [False, False])

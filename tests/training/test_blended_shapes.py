@@ -107,4 +107,4 @@ def test_the_command_takes_a_share_and_refuses_what_is_none(device, shared, tmp_
     assert model.provenance["settings"]["blended_shapes"] == 0.5
     assert (model.encoding.d, model.encoding.sigma, model.encoding.spacing) == (2, 0.5, 1)
     assert cli.main([*words, "1.5"]) == 2
-    assert "blended_shapes is 1.5; it is a share, 0 to 1." in capsys.readouterr().err
+    assert "--blended-shapes is 1.5; it is a share, 0 to 1." in capsys.readouterr().err
