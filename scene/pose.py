@@ -209,14 +209,15 @@ def look_at(eye: np.ndarray, target: np.ndarray, up: tuple = (0.0, 1.0, 0.0)) ->
     Raises ValueError where these and `up` say no direction.
     """
     back = np.asarray(eye, np.float64) - np.asarray(target, np.float64)
+    if (length := np.linalg.norm(back)) > 0:
+        back /= length  # before the product: captures that were made before keep their bits
     right = np.cross(np.asarray(up, np.float64), back)
-    if not np.linalg.norm(right) > 0:
+    if not (length := np.linalg.norm(right)) > 0:
         raise ValueError(
             f"an eye at {eye} that looks at {target} has no direction, or that of up, {up}; "
             "move one of them, or give another up."
         )
-    back /= np.linalg.norm(back)
-    right /= np.linalg.norm(right)
+    right /= length
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
     matrix[:3, 3] = eye
