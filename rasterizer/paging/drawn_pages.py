@@ -18,6 +18,7 @@ class DrawnPages:
         self.stored = np.full(pages, -1)  # where its splats are
         self.weight = np.ones(pages, np.float32)  # the part of each that is drawn
         self.uses = np.zeros(stored, int)  # of each stored page: how many are drawn from it
+        self.changes = 0  # how often what is drawn has changed
 
     def lacking(self, count: int) -> int:
         """Stored pages to grow to where `count` more are wanted; 0: there are enough."""
@@ -38,16 +39,19 @@ class DrawnPages:
         """Pages (n,), of which nothing was drawn, show stored ones (n,) for objects (n,)."""
         self.owner[pages], self.stored[pages], self.weight[pages] = owner, stored, 1
         np.add.at(self.uses, stored, 1)
+        self.changes += 1
 
     def clear(self, pages: np.ndarray) -> None:
         """Nothing is drawn in these pages (n,)."""
         there = self.stored[pages]
         np.subtract.at(self.uses, there[there >= 0], 1)
         self.owner[pages] = self.stored[pages] = -1
+        self.changes += 1
 
     def weigh(self, pages: np.ndarray, weight: float) -> None:
         """Pages (n,) are drawn as a part of themselves, until they are cleared."""
         self.weight[pages] = weight
+        self.changes += 1
 
     def shared(self, i: int) -> np.ndarray:
         """The pages of object i whose splats others draw as well."""
@@ -59,6 +63,7 @@ class DrawnPages:
         before, stored = self.stored[pages], self.free(len(pages))
         np.subtract.at(self.uses, before, 1)
         self.stored[pages], self.uses[stored] = stored, 1
+        self.changes += 1
         return before, stored
 
     def pages_of(self, i: int) -> np.ndarray:

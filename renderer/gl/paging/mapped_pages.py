@@ -29,6 +29,7 @@ class MappedPages(DrawnPages):
         self._words = np.zeros((self.first_entry + pages, 4), np.uint32)
         self.buffer = gpu.reserve(self._words.nbytes, "the map of pages")
         self._listed = gpu.reserve(4 * pages, "a list of pages")
+        self._uploaded = -1  # the changes that the shaders know
 
     @property
     def rows(self) -> int:
@@ -36,7 +37,14 @@ class MappedPages(DrawnPages):
         return PAGE * self.pages
 
     def upload(self, poses: np.ndarray | None = None) -> moderngl.Buffer:
-        """What the shaders read now; poses: (O, frames, 3, 4) eye_from_object, as rows."""
+        """What the shaders read now; poses: (O, frames, 3, 4) eye_from_object, as rows.
+
+        Colours of a thousand copies ask for it a thousand times a frame: it is written where it
+        has changed.
+        """
+        if poses is None and self._uploaded == self.changes:
+            return self.buffer
+        self._uploaded = self.changes
         entries = self._words[self.first_entry :]
         there = self.stored >= 0
         entries[:, 0] = np.where(there, self.first + PAGE * self.stored, NO_PAGE)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.debug.debug import object_color
+from shapeshift.renderer.gl.gpu import overwrite
+from shapeshift.renderer.gl.paging import mapped_pages
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.splats.lod.parents import with_parents
@@ -136,6 +138,25 @@ def test_a_hundred_copies_lie_in_the_pages_of_one(opened, folder):
         every = with_parents(model)[0].leaves.levels.counts  # parents have pages, too
         assert len(every) > len(model.leaves.levels.counts)
         assert len(renderer.drawing.paged.uses) == (-(-every // 32)).sum()
+
+
+def test_colors_of_copies_write_no_map_of_pages(session_gpu, folder, monkeypatch):
+    """The map is of all pages: written for each copy, a thousand would write half a gigabyte."""
+    written = []
+
+    def note(buffer, data):
+        written.append(buffer)
+        overwrite(buffer, data)
+
+    monkeypatch.setattr(mapped_pages, "overwrite", note)
+    model = open_levels(folder, BUDGET)
+    with session_gpu.ctx as ctx, Renderer(ctx, "quads") as renderer:
+        renderer.streaming.converges = False
+        renderer.update(standing(scene_of(*[model] * 20)))
+        renderer.draw(VIEWS[:1])
+    maps = sum(buffer is renderer.drawing.paged.buffer for buffer in written)
+    assert len(written) - maps >= 9, "a list of pages for each copy in sight"
+    assert maps <= 3, "new pages, their colours and a frame"
 
 
 @pytest.mark.parametrize("converges", [True, False])
