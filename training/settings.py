@@ -193,7 +193,7 @@ class TrainSettings:
 
 
 # A scene that never changes: the networks have nothing to share between stops, so more anchors with
-# fewer splats each, and light of their own, gain 0.4 to 1 dB for two to three times the bytes.
+# fewer splats each, and light of their own, gain 0.4 to 1 dB for three times the bytes.
 ONE_MODALITY: dict[str, Any] = {
     "splats_per_anchor": 2, "max_anchors": 30000, "anchor_attributes": "frame,color,light",
 }  # fmt: skip

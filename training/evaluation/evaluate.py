@@ -34,12 +34,8 @@ from shapeshift.training.supervision.still_background import (
 from shapeshift.training.supervision.still_picture import StillPicture
 
 MOST_LOOKED_AT, LOOKED_AT_PX = 12, 64  # held-out photos, for the colour behind them
-SOME_HAVE = (
-    "vgg",
-    "depth_error",
-    "fitted_db",
-    "whole_db",
-)  # fields of ModalityScore that not every photo has
+# Fields of ModalityScore that not every photo has.
+SOME_HAVE = ("vgg", "depth_error", "fitted_db", "whole_db")
 
 
 @dataclass(frozen=True)
