@@ -172,6 +172,21 @@ def from_inside(count: int, size: tuple[int, int]) -> list[View]:
     return out
 
 
+def outward(count: int, size: tuple[int, int]) -> list[View]:
+    """A turn on the spot: from a small ring in the middle of a room, looking away from it.
+
+    Every third photo looks down, every third up; eyes are 0.35 m from the middle, so that
+    neighbouring photos say how far the walls are.
+    """
+    out = []
+    for i in range(count):
+        turn, up = 2 * np.pi * i / count, (-0.35, 0.0, 0.3)[i % 3]
+        ahead = np.array([np.cos(turn), up, np.sin(turn)])
+        eye = np.array([0.35 * ahead[0], 1.5 + 0.1 * np.sin(5 * turn), 0.35 * ahead[2]])
+        out.append(view_at(eye, eye + ahead, size, 65))
+    return out
+
+
 def along(count: int, size: tuple[int, int]) -> list[View]:
     """There and back along the corridor, looking ahead."""
     out = []
@@ -213,6 +228,7 @@ KINDS = {
                   views_usually=64),
     "cut_out": Kind(an_object, around((0, 0.22, 0), 1.3, -25, 65), backdrop=True, masks="object"),
     "passers": Kind(a_room, from_inside, masks="passers"),
+    "outward": Kind(a_room, outward),
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from shapeshift.training.synthetic.strangers import (
     radiance,
     straightened,
 )
-from shapeshift.training.synthetic.tracer import photograph
+from shapeshift.training.synthetic.tracer import Place, photograph, pixel_rays, trace
 
 SIZE, COUNT = (96, 72), 16
 
@@ -85,3 +85,27 @@ def likeness(shown: np.ndarray, straight: np.ndarray, weight: np.ndarray | None)
     known = weight > 0
     gain = (shown * straight)[known].sum() / (straight**2)[known].sum()
     return psnr(gain * straight, shown, weight)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("count", [24, 48])
+def test_a_turn_on_the_spot_looks_away_from_the_middle_at_every_wall(seed, count):
+    kind = KINDS["outward"]
+    views = kind.views(count, SIZE)
+    eyes = np.array([view.world_from_eye.position for view in views])
+    ahead = -np.array([view.world_from_eye.matrix()[:3, 2] for view in views])
+    level = ahead[:, [0, 2]] / np.linalg.norm(ahead[:, [0, 2]], axis=1, keepdims=True)
+    assert np.abs(eyes[:, [0, 2]] - 0.35 * level).max() < 1e-6  # no two cameras face each other
+    turns = np.sort(np.arctan2(*level.T))
+    gaps = np.diff(np.append(turns, turns[0] + 2 * np.pi))
+    assert gaps.max() < np.deg2rad(65) / 3, "photos do not overlap by two thirds"
+    place = Place.of(kind.place(np.random.default_rng(seed)))
+    column, row = (g.ravel() + 0.5 for g in np.meshgrid(np.arange(0, 96, 5), np.arange(0, 72, 5)))
+    met = set()
+    for view, eye in zip(views, eyes, strict=True):
+        d = pixel_rays(view, column, row)
+        distance, index = trace(place, np.broadcast_to(eye, d.shape), d)
+        assert (index >= 0).all(), "a room has no gaps"
+        assert distance.min() > 0.3, "a camera stands in a thing, or right before one"
+        met |= set(index.tolist())
+    assert {2, 3, 4, 5} <= met, "all four walls are photographed"
