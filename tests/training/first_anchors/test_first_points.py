@@ -18,8 +18,10 @@ from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.hull import carve, visual_hulls
 from shapeshift.training.first_anchors.initial import initial_points
 from shapeshift.training.first_anchors.spacing import choose_voxel, voxel_centres
+from shapeshift.training.first_anchors.views import pixel_size
 from shapeshift.training.photos import LoadedPhoto, load_photos
 from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.synthetic.tracer import pixel_rays
 from tests.support.training.point_files import write_las
 
 RNG = np.random.default_rng
@@ -115,8 +117,53 @@ def off_surface(p: np.ndarray) -> np.ndarray:
 def test_depth_photos_give_points_on_the_surfaces(balls, photos):
     points, origin, *_ = initial_points(balls, photos, RNG(0), "depth")
     assert origin == "depth photos"  # the background is known: no guesses
-    assert len(points) == sum(int((p.depth > 0).sum()) for p in photos)
     assert off_surface(points).max() < 2e-4  # metres: two steps of the depth photos
+    # Every pixel that saw something has a point within the diagonal of its cube, of two pixels of
+    # the view that is nearest rounded by sqrt(2) at most; an eighth of a pixel for rounding.
+    seen = np.concatenate([measured(photo) for photo in photos])
+    assert 0.05 * len(seen) < len(points) < 0.3 * len(seen)  # eight photos show most places
+    away = np.array([np.linalg.norm(points - p, axis=1).min() for p in seen])
+    pixel = pixel_size(seen, [photo.view for photo in photos])
+    assert (away / pixel).max() < 2 * 2**0.5 * 3**0.5 + 0.125
+    assert np.array([np.linalg.norm(seen - p, axis=1).min() for p in points]).max() < 1e-9
+
+
+def measured(photo: LoadedPhoto) -> np.ndarray:
+    """(P, 3) metres that a depth photo saw, pixel by pixel along its rays."""
+    row, column = np.nonzero(photo.depth > 0)
+    rays = pixel_rays(photo.view, column + 0.5, row + 0.5)
+    eye, turn = photo.view.world_from_eye.position, photo.view.world_from_eye.matrix()
+    along = photo.depth[row, column] / (rays @ -turn[:3, 2])
+    return np.asarray(eye) + along[:, None] * rays
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_of_the_points_in_a_cube_is_left_the_first(seed):
+    """Beside a loop over points."""
+    rng = RNG(seed)
+    points = rng.normal(size=(700, 3)) * rng.choice([0.01, 1.0, 100.0], (700, 1))
+    points[:8] = [[0, 0, 0], [-0.0, 0, 0], [1, 1, 1], [1, 1, 1], [0.999, 1, 1], *-np.eye(3)]
+    edge = np.exp(rng.uniform(-6, 3, 700))
+    edge[rng.choice(700, 20, replace=False)] = np.inf
+    kept, taken = [], set()
+    for point, side in zip(points, edge, strict=True):
+        key = None
+        if np.isfinite(side):
+            cube = 2.0 ** round(float(np.log2(side)))
+            key = (cube, *(float(np.floor(x / cube)) for x in point))
+        if key is None or key not in taken:
+            kept.append(point)
+            taken.add(key)
+    found = point_sources.one_a_cell(points, edge)
+    assert 100 < len(kept) < 700
+    assert np.array_equal(found, np.array(kept))
+
+
+def test_no_point_is_left_of_none_and_all_of_those_that_nobody_sees():
+    assert point_sources.one_a_cell(np.zeros((0, 3)), np.zeros(0)).shape == (0, 3)
+    points = np.zeros((5, 3))
+    assert len(point_sources.one_a_cell(points, np.full(5, np.inf))) == 5
+    assert len(point_sources.one_a_cell(points, np.full(5, 1e-30))) == 1
 
 
 def test_without_points_depth_comes_before_the_hull(balls, photos, coarse):
