@@ -160,7 +160,7 @@ class TrainSettings:
     anchor_attributes: str = "frame,stop_color"
     """What each anchor has besides its features, as frame,stop_color,light: sizes and axes; a base
     colour, one for all stops (color) or one for each (stop_color); light by direction, which
-    changes its colour by the side it is seen from."""
+    changes its colour by the side it is seen from, or its brightness alone (gray_light)."""
     grow: bool = True
     """Add anchors and move the least useful ones to where pictures need them."""
     grow_every: int = 100
@@ -189,9 +189,10 @@ class TrainSettings:
             tuple(name.strip() for name in names.split(",") if name.strip())
             for names in (self.fixed, self.anchor_attributes)
         )
+        gray = "gray_light" in attributes and "light" not in attributes
         return HeadLayout(
             self.splats_per_anchor, self.features, self.hidden, units, fixed, self.view_dependent,
-            attributes, stops,
+            attributes, stops, light_channels=1 if gray else 3,
         )  # fmt: skip
 
     def rates(self, iterations: int) -> Rates:

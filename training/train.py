@@ -143,6 +143,8 @@ class Trainer(Run):
         )
         values = {"weights": initial_weights(self.layout, rng), "features": features}
         values |= {n: getattr(start, n) for n in ("anchors", *self.layout.own)}
+        if "light" in values:
+            values["light"] = values["light"][:, : self.layout.widths["light"]]
         if len(groups := self.layout.color_groups) > 1:
             del values["colors"]
             for group, stop in zip(groups, self.stops, strict=True):
