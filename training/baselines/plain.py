@@ -258,9 +258,8 @@ class PlainTrainer(Run):
         settings = self.settings
         if self.iteration % settings.interval(self.run_length or 0) == 0:
             stats = self.device.download(self.stats.sums)
-            after_reset = self.iteration > settings.reset_every
             state = self.adam.state()
-            change = choose_densification(state, stats, settings, self.extent, after_reset)
+            change = choose_densification(state, stats, settings, self.extent)
             rng = np.random.default_rng([settings.seed, 3, self.iteration])
             self.adam.load(apply_densification(state, change, rng))
             self.stats = PlainDensificationStats(self.device, self.count)

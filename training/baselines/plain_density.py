@@ -1,8 +1,8 @@
 """Growing and pruning of plain splats by the rules of 3DGS (Kerbl et al., 2023, section 5.2).
 
 Where the screen gradient is large, a small splat is cloned and a large one is split in two; what
-has become transparent goes.  As gsplat's default strategy, and unlike INRIA's program, nothing is
-removed for being large on the screen.
+has become transparent goes.  Unlike there nothing goes for being large, on the screen or in the
+world: at the cap, walls of a room went and did not come back (docs/bench/ideas.md).
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,6 @@ from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.baselines.plain_step import GROUPS
 
 LARGE = 0.01  # of the extent: larger ones are split, not cloned
-TOO_LARGE = 0.1  # of the extent: goes, once opacities have been set back for the first time
 SMALLER = 1.6  # times: each of two halves
 AFTER_RESET = 0.01  # opacity that all are cut to
 
@@ -24,7 +23,7 @@ AFTER_RESET = 0.01  # opacity that all are cut to
 class Densification:
     """What a look at the stats decided, of N splats."""
 
-    gone: np.ndarray  # (N,) bool, transparent or too large
+    gone: np.ndarray  # (N,) bool, transparent
     cloned: np.ndarray  # (C,) indices
     split: np.ndarray  # (S,) indices; each becomes two
 
@@ -40,14 +39,11 @@ def choose_densification(
     stats: np.ndarray,  # (N, 2) of PlainDensificationStats
     settings: PlainSettings,
     extent: float,
-    after_reset: bool,
 ) -> Densification:
     """Which splats go, are cloned or are split; where room is short, the strongest first."""
     largest = np.exp(state["scales.value"].astype(np.float64)).max(axis=1)
     opacity = 1 / (1 + np.exp(-state["opacity.value"].astype(np.float64)))
     gone = ~(opacity >= settings.prune_opacity)  # NaN goes, too
-    if after_reset:
-        gone |= ~(largest <= TOO_LARGE * extent)
     if gone.all():
         gone[:] = False
     grad2d = stats[:, 0] / np.maximum(stats[:, 1], 1)

@@ -78,7 +78,7 @@ def test_small_splats_are_cloned_and_large_ones_split_the_strongest_first():
     state["scales.value"][[1, 3], 2] = np.log(0.2)  # one long axis is enough
     stats = np.array([[5, 1], [9, 3], [0, 0], [8, 2], [1, 1], [4, 1]], np.float32)
     settings = PlainSettings(grow_threshold=2.5, max_splats=9, splats=6)
-    change = choose_densification(state, stats, settings, extent=10.0, after_reset=False)
+    change = choose_densification(state, stats, settings, extent=10.0)
     # pulls 5, 3, 0, 4, 1, 4: over the threshold 0, 3, 5 and 1; room for three
     assert not change.gone.any()
     assert change.cloned.tolist() == [0, 5] and change.split.tolist() == [3]
@@ -96,22 +96,21 @@ def test_small_splats_are_cloned_and_large_ones_split_the_strongest_first():
     assert out["steps"] == 7
 
 
-def test_what_is_transparent_or_broken_goes_and_what_is_too_large_after_a_reset():
+def test_what_is_transparent_or_broken_goes_and_nothing_for_its_size():
     state, stats = state_of(4), np.full((4, 2), 100.0)
     state["opacity.value"][:] = [-9, np.nan, 1, 1]
-    state["scales.value"][3] = np.log(3.0)
+    state["scales.value"][3] = np.log(1000.0)  # a hundred extents
     settings = PlainSettings()
-    for after_reset, gone in ((False, [1, 1, 0, 0]), (True, [1, 1, 0, 1])):
-        change = choose_densification(state, stats, settings, extent=10.0, after_reset=after_reset)
-        assert change.gone.tolist() == [bool(g) for g in gone]
-        assert not set(np.flatnonzero(change.gone)) & {*change.cloned, *change.split}
+    change = choose_densification(state, stats, settings, extent=10.0)
+    assert change.gone.tolist() == [True, True, False, False]
+    assert not set(np.flatnonzero(change.gone)) & {*change.cloned, *change.split}
     state["opacity.value"][:] = -9  # somebody has to stay
-    assert not choose_densification(state, stats, settings, 10.0, False).gone.any()
+    assert not choose_densification(state, stats, settings, 10.0).gone.any()
 
 
 def test_a_full_scene_does_not_grow():
     settings = PlainSettings(max_splats=5, splats=5)
-    change = choose_densification(state_of(8), np.full((8, 2), 50.0), settings, 10.0, False)
+    change = choose_densification(state_of(8), np.full((8, 2), 50.0), settings, 10.0)
     assert not len(change.cloned) and not len(change.split)
 
 
