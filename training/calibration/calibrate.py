@@ -8,26 +8,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from PIL import Image
 
 from shapeshift.rasterizer.project import LEAST_ALPHA
 from shapeshift.runtime_models.model import BadFile, Stop
-from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.baselines.plain import one_modality
 from shapeshift.training.calibration.extrinsics import ExtrinsicOffset, offset_of_matrix, rigid
 from shapeshift.training.calibration.residuals import Shape, ShapeResiduals
 from shapeshift.training.first_anchors.views import distance_of
-from shapeshift.training.photos import BLACK, LoadedPhoto, read
+from shapeshift.training.photos import BLACK, read
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background
-from shapeshift.training.supervision.still_background import (
-    PICTURE_PHOTOS,
-    STILL_PHOTOS,
-    StillBackground,
-    chosen,
-    still_background,
-    still_share,
-)
+from shapeshift.training.supervision.still_background import STILL_PHOTOS, chosen, still_share
 from shapeshift.training.train import Trainer
 
 STEPS = 2000  # of training the shape
@@ -101,14 +93,13 @@ def search(
     other = reference_of(capture, modality)
     factor, _ = factors_of(capture, modality, other.name, settings.downscale or 1)
     distance = distance_of([photo.view for photo in photos])
-    subject = Subject.of(capture, photos, factor, settings)
     offset, inverse = np.eye(4), None
     residuals: ShapeResiduals | None = None
     first: ShapeResiduals | None = None
     for number, level in enumerate(levels):
         report(f"cameras of {modality}", number / len(levels))
         loaded = [
-            subject.alone(photo, read(photo, factor * level.smaller, settings.masks))
+            read(photo, factor * level.smaller, settings.masks)
             for photo in chosen(photos, level.photos)
         ]
         background = choose_background(settings.background, capture.background, loaded)
@@ -122,35 +113,22 @@ def search(
     return offset_of_matrix(rigid(offset), gain_db(first, offset) if first else 0.0)
 
 
-@dataclass(frozen=True)
-class Subject:
-    """What of photos of any size is the subject, where what is behind it stands still."""
+def still_warning(capture: Capture, settings: TrainSettings, modality: str) -> str:
+    """What a person should know where something stands still in a modality's photos; "": nothing.
 
-    still: StillBackground  # of photos whose sides are divided by `factor`
-    factor: int
-    masks: str
-
-    @classmethod
-    def of(
-        cls, capture: Capture, photos: list[Photo], factor: int, settings: TrainSettings
-    ) -> "Subject":
-        """Found in photos of the finest level: the shape, too, is trained without it."""
-        still = StillBackground()
-        if settings.background == "auto" and capture.background is None:
-            some = [read(photo, factor, settings.masks) for photo in chosen(photos, STILL_PHOTOS)]
-            if still_share(some):
-                many = chosen(photos, PICTURE_PHOTOS)
-                still = still_background([read(photo, factor, settings.masks) for photo in many])
-        return cls(still, factor, settings.masks)
-
-    def alone(self, photo: Photo, loaded: LoadedPhoto) -> LoadedPhoto:
-        """The photo as it was loaded in some size, cut out by what its finest size shows."""
-        if not self.still.pictures:
-            return loaded
-        fine = self.still.cut(read(photo, self.factor, self.masks))
-        alpha = Image.fromarray(fine.rgba[..., 3]).resize(loaded.view.size, Image.Resampling.BOX)
-        rgba = np.dstack([loaded.rgba[..., :3], np.asarray(alpha)])
-        return replace(loaded, rgba=rgba, masked=True)
+    It is not left out of them: found by itself in small photos of two turntables and not in those
+    of a third, it made the offset better once and worse once.  docs/training.md, "A turntable".
+    """
+    photos = capture.of(modality, "train")
+    factor = max(settings.downscale or 1, -(-max(photos[0].view.size) // MOST_SIDE))
+    share = still_share([read(p, factor, settings.masks) for p in chosen(photos, STILL_PHOTOS)])
+    if not share:
+        return ""
+    return (
+        f"{modality}: {share:.0%} of its photos' pixels show the same in all of them, while their "
+        "cameras turn; --calibrate does not leave that out, and may end far away: give masks of "
+        "the subject (docs/training.md)."
+    )
 
 
 def reference_of(capture: Capture, modality: str) -> Stop:

@@ -13,11 +13,11 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.calibration.calibrate import (
     PYRAMID,
-    Subject,
     calibrate,
     descend,
     factors_of,
     reference_of,
+    still_warning,
 )
 from shapeshift.training.calibration.extrinsics import (
     moved_by,
@@ -30,10 +30,10 @@ from shapeshift.training.calibration.extrinsics import (
 from shapeshift.training.calibration.residuals import ShapeResiduals
 from shapeshift.training.drawing import camera_of, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.photos import LoadedPhoto, read
+from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
-from shapeshift.training.synthetic.strangers import make_stranger, mask_of
+from shapeshift.training.synthetic.strangers import make_stranger
 
 RNG = np.random.default_rng
 TWICE = f'{{"RGB": {(2 * np.eye(4)).ravel().tolist()}}}'
@@ -248,52 +248,15 @@ def test_both_modalities_are_read_with_pixels_of_one_angle(balls):
     assert factors_of(replace(balls, photos=larger), "RGB", "Thermal", 1) == (2, 1)
 
 
-@pytest.fixture(scope="module")
-def turntable(tmp_path_factory) -> tuple[Capture, list[np.ndarray]]:
-    """Photos before a still wall, and the tracer's masks in the photos' order."""
-    folder = tmp_path_factory.mktemp("turntable")
-    place, _ = make_stranger(folder, "turntable", 1, (80, 60), 32)
-    capture = read_capture(folder)
-    photos = capture.of("RGB", "train")
-    return capture, [mask_of(photo.view, place, 0) >= 0.5 for photo in photos]
+@pytest.mark.parametrize("kind", ["turntable", "cut_out"])
+def test_what_stands_still_behind_a_calibrated_camera_is_said(tmp_path, kind):
+    """Not where masks leave it out, nor where nothing does."""
+    make_stranger(tmp_path, kind, 1, (80, 60), 24)
+    said = still_warning(read_capture(tmp_path), TrainSettings(), "RGB")
+    assert bool(said) == (kind == "turntable")
+    if said:
+        assert said.startswith("RGB: ") and "--calibrate does not leave that out" in said
 
 
-@pytest.mark.parametrize("smaller", [1, 2, 4])
-def test_what_stands_still_is_cut_out_of_photos_of_every_size(turntable, smaller):
-    """As the tracer's own outlines are, made smaller in the same way."""
-    capture, masks = turntable
-    photos = capture.of("RGB", "train")
-    subject = Subject.of(capture, photos, 1, TrainSettings())
-    assert subject.still.pictures
-    shares = []
-    for photo, mask in list(zip(photos, masks, strict=True))[::5]:
-        plain = read(photo, smaller, "auto")
-        cut = subject.alone(photo, plain)
-        assert cut.masked and np.array_equal(cut.rgba[..., :3], plain.rgba[..., :3])
-        rows, columns = (length // smaller for length in mask.shape)
-        parts = mask.reshape(rows, smaller, columns, smaller)
-        away = np.abs(cut.rgba[..., 3] / 255 - parts.mean(axis=(1, 3)))
-        # A rim of a pixel about a table of 60 by 20, and the lowest photo's stripe of the wall.
-        assert away.mean() < 0.06 and (away > 0.5).mean() < 0.06
-        shares.append(away.mean())
-    assert np.median(shares) < 0.025
-
-
-@pytest.mark.parametrize("named", [{"background": "random"}, {"background": "black"}])
-def test_a_background_that_is_named_stays_in_the_photos(turntable, named):
-    capture, _ = turntable
-    photos = capture.of("RGB", "train")
-    for given, settings in (
-        (capture, TrainSettings(**named)),
-        (replace(capture, background=(0.0, 0.0, 0.0)), TrainSettings()),
-    ):
-        subject = Subject.of(given, photos, 1, settings)
-        loaded = read(photos[0], 2, "auto")
-        assert subject.alone(photos[0], loaded) is loaded
-
-
-def test_where_nothing_stands_still_photos_stay(balls):
-    photos = balls.of("Thermal", "train")
-    subject = Subject.of(balls, photos, 1, TrainSettings())
-    loaded = read(photos[0], 1, "auto")
-    assert subject.alone(photos[0], loaded) is loaded
+def test_of_a_room_nothing_is_said(balls):
+    assert still_warning(balls, TrainSettings(), "Thermal") == ""
