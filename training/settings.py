@@ -1,5 +1,6 @@
 """Every number that a training run can be asked for: what `train` offers, and what a run keeps."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
@@ -8,6 +9,7 @@ import numpy as np
 
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.photos import choose_downscale
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -125,7 +127,10 @@ class TrainSettings:
     seed: int = 0
     """Seed of all random numbers."""
     splats_per_anchor: int = 5
-    """Splats that the networks predict for each anchor: k in the paper."""
+    """Splats that the networks predict for each anchor: k in the paper.  Several modalities of
+    photos with fewer than 60,000 pixels have fewer, as many as pixels by 12,000 anchors, at least
+    2, where none of --max-anchors, --splats-per-anchor, --anchor-attributes and --max-mb is
+    given."""
     features: int = 16
     """Numbers that each anchor stores for the networks: the length of its feature vector."""
     hidden: int = 32
@@ -207,8 +212,21 @@ def suited(settings: TrainSettings, asked: Iterable[str], capture: Capture) -> T
     if not set(asked).isdisjoint(SIZES):
         return settings
     if len(capture.stops) > 1:
-        return replace(settings, max_by_shape=True)
+        return replace(settings, max_by_shape=True, splats_per_anchor=fewer(settings, capture))
     return replace(settings, **ONE_MODALITY) if photos >= MANY_PHOTOS else settings
+
+
+def fewer(settings: TrainSettings, capture: Capture) -> int:
+    """Splats an anchor such that all anchors have no more of them than the largest photo pixels.
+
+    More cannot be told apart, and each costs its part of a step: docs/bench/ideas.md, "one shape".
+    """
+    if not capture.photos:
+        return settings.splats_per_anchor
+    factor = settings.downscale or choose_downscale(capture.photos)
+    pixels = max(math.prod(photo.view.divided(factor).size) for photo in capture.photos)
+    most = max(pixels // settings.max_anchors, ONE_MODALITY["splats_per_anchor"])
+    return min(settings.splats_per_anchor, most)
 
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
