@@ -56,9 +56,11 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
     return {"weights": flat * layout.rate_shares()} | shared
 
 
-def check_numbers(settings: object, least: dict[str, float], shares: tuple[str, ...]) -> None:
-    """Raises ValueError naming the first number below its least, not finite, or no share; and the
-    first word that is none of its field's.
+def check_numbers(
+    settings: object, least: dict[str, float], most: dict[str, tuple[float, str]]
+) -> None:
+    """Raises ValueError naming the first number below its least, not finite, or beyond its most,
+    with what that is; and the first word that is none of its field's.
     """
     hints = get_type_hints(type(settings))
     for name, low in least.items():
@@ -75,9 +77,17 @@ def check_numbers(settings: object, least: dict[str, float], shares: tuple[str, 
         if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
             words = ", ".join(map(str, get_args(hint)))
             raise ValueError(f"{name} is {getattr(settings, name)!r}; choose {words}.")
-    for name in shares:
-        if not getattr(settings, name) <= 1:
-            raise ValueError(f"{name} is {getattr(settings, name)}; it is a share, 0 to 1.")
+    for name, (high, meaning) in most.items():
+        if not getattr(settings, name) <= high:
+            raise ValueError(f"{name} is {getattr(settings, name)}; it is {meaning}, 0 to {high}.")
+
+
+# Beyond it 32-bit floats or all other terms of the loss are lost.
+WEIGHT = (1000, "a weight beside the colours' 1")
+MOST: dict[str, tuple[float, str]] = {
+    "blended_shapes": (1, "a share"), "depth_share": WEIGHT, "normal_share": WEIGHT,
+    "min_scale_px": (1000, "a number of pixels"),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -155,7 +165,7 @@ class TrainSettings:
     anchor_attributes: str = "frame,stop_color"
     """What each anchor has besides its features, as frame,stop_color,light: sizes and axes; a base
     colour, one for all stops (color) or one for each (stop_color); light by direction, which
-    changes its colour by the side it is seen from."""
+    changes its colour by the side it is seen from, or its brightness alone (gray_light)."""
     grow: bool = True
     """Add anchors and move the least useful ones to where pictures need them."""
     grow_every: int = 100
@@ -170,7 +180,7 @@ class TrainSettings:
             "hidden": 1, "max_anchors": 1, "grow_every": 1, "downscale": 1, "depth_share": 0,
             "normal_share": 0, "max_mb": 1e-6, "blended_shapes": 0, "min_scale_px": 0,
         }  # fmt: skip
-        check_numbers(self, least, ("blended_shapes",))
+        check_numbers(self, least, MOST)
         self.layout(2)
         if self.iterations is None and self.seconds is None:
             raise ValueError("A run needs an end: give iterations or seconds.")
@@ -184,9 +194,10 @@ class TrainSettings:
             tuple(name.strip() for name in names.split(",") if name.strip())
             for names in (self.fixed, self.anchor_attributes)
         )
+        gray = "gray_light" in attributes and "light" not in attributes
         return HeadLayout(
             self.splats_per_anchor, self.features, self.hidden, units, fixed, self.view_dependent,
-            attributes, stops,
+            attributes, stops, light_channels=1 if gray else 3,
         )  # fmt: skip
 
     def rates(self, iterations: int) -> Rates:
