@@ -1,6 +1,5 @@
 """How every command opens its scene or its photos: the options of reading, progress, doubts."""
 
-import math
 import os
 import re
 import time
@@ -114,11 +113,15 @@ def read_splat_budget(text: str, said: str = "--budget") -> int:
 
 
 def refuse_memory(gigabytes: float) -> None:
-    """Raises UsageError for what is no amount."""
+    """Raises UsageError for what is no amount; 0 stands for what is usual."""
     from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.files.memory import MOST_GB
 
-    if not 0 <= gigabytes < math.inf:
-        raise UsageError(f"--memory is {gigabytes}, expected GB, or 0 for what is usual.")
+    if not 0 <= gigabytes <= MOST_GB:
+        raise UsageError(
+            f"--memory is {gigabytes:.12g}, expected GB, at most {MOST_GB:,}, or 0 for what is "
+            "usual."
+        )
 
 
 def open_model(
@@ -159,14 +162,20 @@ def say_levels(models: Iterable[Model], path: Path, options: ReadingOptions) -> 
 def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
     """Posed photos, not their pixels; progress and doubts of its files go to stderr.
 
-    memory_gb: --memory, for all that this process reads from now on.  Raises BadFile, UsageError.
+    memory_gb: --memory, for all that this process reads from now on; None: what is usual.  Raises
+    BadFile, UsageError.
     """
+    from shapeshift.app.errors import UsageError
     from shapeshift.app.progress import working
-    from shapeshift.runtime_models.files.memory import VARIABLE
+    from shapeshift.runtime_models.files.memory import MOST_GB, VARIABLE
     from shapeshift.scene.captures.read_capture import read_capture
 
-    if memory_gb:
-        refuse_memory(memory_gb)
+    if memory_gb is not None:
+        if not 0 < memory_gb <= MOST_GB:
+            raise UsageError(
+                f"--memory is {memory_gb:.12g}, expected GB above 0, at most {MOST_GB:,}; leave it "
+                "out for what is usual."
+            )
         os.environ[VARIABLE] = str(memory_gb)  # where its pixels are read, also by children
     with working("reading the capture"):
         capture = read_capture(path)

@@ -1,5 +1,6 @@
 """Every number that a training run can be asked for: what `train` offers, and what a run keeps."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
@@ -8,6 +9,7 @@ import numpy as np
 
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.photos import choose_downscale
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -54,9 +56,11 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
     return {"weights": flat * layout.rate_shares()} | shared
 
 
-def check_numbers(settings: object, least: dict[str, float], shares: tuple[str, ...]) -> None:
-    """Raises ValueError naming the first number below its least, not finite, or no share; and the
-    first word that is none of its field's.
+def check_numbers(
+    settings: object, least: dict[str, float], most: dict[str, tuple[float, str]]
+) -> None:
+    """Raises ValueError naming the first number below its least, not finite, or beyond its most,
+    with what that is; and the first word that is none of its field's.
     """
     hints = get_type_hints(type(settings))
     for name, low in least.items():
@@ -73,9 +77,17 @@ def check_numbers(settings: object, least: dict[str, float], shares: tuple[str, 
         if get_origin(hint) is Literal and getattr(settings, name) not in get_args(hint):
             words = ", ".join(map(str, get_args(hint)))
             raise ValueError(f"{name} is {getattr(settings, name)!r}; choose {words}.")
-    for name in shares:
-        if not getattr(settings, name) <= 1:
-            raise ValueError(f"{name} is {getattr(settings, name)}; it is a share, 0 to 1.")
+    for name, (high, meaning) in most.items():
+        if not getattr(settings, name) <= high:
+            raise ValueError(f"{name} is {getattr(settings, name)}; it is {meaning}, 0 to {high}.")
+
+
+# Beyond it 32-bit floats or all other terms of the loss are lost.
+WEIGHT = (1000, "a weight beside the colours' 1")
+MOST: dict[str, tuple[float, str]] = {
+    "blended_shapes": (1, "a share"), "depth_share": WEIGHT, "normal_share": WEIGHT,
+    "min_scale_px": (1000, "a number of pixels"),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -125,7 +137,10 @@ class TrainSettings:
     seed: int = 0
     """Seed of all random numbers."""
     splats_per_anchor: int = 5
-    """Splats that the networks predict for each anchor: k in the paper."""
+    """Splats that the networks predict for each anchor: k in the paper.  Several modalities of
+    photos with fewer than 60,000 pixels have fewer, as many as pixels by 12,000 anchors, at least
+    2, where none of --max-anchors, --splats-per-anchor, --anchor-attributes and --max-mb is
+    given."""
     features: int = 16
     """Numbers that each anchor stores for the networks: the length of its feature vector."""
     hidden: int = 32
@@ -150,7 +165,7 @@ class TrainSettings:
     anchor_attributes: str = "frame,stop_color"
     """What each anchor has besides its features, as frame,stop_color,light: sizes and axes; a base
     colour, one for all stops (color) or one for each (stop_color); light by direction, which
-    changes its colour by the side it is seen from."""
+    changes its colour by the side it is seen from, or its brightness alone (gray_light)."""
     grow: bool = True
     """Add anchors and move the least useful ones to where pictures need them."""
     grow_every: int = 100
@@ -165,7 +180,7 @@ class TrainSettings:
             "hidden": 1, "max_anchors": 1, "grow_every": 1, "downscale": 1, "depth_share": 0,
             "normal_share": 0, "max_mb": 1e-6, "blended_shapes": 0, "min_scale_px": 0,
         }  # fmt: skip
-        check_numbers(self, least, ("blended_shapes",))
+        check_numbers(self, least, MOST)
         self.layout(2)
         if self.iterations is None and self.seconds is None:
             raise ValueError("A run needs an end: give iterations or seconds.")
@@ -179,9 +194,10 @@ class TrainSettings:
             tuple(name.strip() for name in names.split(",") if name.strip())
             for names in (self.fixed, self.anchor_attributes)
         )
+        gray = "gray_light" in attributes and "light" not in attributes
         return HeadLayout(
             self.splats_per_anchor, self.features, self.hidden, units, fixed, self.view_dependent,
-            attributes, stops,
+            attributes, stops, light_channels=1 if gray else 3,
         )  # fmt: skip
 
     def rates(self, iterations: int) -> Rates:
@@ -207,8 +223,21 @@ def suited(settings: TrainSettings, asked: Iterable[str], capture: Capture) -> T
     if not set(asked).isdisjoint(SIZES):
         return settings
     if len(capture.stops) > 1:
-        return replace(settings, max_by_shape=True)
+        return replace(settings, max_by_shape=True, splats_per_anchor=fewer(settings, capture))
     return replace(settings, **ONE_MODALITY) if photos >= MANY_PHOTOS else settings
+
+
+def fewer(settings: TrainSettings, capture: Capture) -> int:
+    """Splats an anchor such that all anchors have no more of them than the largest photo pixels.
+
+    More cannot be told apart, and each costs its part of a step: docs/bench/ideas.md, "one shape".
+    """
+    if not capture.photos:
+        return settings.splats_per_anchor
+    factor = settings.downscale or choose_downscale(capture.photos)
+    pixels = max(math.prod(photo.view.divided(factor).size) for photo in capture.photos)
+    most = max(pixels // settings.max_anchors, ONE_MODALITY["splats_per_anchor"])
+    return min(settings.splats_per_anchor, most)
 
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed

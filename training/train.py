@@ -130,7 +130,7 @@ class Trainer(Run):
 
     def initialise(self, photos: list[LoadedPhoto], report: Report | None) -> None:
         """Anchors, features and weights of a new run."""
-        settings = self.settings
+        settings, wide = self.settings, self.layout.widths
         rng = np.random.default_rng([settings.seed, 0])
         first = initial_points(self.capture, photos, rng, settings.points, report, settings.seconds)
         self.warnings += first.doubts
@@ -142,7 +142,7 @@ class Trainer(Run):
             rng.normal(size=(count, settings.features)) * FEATURE_SPREAD
         )
         values = {"weights": initial_weights(self.layout, rng), "features": features}
-        values |= {n: getattr(start, n) for n in ("anchors", *self.layout.own)}
+        values |= {n: getattr(start, n)[:, : wide.get(n)] for n in ("anchors", *self.layout.own)}
         if len(groups := self.layout.color_groups) > 1:
             del values["colors"]
             for group, stop in zip(groups, self.stops, strict=True):

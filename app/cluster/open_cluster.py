@@ -42,16 +42,27 @@ class Cluster(Protocol):
 
 
 def check_cluster(options: ClusterOptions) -> None:
-    """Before long work: what --cluster says, and whether what it needs is installed.
+    """Before long work: what --cluster and --gpus say, and whether what they need is installed.
 
     Raises UsageError.
     """
     from shapeshift.app.cluster.place import read_place
 
-    if read_place(options.cluster).kind != NONE:
+    place = read_place(options.cluster)
+    check_gpus(place.kind, options.gpus)
+    if place.kind != NONE:
         from shapeshift.app.cluster.certificates import require_dask
 
         require_dask()
+
+
+def check_gpus(kind: str, gpus: int) -> None:
+    """Raises UsageError where --gpus is no number of them, or --cluster of that kind has none."""
+    if gpus < 0 or (gpus and kind != "local"):
+        raise UsageError(
+            f"--gpus is {gpus}, expected the GPUs of this machine, with --cluster local; of other "
+            "machines `cluster worker --gpus` says how many there are."
+        )
 
 
 @contextmanager
@@ -65,11 +76,7 @@ def open_cluster(
     from shapeshift.app.cluster.place import read_place
 
     place = read_place(where)
-    if gpus < 0 or (gpus and place.kind != "local"):
-        raise UsageError(
-            f"--gpus is {gpus}, expected the GPUs of this machine, with --cluster local; of other "
-            "machines `cluster worker --gpus` says how many there are."
-        )
+    check_gpus(place.kind, gpus)
     if place.kind == "none":
         yield Here(shown or board)
         return

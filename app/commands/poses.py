@@ -64,6 +64,8 @@ def run(options: Options) -> int:
     settings = settings_of(options)
     if not options.every >= 1:
         raise UsageError(f"--every is {options.every}; give 1 or more.")
+    if not options.frames >= 3:
+        raise UsageError(f"--frames is {options.frames}; give 3 or more.")
     refuse_target(options)
     with progress_bar() as bar:
         task = bar.add_task("photos", total=None)
@@ -154,12 +156,9 @@ def refuse_target(options: Options) -> None:
 
 def frames_of(options: Options, progress) -> Path:
     """The folder of the video's frames; what a run before took out is used again."""
-    from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.poses.video_frames import take_frames
     from shapeshift.runtime_models.files.whole_file import make_folders, whole_folder
 
-    if not options.frames >= 3:
-        raise UsageError(f"--frames is {options.frames}; give 3 or more.")
     folder = options.out / FRAMES
     if not folder.is_dir():
         make_folders(options.out.parent, options.out.name)

@@ -152,7 +152,9 @@ def straight_capture(options: Options, model: "AnchorModel | SplatLayers") -> "C
     """The capture, its cameras where the training found them.  Raises BadFile."""
     from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
 
-    return with_extrinsics(open_capture(options.capture, options.memory), rig_of(model.provenance))
+    return with_extrinsics(
+        open_capture(options.capture, options.memory or None), rig_of(model.provenance)
+    )
 
 
 def read_maps(

@@ -163,7 +163,7 @@ def run(options: Options) -> int:
     thermal = thermal_scene(document, choice)
     emission, own = choose_emission(options, file, thermal.stop.unit)
     file = replace(file, emission=emission)
-    capture = open_capture(options.capture, options.memory) if options.capture else None
+    capture = open_capture(options.capture, options.memory or None) if options.capture else None
     views = choose_views(options, document, cameras, size)
     photo = photo_stop(options, document, thermal)
     with open_renderer(options.context, options.drawing) as (renderer, _):

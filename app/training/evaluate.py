@@ -60,7 +60,7 @@ def run(options: Options) -> int:
     if options.downscale is not None and options.downscale < 1:
         raise UsageError(f"--downscale is {options.downscale}; it has to be at least 1.")
     distance = None if options.vgg is None else VggDistance(options.vgg)
-    capture = open_capture(options.capture, options.memory)
+    capture = open_capture(options.capture, options.memory or None)
     if options.modality is not None:
         capture = only(capture, options.modality)
     model = open_model(options.scene, options)

@@ -26,7 +26,7 @@ def calibrated(
 ) -> "TrainSettings":
     """The settings with the offset of a modality's cameras, which is looked for now."""
     from shapeshift.app.progress import progress_bar
-    from shapeshift.training.calibration.calibrate import calibrate
+    from shapeshift.training.calibration.calibrate import calibrate, still_warning
     from shapeshift.training.calibration.extrinsics import rig_json
 
     say(f"looking for the offset of the cameras of {modality} ...")
@@ -42,6 +42,8 @@ def calibrated(
         "their stated poses, each in its own axes; its photos fit "
         f"{found.gain_db:.1f} dB better so.  Trained with that."
     )
+    if doubt := still_warning(capture, settings, modality):
+        say(doubt)
     return replace(settings, rig=rig_json(modality, found))
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.runtime_models.files.memory import MOST_GB
 from shapeshift.runtime_models.model import BadFile
 
 if TYPE_CHECKING:
@@ -55,8 +56,11 @@ def room_of(out: Path | None, megabytes: float | None, said: str = "--photo-mb")
     """
     from shapeshift.training.photo_store.open_photos import PhotoRoom
 
-    if megabytes is not None and not 0 < megabytes < float("inf"):
-        raise UsageError(f"{said} is {megabytes}, expected MB above 0.")
+    if megabytes is not None and not 0 < megabytes <= MOST_GB * 1000:
+        raise UsageError(
+            f"{said} is {megabytes:.12g}, expected MB above 0, at most {MOST_GB * 1000:,}; leave "
+            "it out for half of the memory that files may take."
+        )
     most = None if megabytes is None else int(megabytes * 1e6)
     return PhotoRoom(most, None if out is None else photos_path(out))
 

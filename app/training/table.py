@@ -89,6 +89,7 @@ def run(options: Options) -> int:
     if options.resume and not options.only:
         raise UsageError("--resume goes on with one model; add --only, or leave it out.")
     check_cluster(options)
+    check_settings(options)
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     distance = None if options.vgg is None else VggDistance(options.vgg)
     check_capture(capture, options, distance)
@@ -127,6 +128,15 @@ def run(options: Options) -> int:
     finish(table.rows, options.out, head)
     say(f"written to {full(options.out)}: table.csv, table.md and the models")
     return 0
+
+
+def check_settings(options: Options) -> None:
+    """Raises UsageError for numbers that no training can have, before anything is read."""
+    from shapeshift.app.training.train_baselines import plain_settings
+    from shapeshift.app.training.train_options import settings_of
+
+    settings_of(train_options("joint", options).asked)
+    plain_settings(train_options("splats", options))
 
 
 def run_part(device, capture: "Capture", options: Options) -> int:

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapeshift.app.cluster.open_cluster import NONE
+from shapeshift.app.cluster.open_cluster import NONE, check_gpus
 from shapeshift.app.cluster.task import is_task
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
@@ -115,6 +115,9 @@ def part_in_blocks(options: Options) -> Callable[[Options], int] | None:
         return run_blocks
     if options.coarse_iterations is not None:
         raise UsageError("--coarse-iterations is of --blocks; add --blocks, or leave it out.")
+    if not options.block_photos >= 0:
+        raise UsageError(f"--block-photos is {options.block_photos}; it has to be at least 0.")
+    check_gpus(NONE, options.gpus)
     if options.cluster != NONE:
         raise UsageError("--cluster shares out blocks; add --blocks, or leave it out.")
     return None

@@ -1,5 +1,6 @@
 """Small random models that tests share."""
 
+import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from shapeshift.runtime_models.model import (
     Mlp,
     Stop,
 )
+from shapeshift.runtime_models.package.package_files import ANCHORS
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stop_weights import StopWeights
@@ -149,3 +151,12 @@ def with_frames(model: AnchorModel, seed: int = 0) -> AnchorModel:
     wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
     scales = np.exp(rng.uniform(-1.6, 1.6, (count, 3)))
     return replace(model, frames=AnchorFrames(scales.astype(np.float32), wxyz.astype(np.float32)))
+
+
+def changed_arrays(files: dict[str, bytes], **arrays) -> dict[str, bytes]:
+    """The package with arrays of its npz replaced, or left out where None."""
+    with np.load(io.BytesIO(files[ANCHORS])) as archive:
+        there = dict(archive) | arrays
+    out = io.BytesIO()
+    np.savez(out, **{name: array for name, array in there.items() if array is not None})
+    return files | {ANCHORS: out.getvalue()}

@@ -216,8 +216,8 @@ def test_settings_name_the_networks():
         TrainSettings(fixed="shape")
 
 
-def a_view() -> View:
-    return View(look_at(np.ones(3), np.zeros(3)), perspective(0.7, (4, 4)), 0.05, 9.0, (4, 4))
+def a_view(size: tuple[int, int] = (4, 4)) -> View:
+    return View(look_at(np.ones(3), np.zeros(3)), perspective(0.7, size), 0.05, 9.0, size)
 
 
 @pytest.mark.parametrize(
@@ -255,10 +255,40 @@ def test_a_scene_that_never_changes_has_more_anchors_with_light(asked, stops, ph
 )
 def test_anchors_of_several_modalities_are_counted_for_each_shape(asked, stops, counted):
     """Unless somebody says how many there may be, or of what kind; nothing else differs."""
-    taken = tuple(Photo(a_view(), Path(f"{i}.png"), "0", split="train") for i in range(9))
+    taken = tuple(Photo(a_view((640, 480)), Path(f"{i}.png"), "0", split="train") for i in range(9))
     capture = Capture(Path(), tuple(Stop(str(i), 0.1 * i) for i in range(stops)), taken)
     settings = TrainSettings(seed=7)
     assert suited(settings, asked, capture) == replace(settings, max_by_shape=counted)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "downscale", "asked", "splats"),
+    [
+        ([(300, 200)], None, (), 5), ([(599, 100)], None, (), 4), ([(200, 200)], None, (), 3),
+        ([(192, 144)], None, (), 2), ([(1, 1)], None, (), 2), ([(4096, 4096)], None, (), 5),
+        ([(192, 144), (300, 200)], None, (), 5),  # the largest counts
+        ([(600, 400)], 2, (), 5), ([(600, 400)], 3, (), 2),
+        ([(1200, 100)], None, (), 2),  # halved by itself: 600x50
+        *(([(192, 144)], None, (name,), 5) for name in (*ONE_MODALITY, "max_mb")),
+    ],
+)  # fmt: skip
+def test_small_photos_of_several_modalities_have_no_more_splats_than_pixels(
+    sizes, downscale, asked, splats
+):
+    taken = tuple(Photo(a_view(s), Path(f"{s[0]}.png"), "0", split="train") for s in sizes)
+    capture = Capture(Path(), (Stop("0", 0.0), Stop("1", 1.0)), taken)
+    settings = TrainSettings(seed=7, downscale=downscale)
+    found = suited(settings, asked, capture)
+    assert found == replace(settings, max_by_shape=not asked, splats_per_anchor=splats)
+    pixels = max(w * h for w, h in sizes) / (downscale or 1) ** 2
+    if splats > 2 and not asked:  # 2 at least
+        assert found.max_anchors * splats <= pixels
+
+
+def test_no_photos_ask_for_no_fewer_splats():
+    """A capture that training refuses later, by name."""
+    nothing = Capture(Path(), (Stop("0", 0.0), Stop("1", 1.0)), ())
+    assert suited(TrainSettings(), (), nothing).splats_per_anchor == 5
 
 
 def test_rates_decay_further_in_long_runs():

@@ -1,13 +1,14 @@
 """What a training step costs, pass by pass, with all anchors and with those that its stop shows.
 
     python3 tools/training/step_cost.py CAPTURE ... --steps 300 --out docs/bench/step_cost.csv \
-        [--looks 20] [--downscale N ...] [--code NAME]
+        [--looks 20] [--downscale N ...] [--code NAME] [--anchor-attributes frame,color,light]
 
 CAPTURE is a folder of posed photos.  After so many steps of training with its defaults (as a run of
 four times as many) the anchors stay as they are, and the same photos of each stop are run in turns
 with all anchors and with those that the view can show at the stop, as training does in nine steps
 of ten.  anchors: how many ran, the mean; cpu_ms and the passes: milliseconds of one core, of each
 the median over the looks.  code: what is measured, where rows of several commits are put together.
+psnr_db: of the held-out photos of the stop after those steps; faster code has to have it, too.
 """
 
 import argparse
@@ -34,13 +35,13 @@ PASSES = (
 )  # fmt: skip
 COLUMNS = (
     "capture", "stop", "code", "run", "anchors", "of", "cpu_ms",
-    *(f"{name.replace(' ', '_')}_ms" for name in PASSES),
+    *(f"{name.replace(' ', '_')}_ms" for name in PASSES), "psnr_db",
 )  # fmt: skip
 
 
-def trained(device, folder: Path, steps: int, factor: int | None) -> Trainer:
+def trained(device, folder: Path, steps: int, factor: int | None, attributes: str) -> Trainer:
     """A run after so many steps."""
-    settings = TrainSettings(iterations=4 * steps, downscale=factor)
+    settings = TrainSettings(iterations=4 * steps, downscale=factor, anchor_attributes=attributes)
     trainer = Trainer(device, read_capture(folder), settings)
     for now in trainer.steps():
         if now.iteration == steps:
@@ -70,7 +71,7 @@ def look(trainer: Trainer, photo, some: bool) -> tuple[int, dict[str, float]]:
 
 def measured(trainer: Trainer, looks: int) -> list[dict]:
     """Two rows a stop."""
-    rows = []
+    rows, decibels = [], trainer.held_out_psnr(len(trainer.held_out))
     for stop in trainer.stops:
         photos = trainer.schedule.photos[stop.name]
         found: dict[bool, list] = {False: [], True: []}
@@ -90,6 +91,7 @@ def measured(trainer: Trainer, looks: int) -> list[dict]:
                 | {"anchors": round(float(np.mean(ran))), "of": trainer.anchors_count}
                 | {"cpu_ms": f"{passes['all']:.2f}"}
                 | {f"{name.replace(' ', '_')}_ms": f"{passes[name]:.2f}" for name in PASSES}
+                | {"psnr_db": f"{decibels[stop.name]:.2f}" if stop.name in decibels else ""}
             )
     return rows
 
@@ -102,6 +104,7 @@ def main() -> None:
     parser.add_argument("--looks", type=int, default=20)
     parser.add_argument("--downscale", type=int, nargs="+", help="one a capture; default: usual")
     parser.add_argument("--code", default="")
+    parser.add_argument("--anchor-attributes", default=TrainSettings().anchor_attributes)
     options, device = parser.parse_args(), open_device("cpu")
     words = [Path(w).name if Path(w).exists() else w for w in sys.argv[1:]]
     factors = options.downscale or [None] * len(options.captures)
@@ -111,7 +114,7 @@ def main() -> None:
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         rows.writeheader()
         for folder, factor in zip(options.captures, factors, strict=True):
-            trainer = trained(device, folder, options.steps, factor)
+            trainer = trained(device, folder, options.steps, factor, options.anchor_attributes)
             what = {"capture": folder.name, "code": options.code}
             rows.writerows(what | row for row in measured(trainer, options.looks))
             file.flush()

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass
 
-from shapeshift.training.settings import Background, Masks, check_numbers
+from shapeshift.training.settings import WEIGHT, Background, Masks, check_numbers
 
 SHORT_RUN = 1000  # iterations
 
@@ -61,7 +61,7 @@ class PlainSettings:
             "max_splats": 1, "grow_every": 1, "reset_every": 1, "downscale": 1, "depth_share": 0,
             "normal_share": 0,
         }  # fmt: skip
-        check_numbers(self, least, ())
+        check_numbers(self, least, {"depth_share": WEIGHT, "normal_share": WEIGHT})
         if not self.sh_degree <= 3:
             raise ValueError(f"sh_degree is {self.sh_degree}; harmonics go up to degree 3.")
         if self.iterations is None and self.seconds is None:

@@ -19,6 +19,7 @@ from shapeshift.training.first_anchors.views import distance_of
 from shapeshift.training.photos import BLACK, read
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background
+from shapeshift.training.supervision.still_background import STILL_PHOTOS, chosen, still_share
 from shapeshift.training.train import Trainer
 
 STEPS = 2000  # of training the shape
@@ -97,19 +98,37 @@ def search(
     first: ShapeResiduals | None = None
     for number, level in enumerate(levels):
         report(f"cameras of {modality}", number / len(levels))
-        chosen = [
+        loaded = [
             read(photo, factor * level.smaller, settings.masks)
-            for photo in photos[:: -(-len(photos) // level.photos)]
+            for photo in chosen(photos, level.photos)
         ]
-        background = choose_background(settings.background, capture.background, chosen)
+        background = choose_background(settings.background, capture.background, loaded)
         behind = float(np.mean(background or BLACK))
-        finer = ShapeResiduals(device, shape, chosen, behind, distance)
+        finer = ShapeResiduals(device, shape, loaded, behind, distance)
         if residuals is not None:
             finer.gray = residuals.gray
         residuals = finer
         first = first or residuals
         offset, inverse = descend(residuals, offset, None if level.probe else inverse, level.tries)
     return offset_of_matrix(rigid(offset), gain_db(first, offset) if first else 0.0)
+
+
+def still_warning(capture: Capture, settings: TrainSettings, modality: str) -> str:
+    """What a person should know where something stands still in a modality's photos; "": nothing.
+
+    It is not left out of them: found by itself in small photos of two turntables and not in those
+    of a third, it made the offset better once and worse once.  docs/training.md, "A turntable".
+    """
+    photos = capture.of(modality, "train")
+    factor = max(settings.downscale or 1, -(-max(photos[0].view.size) // MOST_SIDE))
+    share = still_share([read(p, factor, settings.masks) for p in chosen(photos, STILL_PHOTOS)])
+    if not share:
+        return ""
+    return (
+        f"{modality}: {share:.0%} of its photos' pixels show the same in all of them, while their "
+        "cameras turn; --calibrate does not leave that out, and may end far away: give masks of "
+        "the subject (docs/training.md)."
+    )
 
 
 def reference_of(capture: Capture, modality: str) -> Stop:

@@ -182,9 +182,19 @@ def _one_color(part: Component, settings: TrainSettings, stops: tuple) -> TrainS
     return replace(settings, anchor_attributes=",".join(dict.fromkeys(names)))
 
 
+def _gray_light(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    """Light by direction that is the same in red, green and blue."""
+    layout = settings.layout(UNITS)
+    if "light" not in layout.own or layout.light_channels == 1:
+        return None
+    names = ("gray_light" if name == "light" else name for name in layout.attributes)
+    return replace(settings, anchor_attributes=",".join(dict.fromkeys(names)))
+
+
 REDUCE = {
     "fix": _fix, "view": _no_view, "hidden": _hidden, "features": _features,
     "slot": _slot, "anchors": _anchors, "attribute": _attribute, "one color": _one_color,
+    "gray light": _gray_light,
 }  # fmt: skip
 # What costs most to run comes first; the shape as a whole before its networks one by one.
 COMPONENTS = (
@@ -195,7 +205,8 @@ COMPONENTS = (
     Component("half of the hidden units", "hidden", again=True),
     Component("half of the features", "features", again=True),
     Component("anchors' own axes and sizes", "attribute", ("frame",)),
-    Component("anchors' own light by direction", "attribute", ("light",)),
+    Component("anchors' own light by direction", "attribute", ("light", "gray_light")),
+    Component("light of red, green and blue each", "gray light"),
     Component("a base colour for each stop", "one color"),
     Component("anchors' own base colours", "attribute", ("color", "stop_color")),
     Component("one splat of every anchor", "slot", again=True),

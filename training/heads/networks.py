@@ -15,9 +15,10 @@ CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients 
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
 RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
 # What anchors may have besides their features, and what the kernels call it: a base colour may be
-# one for all stops, or one for each of them.
+# one for all stops, or one for each of them; light of red, green and blue, or one for all three.
 ANCHOR_ATTRIBUTES = {
     "frame": "frames", "color": "colors", "stop_color": "colors", "light": "light",
+    "gray_light": "light",
 }  # fmt: skip
 # Numbers an anchor, see gaussians.cl; light is of red, green and blue, in older scenes one for all.
 ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3, "light": WIDTHS[3]}
@@ -64,8 +65,8 @@ class HeadLayout:
     @property
     def own(self) -> tuple[str, ...]:
         """What anchors have besides places and features, as the kernels call it."""
-        names = (name for name in self.attributes if name != "light" or self.view_dependent)
-        return tuple(dict.fromkeys(ANCHOR_ATTRIBUTES[name] for name in names))
+        names = dict.fromkeys(ANCHOR_ATTRIBUTES[name] for name in self.attributes)
+        return tuple(name for name in names if name != "light" or self.view_dependent)
 
     @property
     def color_groups(self) -> tuple[str, ...]:

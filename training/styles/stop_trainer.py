@@ -36,7 +36,7 @@ class StopSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_numbers(self, {"units": 1, "features": 0, "seed": 0}, ())
+        check_numbers(self, {"units": 1, "features": 0, "seed": 0}, {})
 
 
 class StopTrainer:

@@ -27,7 +27,7 @@ def kind_of(model) -> tuple[int, bool]:
 
 def test_train_says_nothing_and_has_more_anchors_with_light(balls, tmp_path):
     both, alone = balls
-    cases = ((alone, (), (2, True)), (both, (), (5, False)),
+    cases = ((alone, (), (2, True)), (both, (), (2, False)),
              (alone, ("--max-anchors", "200"), (5, False)))  # fmt: skip
     for number, (folder, more, kind) in enumerate(cases):
         out = str(tmp_path / f"{number}.shift")

@@ -1,5 +1,6 @@
 """Numbers that no training can have: one sentence that names the option as it was typed."""
 
+import numpy as np
 import pytest
 
 from shapeshift.app import cli
@@ -41,6 +42,9 @@ def test_train_names_the_option(tmp_path, capsys, name):
     [
         ("train", ("--depth-share", "nan"), "--depth-share is nan; it has to be at least 0."),
         ("train", ("--blended-shapes", "1.1"), "--blended-shapes is 1.1; it is a share, 0 to 1."),
+        ("train", ("--depth-share", "1e30"), "--depth-share is 1e+30; it is a weight beside the"),
+        ("train", ("--gpus", "-1"), "--gpus is -1, expected the GPUs of this machine"),
+        ("train", ("--block-photos", "-1"), "--block-photos is -1; it has to be at least 0."),
         ("train", ("--fixed", "shape"), "--fixed: there is no head 'shape'"),
         ("train", ("--anchor-attributes", "hat"), "--anchor-attributes: anchors have no attribute"),
         ("train", ("--model", "splats", "--max-splats", "0"), "--max-splats is 0;"),
@@ -52,6 +56,13 @@ def test_train_names_the_option(tmp_path, capsys, name):
         ("fit", ("--final-seconds", "-1"), "--final-seconds is -1"),
         ("fit", ("--tolerance-db", "nan"), "--tolerance-db is nan;"),
         ("fit", ("--seeds", "0"), "--seeds is 0;"),
+        ("fit", ("--gpus", "-1"), "--gpus is -1, expected the GPUs of this machine"),
+        ("table", ("--seconds", "nan"), "--seconds is nan;"),
+        ("table", ("--iterations", "0"), "--iterations is 0;"),
+        ("table", ("--iterations", "1", "--downscale", "0"), "--downscale is 0;"),
+        ("table", ("--iterations", "1", "--max-anchors", "0"), "--max-anchors is 0;"),
+        ("table", ("--iterations", "1", "--sh-degree", "4"), "--sh-degree is 4;"),
+        ("poses", ("--frames", "2"), "--frames is 2; give 3 or more."),
     ],
 )
 def test_a_command_names_the_option(tmp_path, capsys, command, more, said):
@@ -73,6 +84,48 @@ def test_a_command_names_the_option(tmp_path, capsys, command, more, said):
 def test_blocks_are_refused_before_the_coarse_run(tmp_path, capsys, more, said):
     words = ("train", tmp_path, "--out", tmp_path / "a.blocks", "--blocks", "2", *more)
     assert refused(capsys, *words).startswith(f"shapeshift train: {said}")
+
+
+@pytest.mark.parametrize("command", ["train", "fit", "table", "splats", "separate", "blocks"])
+@pytest.mark.parametrize("memory", ["0", "-1", "nan", "inf", "1000001"])
+def test_no_training_has_such_memory(tmp_path, capsys, command, memory):
+    """Before anything is read: the folder holds no capture, which is not said."""
+    more = {"table": ["--iterations", "1"], "splats": ["--model", "splats"],
+            "separate": ["--separate"], "blocks": ["--blocks", "2"]}.get(command, [])  # fmt: skip
+    typed = command if command in ("fit", "table") else "train"
+    out = tmp_path / {"blocks": "a.blocks"}.get(command, "a" if more else "a.shift")
+    said = refused(capsys, typed, tmp_path, "--out", out, "--memory", memory, *more)
+    assert said == (
+        f"shapeshift {typed}: --memory is {float(memory):.12g}, expected GB above 0, at most "
+        "1,000,000; leave it out for what is usual."
+    )
+
+
+@pytest.mark.parametrize("memory", ["1e-9", "1000000"])
+def test_the_least_and_the_most_memory_are_taken(tmp_path, capsys, monkeypatch, memory):
+    """What fails is the folder, which holds no capture."""
+    monkeypatch.setenv("SHAPESHIFT_MEMORY", "")  # the command sets it
+    words = ("train", tmp_path, "--out", tmp_path / "a.shift", "--memory", memory)
+    assert "neither photos nor poses" in refused(capsys, *words)
+
+
+def test_of_a_reader_0_is_what_is_usual(tmp_path, capsys):
+    (tmp_path / "a.ply").write_bytes(b"ply")
+    words = ("eval", tmp_path / "a.ply", tmp_path, "--memory")
+    assert "neither photos nor poses" in refused(capsys, *words, "0")
+    assert refused(capsys, *words, "-1").startswith("shapeshift eval: --memory is -1, expected GB")
+
+
+@pytest.mark.parametrize(
+    ("name", "most"), [("depth_share", 1000), ("normal_share", 1000), ("min_scale_px", 1000)]
+)
+def test_the_most_is_taken_and_what_is_next_is_not(name, most):
+    assert getattr(TrainSettings(**{name: most}), name) == most
+    with pytest.raises(ValueError, match=f"^{name} is .*, 0 to {most}[.]$"):
+        TrainSettings(**{name: np.nextafter(most, np.inf)})
+    if name != "min_scale_px":
+        with pytest.raises(ValueError, match=f"^{name} is .*, 0 to {most}[.]$"):
+            PlainSettings(**{name: np.nextafter(most, np.inf)})
 
 
 def test_a_sentence_keeps_what_is_no_setting():

@@ -17,7 +17,7 @@ from shapeshift.runtime_models.package.read_package import read_files, read_pack
 from shapeshift.runtime_models.package.write_package import package_files, write_package
 from shapeshift.runtime_models.read_scene import describe
 from shapeshift.runtime_models.rotation import product
-from tests.support.models import make_random_model, with_frames, without_control
+from tests.support.models import changed_arrays, make_random_model, with_frames, without_control
 
 EYE = np.array([0.3, -0.2, 2.0])
 
@@ -81,15 +81,6 @@ def test_a_package_without_frames_is_as_it_was():
     assert read_files(files.__getitem__, "here").frames is None
 
 
-def changed(files: dict[str, bytes], **arrays) -> dict[str, bytes]:
-    """The package with arrays of its npz replaced, or left out where None."""
-    with np.load(io.BytesIO(files[ANCHORS])) as archive:
-        there = dict(archive) | arrays
-    out = io.BytesIO()
-    np.savez(out, **{name: array for name, array in there.items() if array is not None})
-    return files | {ANCHORS: out.getvalue()}
-
-
 @pytest.mark.parametrize(
     ("arrays", "sentence"),
     [
@@ -106,12 +97,12 @@ def changed(files: dict[str, bytes], **arrays) -> dict[str, bytes]:
 def test_frames_that_cannot_be_are_refused(arrays, sentence):
     files = package_files(with_frames(make_random_model(10)), "float32")
     with pytest.raises(BadFile, match=sentence):
-        read_files(changed(files, **arrays).__getitem__, "here")
+        read_files(changed_arrays(files, **arrays).__getitem__, "here")
 
 
 def test_a_quaternion_of_no_length_turns_nothing():
     files = package_files(with_frames(make_random_model(10)), "float32")
-    files = changed(files, frame_rotations=np.zeros((10, 4), np.float32))
+    files = changed_arrays(files, frame_rotations=np.zeros((10, 4), np.float32))
     np.testing.assert_array_equal(
         read_files(files.__getitem__, "here").frames.wxyz, np.tile([1, 0, 0, 0], (10, 1))
     )

@@ -1,6 +1,5 @@
 """Light by direction that a package cannot have, and the sentences about it."""
 
-import io
 import json
 from dataclasses import replace
 
@@ -8,19 +7,10 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST
+from shapeshift.runtime_models.package.package_files import MANIFEST
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_package import package_files
-from tests.support.models import make_random_model, with_light
-
-
-def changed(files: dict[str, bytes], **arrays) -> dict[str, bytes]:
-    """The package with arrays of its npz replaced, or left out where None."""
-    with np.load(io.BytesIO(files[ANCHORS])) as archive:
-        there = dict(archive) | arrays
-    out = io.BytesIO()
-    np.savez(out, **{name: array for name, array in there.items() if array is not None})
-    return files | {ANCHORS: out.getvalue()}
+from tests.support.models import changed_arrays, make_random_model, with_light
 
 
 @pytest.mark.parametrize(
@@ -41,20 +31,20 @@ def changed(files: dict[str, bytes], **arrays) -> dict[str, bytes]:
 def test_light_that_cannot_be_is_refused(arrays, sentence):
     files = package_files(with_light(make_random_model(10)), "float32")
     with pytest.raises(BadFile, match=sentence):
-        read_files(changed(files, **arrays).__getitem__, "here")
+        read_files(changed_arrays(files, **arrays).__getitem__, "here")
 
 
 @pytest.mark.parametrize("width", [24, 25])
 def test_light_of_three_channels_is_none_of_one(width):
     files = package_files(with_light(make_random_model(10), channels=1), "float32")
-    files = changed(files, light=np.zeros((10, width), np.float32))
+    files = changed_arrays(files, light=np.zeros((10, width), np.float32))
     with pytest.raises(BadFile, match=r"expected \(A, 8\)"):
         read_files(files.__getitem__, "here")
 
 
 def test_the_largest_light_is_read():
     files = package_files(with_light(make_random_model(10)), "float32")
-    files = changed(files, light=np.full((10, 24), 1e4, np.float32))
+    files = changed_arrays(files, light=np.full((10, 24), 1e4, np.float32))
     assert (read_files(files.__getitem__, "here").light == 1e4).all()
 
 

@@ -9,6 +9,7 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.rasterizer.reference import finite_differences, render_reference
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.calibration.calibrate import (
     PYRAMID,
@@ -16,6 +17,7 @@ from shapeshift.training.calibration.calibrate import (
     descend,
     factors_of,
     reference_of,
+    still_warning,
 )
 from shapeshift.training.calibration.extrinsics import (
     moved_by,
@@ -31,6 +33,7 @@ from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.synthetic.strangers import make_stranger
 
 RNG = np.random.default_rng
 TWICE = f'{{"RGB": {(2 * np.eye(4)).ravel().tolist()}}}'
@@ -243,3 +246,17 @@ def test_both_modalities_are_read_with_pixels_of_one_angle(balls):
     )
     assert factors_of(replace(balls, photos=larger), "Thermal", "RGB", 1) == (1, 6)
     assert factors_of(replace(balls, photos=larger), "RGB", "Thermal", 1) == (2, 1)
+
+
+@pytest.mark.parametrize("kind", ["turntable", "cut_out"])
+def test_what_stands_still_behind_a_calibrated_camera_is_said(tmp_path, kind):
+    """Not where masks leave it out, nor where nothing does."""
+    make_stranger(tmp_path, kind, 1, (80, 60), 24)
+    said = still_warning(read_capture(tmp_path), TrainSettings(), "RGB")
+    assert bool(said) == (kind == "turntable")
+    if said:
+        assert said.startswith("RGB: ") and "--calibrate does not leave that out" in said
+
+
+def test_of_a_room_nothing_is_said(balls):
+    assert still_warning(balls, TrainSettings(), "Thermal") == ""

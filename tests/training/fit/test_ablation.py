@@ -118,9 +118,19 @@ def test_settings_without_each_part():
     assert BY_NAME["anchors' own base colours"].without(more, STOPS).anchor_attributes == (
         "frame,light"
     )
+    grey = BY_NAME["light of red, green and blue each"].without(settings, STOPS)
+    assert grey.anchor_attributes == "frame,color,gray_light"
+    layout = grey.layout(2)
+    assert layout.light_channels == 1 and layout.own_widths["light"] == 8
+    assert BY_NAME["light of red, green and blue each"].without(grey, STOPS) is None
+    without = BY_NAME["anchors' own light by direction"].without(grey, STOPS)
+    assert without.anchor_attributes == "frame,color"
+    both = TrainSettings(anchor_attributes="light,gray_light").layout(2)
+    assert both.light_channels == 3 and both.own == ("light",)
     for none in ({}, {"view_dependent": False, "anchor_attributes": "frame,light"}):
         usual = TrainSettings(**none)  # blind colours have no light, so nothing is taken away
         assert BY_NAME["anchors' own light by direction"].without(usual, STOPS) is None
+        assert BY_NAME["light of red, green and blue each"].without(usual, STOPS) is None
 
 
 def test_parts_that_are_not_there_are_not_tried():

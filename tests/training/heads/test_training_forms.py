@@ -1,10 +1,14 @@
 """The GPU forms of a whole training step, run on a CPU, beside the CPU forms."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from shapeshift.runtime_models.package.package_files import MANIFEST
+from shapeshift.runtime_models.package.read_package import read_files
+from shapeshift.runtime_models.package.write_package import package_files
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
 from shapeshift.training.heads.networks import (
@@ -143,3 +147,32 @@ def test_growing_works_in_the_gpu_forms(as_gpu, balls):
     losses = [now.loss for now in trainer.steps() if now.loss is not None]
     assert np.isfinite(losses).all() and losses[-1] < losses[0]
     assert trainer.anchors_count != first
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "version"), [("gray_light", 8, "shapeshift 3"), ("light", 24, "shapeshift 4")]
+)
+def test_light_of_one_or_three_channels_is_learned_kept_and_gone_on_with(
+    device, balls, name, width, version
+):
+    """The format of one channel is that of older packages."""
+    settings = replace(SETTINGS, anchor_attributes=f"frame,color,{name}", iterations=12)
+    whole = Trainer(device, balls, settings)
+    whole.exposures.one_exposure = True  # so few steps do not tell, and light would rest
+    for _ in whole.steps():
+        pass
+    model = whole.model()
+    assert model.light.shape == (whole.anchors_count, width) and model.light.any()
+    files = package_files(model, "float16")
+    assert json.loads(files[MANIFEST])["format"] == version
+    back = read_files(files.__getitem__, "here")
+    # A byte a number, on steps of a power of two: at most a 127th of the largest away.
+    np.testing.assert_allclose(back.light, model.light, atol=np.abs(model.light).max() / 127)
+    half = Trainer(device, balls, replace(settings, iterations=6))
+    for _ in half.steps():
+        pass
+    state, notes = half.checkpoint()
+    again = Trainer(device, balls, settings, (state, notes))
+    for _ in again.steps():
+        pass
+    assert again.model().light.shape == model.light.shape and again.iteration == 12
