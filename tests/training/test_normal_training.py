@@ -14,6 +14,7 @@ from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.normal_photo import load_normals
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of
+from shapeshift.training.first_anchors import point_sources
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.depth_loss import DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
@@ -186,20 +187,23 @@ def with_normals(capture: Capture, folder) -> Capture:
     return replace(capture, photos=tuple(photos))
 
 
-def test_normal_maps_bring_the_shape_nearer_where_photos_are_few(device, tmp_path):
-    """From a hull and three photos a modality: measured once, 0.034 against 0.063 with this seed,
-    0.032 against 0.063 with another.
+def test_normal_maps_bring_the_shape_nearer_where_photos_are_few(device, tmp_path, monkeypatch):
+    """From three depth photos a modality, at every pixel: measured once, 0.034 against 0.063 with
+    this seed, 0.032 against 0.063 with another.  From points two pixels apart, as a run takes them,
+    there is less to mend: 0.037 against 0.053.
     """
+    monkeypatch.setattr(point_sources, "one_a_cell", lambda points, edge: points)
     balls = with_normals(make_balls(tmp_path / "balls", 64, 3, 3, depth=True), tmp_path)
     mapped = load_normals(balls.photos[0])
     assert mapped[..., 3].mean() > 0.3 and (mapped[..., 2][mapped[..., 3] > 0] > -30).mean() > 0.9
-    hull = replace(balls, points=None, point_colors=None)
+    bare = replace(balls, points=None, point_colors=None)
     errors = []
     for share in (0.3, 0.0):
         settings = TrainSettings(
             iterations=120, max_anchors=400, grow=False, depth_share=0.0, normal_share=share
         )
-        trainer = Trainer(device, hull, settings)
+        trainer = Trainer(device, bare, settings)
+        assert trainer.origin == "depth photos"
         for _ in trainer.steps():
             pass
         errors.append(depth_error(trainer))
