@@ -1,10 +1,10 @@
 """Every number of a run that trains plain 3DGS splats: the yardstick of the anchor model."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from shapeshift.training.settings import WEIGHT, Background, Masks, check_numbers
 
-SHORT_RUN = 1000  # iterations
+SHORTEST_RUN, SHORT_RUN = 400, 1000  # iterations at most
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,12 @@ class PlainRates:
     decay: float  # what is left of every rate at the end of the run, exponentially
 
 
-# Short runs want faster rates than the 30,000 iterations of 3DGS, as the anchor model's do: twice
-# its opacities', 12 times its places', 16 times its scales' and 40 times its colours' were the best
-# of those tried on two scenes.
-SHORT = PlainRates(0.002, 0.08, 0.02, 0.1, 0.1, 0.005, decay=0.1)
-LONG = PlainRates(0.001, 0.04, 0.01, 0.05, 0.05, 0.0025, decay=0.03)
+# Short runs want faster rates than the 30,000 iterations of 3DGS, as the anchor model's do: 6 times
+# its places', 8 times its scales' and 20 times its colours'; the shortest twice that, which loses
+# 0.5 to 1.2 dB after 500 iterations and 1 to 2 after 800 (docs/bench/ideas.md).
+SHORTEST = PlainRates(0.002, 0.08, 0.02, 0.1, 0.1, 0.005, decay=0.1)
+SHORT = PlainRates(0.001, 0.04, 0.01, 0.05, 0.05, 0.0025, decay=0.1)
+LONG = replace(SHORT, decay=0.03)
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,8 @@ class PlainSettings:
 
     def rates(self, iterations: int) -> PlainRates:
         """The learning rates of a run of so many iterations."""
+        if iterations <= SHORTEST_RUN:
+            return SHORTEST
         return SHORT if iterations <= SHORT_RUN else LONG
 
     def as_dict(self) -> dict:
