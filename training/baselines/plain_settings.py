@@ -22,7 +22,7 @@ class PlainRates:
 
 # Short runs want faster rates than the 30,000 iterations of 3DGS, as the anchor model's do: 6 times
 # its places', 8 times its scales' and 20 times its colours'; the shortest twice that, which loses
-# 0.5 to 1.2 dB after 500 iterations and 1 to 2 after 800 (docs/bench/ideas.md).
+# 0.5 to 1.2 dB after 500 iterations and 0.4 to 2 after 800 (docs/bench/ideas.md).
 SHORTEST = PlainRates(0.002, 0.08, 0.02, 0.1, 0.1, 0.005, decay=0.1)
 SHORT = PlainRates(0.001, 0.04, 0.01, 0.05, 0.05, 0.0025, decay=0.1)
 LONG = replace(SHORT, decay=0.03)
