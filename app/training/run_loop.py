@@ -29,6 +29,8 @@ def calibrated(
     from shapeshift.training.calibration.calibrate import calibrate, still_warning
     from shapeshift.training.calibration.extrinsics import rig_json
 
+    if doubt := still_warning(capture, settings, modality):
+        say(doubt)  # before minutes of work, which end far away
     say(f"looking for the offset of the cameras of {modality} ...")
     with progress_bar() as bar:
         task = bar.add_task("compiling kernels", total=1.0)
@@ -42,8 +44,6 @@ def calibrated(
         "their stated poses, each in its own axes; its photos fit "
         f"{found.gain_db:.1f} dB better so.  Trained with that."
     )
-    if doubt := still_warning(capture, settings, modality):
-        say(doubt)
     return replace(settings, rig=rig_json(modality, found))
 
 

@@ -120,6 +120,8 @@ def still_warning(capture: Capture, settings: TrainSettings, modality: str) -> s
     of a third, it made the offset better once and worse once.  docs/training.md, "A turntable".
     """
     photos = capture.of(modality, "train")
+    if not photos:
+        return ""  # which calibrate refuses
     factor = max(settings.downscale or 1, -(-max(photos[0].view.size) // MOST_SIDE))
     share = still_share([read(p, factor, settings.masks) for p in chosen(photos, STILL_PHOTOS)])
     if not share:

@@ -260,3 +260,4 @@ def test_what_stands_still_behind_a_calibrated_camera_is_said(tmp_path, kind):
 
 def test_of_a_room_nothing_is_said(balls):
     assert still_warning(balls, TrainSettings(), "Thermal") == ""
+    assert still_warning(balls, TrainSettings(), "Sound") == "", "that calibrate refuses"
