@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.capture_files import in_code_page
 from shapeshift.scene.captures.colmap.text_lines import (
@@ -17,6 +19,7 @@ from shapeshift.scene.captures.colmap.text_lines import (
     numbers_of,
     rows_of_table,
 )
+from shapeshift.scene.pose import Pose
 
 MODELS = (
     "sparse/0",
@@ -95,6 +98,16 @@ class Posed:
     wxyz: tuple[float, ...]  # camera from world, OpenCV axes
     place: tuple[float, ...]  # (3,) of that transform
     lens: int  # of a ColmapCamera
+
+    @property
+    def length(self) -> float:
+        """Of its quaternion: any but 0 is a turn; tables are rounded, or were never divided."""
+        return math.hypot(*self.wxyz)
+
+    def camera_from_world(self) -> np.ndarray:
+        """(4, 4) of its quaternion divided by its length, which is neither 0 nor infinite."""
+        wxyz = np.array(self.wxyz) / max(map(abs, self.wxyz))  # 1e-320 has no square
+        return Pose(np.array(self.place), wxyz / np.linalg.norm(wxyz)).matrix()
 
 
 def find_model(folder: Path, tables: tuple[str, ...] = ("images",)) -> tuple[Path, str] | None:

@@ -28,6 +28,7 @@ from shapeshift.scene.captures.capture_rules import (
     with_counts,
 )
 from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
+from shapeshift.scene.captures.colmap.rig_frames import refused_poses
 from shapeshift.scene.captures.colmap_tables import find_model, read_tables
 from shapeshift.scene.captures.read_transforms import read_capture_json
 
@@ -73,7 +74,7 @@ def read_colmap(folder: Path) -> Capture:
     guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
-    doubts += other_lengths(posed)
+    doubts += other_lengths(posed) + refused_poses(model, ending, posed)
     return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
 
 
