@@ -20,6 +20,7 @@ class PosedFrames:
     where: str  # the file or folder that has the poses, for messages
     frames: list[dict]
     doubts: tuple[str, ...] = ()  # what a person should know, a sentence each
+    alone: bool = True  # no other captures have photos in the same folders
 
 
 def table_of(path: Path, *shapes: tuple[int, ...]) -> np.ndarray:
@@ -50,9 +51,3 @@ def photos_in(folder: Path) -> list[Path]:
     """Pictures of a folder, by number where their names are numbers, else by name."""
     found = [p for p in folder.iterdir() if p.suffix.lower() in {".jpg", ".jpeg", ".png"}]
     return sorted(found, key=lambda p: (int(p.stem) if p.stem.isdecimal() else -1, p.name))
-
-
-def left_out(count: int, of: int, example: str) -> tuple[str, ...]:
-    if not count:
-        return ()
-    return (f"{count} of {of} frames have no pose, for example {example}; they are left out.",)

@@ -53,5 +53,5 @@ def capture_from(posed: PosedFrames) -> Capture:
         raise BadFile(f"{posed.where}: no photo has a pose here; copy the whole folder")
     first = posed.frames[0]
     said = {key: first[key] for key in ("up", "ply_file_path") if key in first}
-    capture = capture_of(posed.folder, posed.where, said, posed.frames)
+    capture = capture_of(posed.folder, posed.where, said, posed.frames, alone=posed.alone)
     return replace(capture, doubts=capture.doubts + posed.doubts)
