@@ -21,7 +21,6 @@ from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    counts_from,
     spread_stops,
     stops_from,
     with_counts,
@@ -75,8 +74,8 @@ def read_colmap(folder: Path) -> Capture:
             (rescaled if fits(lens.size, made[0].file_size) else turned).append(str(path))
     points, colors, more = points_of(model, ending)
     table.used("points", 0 if points is None else len(points))
-    counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
-    photos = with_counts(listed_split(photos, folder, root, table), counts)
+    photos = listed_split(photos, folder, root, table)
+    photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
     guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
