@@ -7,6 +7,7 @@ and must bring to +Y what the program means by up, without a scale.
 """
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +71,9 @@ def ours_from_file(capture: Capture, shots: list[Shot]) -> tuple[np.ndarray, np.
     """The turn and shift (float64) that brings the file's cameras to those that were read."""
     by_name = {Path(photo.path).name: photo for photo in capture.photos}
     true = np.array([shot.centre for shot in shots])
-    read = np.array([by_name[s.name].view.world_from_eye.position for s in shots], np.float64)
+    read = np.array(
+        [by_name[Path(s.name).name].view.world_from_eye.position for s in shots], np.float64
+    )
     a, b = true - true.mean(axis=0), read - read.mean(axis=0)
     u, _, vt = np.linalg.svd(b.T @ a)
     turn = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
@@ -85,7 +88,7 @@ def compare(capture: Capture, shots: list[Shot], formula, up, points=POINTS, tol
     assert np.abs(turn @ np.asarray(up) - (0, 1, 0)).max() < 1e-6
     points = points + np.mean([s.centre for s in shots], axis=0) * (1, 1, 1)
     shown = 0
-    by_shot = {shot.name: shot for shot in shots}
+    by_shot = {Path(shot.name).name: shot for shot in shots}
     assert {Path(p.path).name for p in capture.photos} == by_shot.keys()
     for photo in capture.photos:
         wanted = formula(in_camera(by_shot[Path(photo.path).name], points))
@@ -295,6 +298,10 @@ def cases():
         lambda p: brown(p, 37, 37, 21, 14.5, (-0.2, 0.05, 0.01), 0.02, -0.01),
         (0, 0, 1),
     )
+    phone = [replace(s, name=f"imgl/{i:05d}.jpg") for i, s in enumerate(sfm)]
+    out["scaniverse"] = (
+        lambda d: write.scaniverse(d, phone, (18.5, 10.5, 7.25)), phone,
+        lambda p: brown(p, 37, 37, 21, 14.5), SFM_UP)  # fmt: skip
     return out
 
 
