@@ -21,7 +21,6 @@ from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    counts_from,
     split_every_8th,
     spread_stops,
     stops_from,
@@ -67,8 +66,8 @@ def read_colmap(folder: Path) -> Capture:
         if made[0].file_size != lens.size:
             (rescaled if fits(lens.size, made[0].file_size) else turned).append(str(path))
     points, colors, more = points_of(model / f"points3D{ending}")
-    counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
-    photos = with_counts(listed_split(photos, folder, root), counts)
+    photos = listed_split(photos, folder, root)
+    photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
     guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
