@@ -1,6 +1,7 @@
 """What readers of scans and data sets hand on: frames in the words of transforms.json."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,11 @@ class PosedFrames:
     where: str  # the file or folder that has the poses, for messages
     frames: list[dict]
     doubts: tuple[str, ...] = ()  # what a person should know, a sentence each
+    left: Mapping[str, Sequence[str]] = field(default_factory=dict)  # why -> photos; doubts say it
     alone: bool = True  # no other captures have photos in the same folders
+    points: np.ndarray | None = None  # (P, 3) float64, the file's world
+    colors: np.ndarray | None = None  # (P, 3) 0..1
+    program: str = ""  # whose file it is, where not a data set's
 
 
 def table_of(path: Path, *shapes: tuple[int, ...]) -> np.ndarray:
