@@ -4,6 +4,7 @@ import os
 from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +74,7 @@ class Shot:
 
 def read_transforms(*files: Path) -> Capture:
     """A capture from one JSON file, or from the train/val/test files of a Blender data set."""
-    table = FileTable()
+    table = FileTable(files[0].parent)
     return capture_of(files[0].parent, str(files[0]), *gather(files, table), table)
 
 
@@ -90,11 +91,12 @@ def capture_of(
     where: of the file, for messages; table: what was left out so far; alone: files beside those
     that frames name are worth a word.  Raises BadFile.
     """
-    table = table or FileTable()
+    table = table or FileTable(folder)
     stops = stops_of(data, entries, where)
     named = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
-    shots = [shot for shot in named if os.path.isfile(shot.path)]
-    missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
+    there = [os.path.isfile(shot.path) for shot in named]
+    shots = list(compress(named, there))
+    missing = [str(shot.path) for shot, found in zip(named, there, strict=True) if not found]
     refuse_all_missing(missing, len(named), where)
     for stop in stops:
         if not any(s.modality == stop.name for s in shots):
@@ -229,7 +231,7 @@ def gather(files: tuple[Path, ...], table: FileTable | None = None) -> tuple[dic
 
     table: gets what their lists leave out.
     """
-    table = table or FileTable()
+    table = table or FileTable(files[0].parent)
     everything: dict = {}
     entries: list[Mapping] = []
     for file in files:

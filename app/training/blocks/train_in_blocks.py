@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shapeshift.app.capture_facts import print_files
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.errors import UsageError, as_typed
 from shapeshift.app.opening import open_capture
@@ -53,6 +54,7 @@ def train_blocks(
     check_writable(options.out)
     refuse_foreign_folder(options.out)
     capture = open_capture(options.capture, options.memory)
+    print_files(capture.files)
     if wanted.count is None and wanted.grid is None:
         refuse_one(options, capture, said)
     work = work_folder(options.out)
