@@ -11,6 +11,7 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import Fields, rows_of, shown
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
+from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.photo_view import subject_distance
 from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
@@ -239,7 +240,7 @@ def spread_stops(names: Iterable[str]) -> tuple[Stop, ...]:
 
 
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:
-    """Thermal stops of grey photos get a palette; false-colour photos keep their own colours."""
+    """Stops of values get a palette where their photos are grey; false colours stay as they are."""
 
     def grey(name: str) -> bool:
         photo = next(p for p in photos if p.modality == name)
@@ -247,7 +248,8 @@ def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[St
         return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
     return tuple(
-        replace(s, palette="ironbow") if s.kind == "thermal" and grey(s.name) else s for s in stops
+        replace(s, palette=USUAL_PALETTE[s.kind]) if s.is_measured and grey(s.name) else s
+        for s in stops
     )
 
 
@@ -265,17 +267,17 @@ def stop_from(entry: Fields, where: str) -> Stop:
     name = entry.text("name")
     entry.where = f"{where}: modality {shown(name)}"
     date = date_in_entry(entry)
-    return Stop(
-        name,
-        entry.number("x", wanted="0 to 1", low=0, high=1)
-        if entry.has("x") or not date
-        else NO_PLACE,
-        entry.line("kind", "rgb", known=STOP_KINDS) if entry.has("kind") else "rgb",
-        entry.text("palette", ""),
-        entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None,
-        entry.text("unit", ""),
-        date,
-    )
+    x, kind = NO_PLACE, "rgb"
+    if entry.has("x") or not date:
+        x = entry.number("x", wanted="0 to 1", low=0, high=1)
+    if entry.has("kind"):
+        kind = entry.line("kind", "rgb", known=STOP_KINDS)
+    ends = entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None
+    palette, unit = entry.text("palette", ""), entry.text("unit", "")
+    try:
+        return Stop(name, x, kind, palette, ends, unit, date)
+    except ValueError as error:
+        raise BadFile(f"{entry.where}: {error}") from None
 
 
 def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:

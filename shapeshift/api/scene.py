@@ -56,7 +56,7 @@ class Scene(InspectedScene):
         scales (N, 3) metres of one sigma, wxyz (N, 4) unit, opacity (N,) 0..1, sh (N, M, 3)
         spherical harmonics (colour = 0.5 + sum, display sRGB).
 
-        Objects stand where the scene has them.  palette: thermal stops in their false colours.
+        Objects stand where the scene has them.  palette: value stops in their false colours.
         eye (3,) metres: for scenes whose shape depends on it (Scaffold-GS).  Raises BadFile,
         UsageError.
 
