@@ -12,7 +12,7 @@ from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
-from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
+from shapeshift.scene.cameras.read_colmap_cameras import camera_pose, other_lengths
 from shapeshift.scene.capture_files import SMALLER, find_file
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
 from shapeshift.scene.capture_photos import doubts_of, fits, posed_photos, refuse_all_missing
@@ -27,7 +27,7 @@ from shapeshift.scene.captures.capture_rules import (
     stops_from,
     with_counts,
 )
-from shapeshift.scene.captures.colmap_points import read_colmap_points
+from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
 from shapeshift.scene.captures.colmap_tables import find_model, read_tables
 from shapeshift.scene.captures.read_transforms import read_capture_json
 
@@ -40,10 +40,10 @@ def read_colmap(folder: Path) -> Capture:
     if (found := find_model(folder)) is None:
         raise BadFile(f"{folder} holds no COLMAP model; images.bin or images.txt is wanted.")
     model, ending = found
-    lenses, images = read_tables(model, ending)
-    posed = sorted(images, key=lambda image: image.name)
     base = folder / "dense" if model == folder / "dense" / "sparse" else folder
     root = photos_folder(base)
+    lenses, images = read_tables(model, ending, root)
+    posed = sorted(images, key=lambda image: image.name)
     said = read_capture_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
     stops, modality_of = modalities(said, [i.name for i in posed], folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
@@ -73,6 +73,7 @@ def read_colmap(folder: Path) -> Capture:
     guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
+    doubts += other_lengths(posed)
     return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
 
 
