@@ -163,7 +163,8 @@ def with_values(model: AnchorModel, name: str, share: np.ndarray) -> AnchorModel
     )
     networks["color"] = widened(color, units, model, shut, None)
     if not known.all():
-        opacity = NewUnits(-read, np.zeros(k), -GONE * np.eye(k))
+        # From halfway to UNKNOWN on: what is stored of a value may lie a rounding below 0.
+        opacity = NewUnits(-read, np.full(k, UNKNOWN / 2), -2 * GONE * np.eye(k))
         networks["opacity"] = widened(networks["opacity"], opacity, model, shut, None)
     return replace(model, networks=networks)
 

@@ -13,6 +13,7 @@ from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.runtime_models.stop_names import guess_kind
+from shapeshift.runtime_models.stops.stop_formula import check_formulas, read_formula
 from shapeshift.scene.cameras.photo_view import subject_distance
 from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
 from shapeshift.scene.captures.dated_stops import (
@@ -81,7 +82,13 @@ class CaptureWorld:
         doubts: tuple[str, ...] = (),
     ) -> Capture:
         """The finished capture; `guessed` = nobody said what the modalities are."""
+        formulas = tuple(stop for stop in stops if stop.formula)
+        stops = tuple(stop for stop in stops if not stop.formula)
         stops, photos, more = with_own_ranges(stops, photos)
+        try:
+            check_formulas((*stops, *formulas))
+        except ValueError as error:
+            raise BadFile(f"{folder}: {error}") from None
         notes = {"up_in_file": self.up} | (notes or {})
         if self.left_handed:
             notes[LEFT_HANDED] = True
@@ -111,6 +118,7 @@ class CaptureWorld:
             background,
             notes,
             doubts + more,
+            formulas,
         )
 
 
@@ -260,7 +268,18 @@ def stops_from(listed: object, where: str) -> list[Stop]:
     stops = [stop_from(row, where) for row in rows_of(listed, f"{where}: modality", 1)]
     if len({stop.name for stop in stops}) < len(stops):
         raise BadFile(f"{where}: two modalities have the same name; rename one")
+    for stop in stops:  # what it is of is known when the photos are
+        refuse_formula(stop, where)
     return list(placed_by_date(stops, where))
+
+
+def refuse_formula(stop: Stop, where: str) -> None:
+    """Raises BadFile for a formula that is none, before any photo is looked for."""
+    try:
+        if stop.formula:
+            read_formula(stop.formula)
+    except ValueError as error:
+        raise BadFile(f"{where}: modality {shown(stop.name)}: {error}") from None
 
 
 def stop_from(entry: Fields, where: str) -> Stop:
@@ -273,9 +292,9 @@ def stop_from(entry: Fields, where: str) -> Stop:
     if entry.has("kind"):
         kind = entry.line("kind", "rgb", known=STOP_KINDS)
     ends = entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None
-    palette, unit = entry.text("palette", ""), entry.text("unit", "")
+    palette, unit, formula = (entry.text(key, "") for key in ("palette", "unit", "formula"))
     try:
-        return Stop(name, x, kind, palette, ends, unit, date)
+        return Stop(name, x, kind, palette, ends, unit, date, formula)
     except ValueError as error:
         raise BadFile(f"{entry.where}: {error}") from None
 

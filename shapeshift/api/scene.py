@@ -322,6 +322,31 @@ class Scene(InspectedScene):
         )  # fmt: skip
         return Scene.from_model(add_style(self, options, weights, paint, pace, progress))
 
+    def add_formula(
+        self,
+        name: str,
+        formula: str,
+        *,
+        value_range: tuple[float, float] | None = None,
+        unit: str = "",
+        palette: str = "",
+        after: str = "",
+        pace: bool = True,
+    ) -> "Scene":
+        """The scene with one stop more, whose values are a formula of other stops' values, such as
+        "a / (b + 1)" (docs/thermal.md).  value_range: at the palette's ends; None: what the scene
+        has.  after: the stop that it comes after.  Raises BadFile, UsageError.
+
+            ndvi = scene.add_formula("NDVI", "(nir - red) / (nir + red)")
+        """
+        from shapeshift.api.style import add_formula
+        from shapeshift.app.training.style_options import Options
+
+        where = self.path or Path("scene")
+        asked = {"range": value_range, "unit": unit, "palette": palette, "after": after}
+        options = Options(scene=where, out=Path(), name=name, formula=formula, pace=pace, **asked)
+        return Scene.from_model(add_formula(self, options))
+
     def without_stop(self, name: str) -> "Scene":
         """The scene without one of its stops, and without what that one alone had.
 
