@@ -80,7 +80,7 @@ def _kind(photos: list[Photo]) -> str:
 
 def refuse_colors(photo: Photo) -> None:
     """BadFile where a photo holds colours: a value is one number a pixel."""
-    image, _ = decoded(photo.path, photo.counts)
+    image = decoded(photo.path, photo.counts).image
     pixels = np.asarray(image.convert("RGB"))
     if np.ptp(pixels, axis=2).max(initial=0) > GREY_STEPS:
         raise BadFile(
