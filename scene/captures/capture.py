@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
+from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
 from shapeshift.scene.pose import View
 
 LEFT_HANDED = "left_handed"  # in the notes: the file's world is, and its x was turned round
@@ -29,6 +30,10 @@ class Photo:
     lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
     mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
     float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
+    no_value: NoValue = SAID_NOTHING  # which of its numbers are none, beside what its file says
+    may_lack_values: bool = (
+        False  # whether a pixel may have none: its header or its capture says so
+    )
 
     @property
     def file_size(self) -> tuple[int, int]:
@@ -45,6 +50,18 @@ class Photo:
 
 
 @dataclass(frozen=True)
+class FoundFiles:
+    """One row of what a capture found: files of one kind that met one fate."""
+
+    kind: str  # photos, masks, models ...
+    found: int  # that are there
+    used: int  # all of them, or none
+    left_out: int  # all that are there, or that should be
+    why: str = ""
+    example: str = ""  # the first that is left out
+
+
+@dataclass(frozen=True)
 class Capture:
     folder: Path
     stops: tuple[Stop, ...]
@@ -54,6 +71,8 @@ class Capture:
     background: tuple[float, float, float] | None = None  # what lies behind; None = black
     notes: dict = field(default_factory=dict)
     doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
+    formulas: tuple[Stop, ...] = ()  # stops of values by formula of its stops', without photos
+    files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]
