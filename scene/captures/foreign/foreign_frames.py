@@ -49,8 +49,9 @@ class PhotoIndex:
         """
         if "/" in name or "\\" in name:
             found = find_file(self.folder, name, ("",))
-            if os.path.isfile(found.path) and not found.elsewhere:
-                return [name]
+            inside = not os.path.isabs(name) and ".." not in parts_of(name)
+            if inside and os.path.isfile(found.path) and not found.elsewhere:
+                return [found.path.relative_to(self.folder).as_posix()]
         parts = parts_of(name)
         last = folded(parts[-1])
         alike = self.by_name.get(last) or self.by_stem.get(last)
@@ -158,10 +159,22 @@ class Gathered:
             *said,
             *self.doubts,
         )
-        folder, where = self.photos.folder, str(self.path)
+        folder, where = self.photos_where_they_were(), str(self.path)
         return PosedFrames(
             folder, where, self.frames, doubts, self.points, self.colors, self.program
         )
+
+    def photos_where_they_were(self) -> Path:
+        """The folder of the photos; where none lies with the file, as in Meshroom's cache, that of
+        the photos which it names by whole paths of this machine."""
+        names = [str(frame["file_path"]) for frame in self.frames]
+        below = any(os.path.isfile(self.photos.folder / n) for n in names if not os.path.isabs(n))
+        if below or not all(map(os.path.isabs, names)) or not any(map(os.path.isfile, names)):
+            return self.photos.folder
+        folder = Path(os.path.commonpath([os.path.dirname(name) for name in names]))
+        for frame in self.frames:
+            frame["file_path"] = Path(frame["file_path"]).relative_to(folder).as_posix()
+        return folder
 
 
 def lens_words(lens: ColmapCamera | None) -> dict:
