@@ -161,8 +161,9 @@ class Gathered:
         )
         folder, where = self.photos_where_they_were(), str(self.path)
         return PosedFrames(
-            folder, where, self.frames, doubts, self.points, self.colors, self.program
-        )
+            folder, where, self.frames, doubts, self.left,
+            points=self.points, colors=self.colors, program=self.program,
+        )  # fmt: skip
 
     def photos_where_they_were(self) -> Path:
         """The folder of the photos; where none lies with the file, as in Meshroom's cache, that of
