@@ -114,7 +114,8 @@ class Gathered:
 
     def leave(self, name: str, why: str) -> None:
         self.named += 1
-        self.left.setdefault(why, []).append(name)
+        found = self.photos.find(name)
+        self.left.setdefault(why, []).append(found[0] if len(found) == 1 else name)
 
     def add(
         self,
@@ -169,12 +170,15 @@ class Gathered:
         """The folder of the photos; where none lies with the file, as in Meshroom's cache, that of
         the photos which it names by whole paths of this machine."""
         names = [str(frame["file_path"]) for frame in self.frames]
-        below = any(os.path.isfile(self.photos.folder / n) for n in names if not os.path.isabs(n))
-        if below or not all(map(os.path.isabs, names)) or not any(map(os.path.isfile, names)):
-            return self.photos.folder
-        folder = Path(os.path.commonpath([os.path.dirname(name) for name in names]))
-        for frame in self.frames:
-            frame["file_path"] = Path(frame["file_path"]).relative_to(folder).as_posix()
+        folder = self.photos.folder
+        whole = [os.path.isabs(name) for name in names]
+        if all(whole) and any(map(os.path.isfile, names)):
+            folder = Path(os.path.commonpath([os.path.dirname(name) for name in names]))
+        for frame, name, absolute in zip(self.frames, names, whole, strict=True):
+            if absolute and Path(name).is_relative_to(folder):
+                frame["file_path"] = Path(name).relative_to(folder).as_posix()
+            elif absolute:  # one of them may be there: it is of another place
+                frame["file_path"] = "/".join(parts_of(name))
         return folder
 
 
