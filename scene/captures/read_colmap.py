@@ -105,6 +105,8 @@ def modalities(
     stops = stops_from(entries, where)
     of: dict = {}
     for stop, entry in zip(stops, entries, strict=True):
+        if stop.formula:
+            continue
         prefix = Fields(entry, where).text("folder", stop.name).rstrip("/") + "/"
         mine = [n for n in names if n.startswith(prefix)]
         if not mine:

@@ -99,7 +99,7 @@ def capture_of(
     missing = [str(shot.path) for shot, found in zip(named, there, strict=True) if not found]
     refuse_all_missing(missing, len(named), where)
     for stop in stops:
-        if not any(s.modality == stop.name for s in shots):
+        if not stop.formula and not any(s.modality == stop.name for s in shots):
             raise BadFile(
                 f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
             )
@@ -332,7 +332,7 @@ def shots_of(
     matrix = rigid(entry[key], where, may_mirror=True)
     if not opencv_axes(entry):
         matrix = matrix @ OPENCV_FROM_EYE
-    names = [s.name for s in stops]
+    names = [s.name for s in stops if not s.formula]
     day = "" if "modality" in entry else day_of_frame(entry, where)
     if "modality" in entry or day or len(names) == 1:
         modality = fields.text("modality", day or names[0])
