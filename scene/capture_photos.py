@@ -64,19 +64,20 @@ def posed_photo(
 
     world_from_camera: (4, 4) OpenCV axes, our world; lens: of the size that the capture states.
     """
-    size = image_size(path, None)
+    with open_image(path) as image:
+        size, mode = image.size, image.mode
     if not fits(lens.size, size):
         world_from_camera, lens = as_it_lies(path, world_from_camera, lens)
     lens = of_size(lens, size, path)
     try:
         if is_straight(lens, where):
             view = View.from_pinhole(world_from_camera, lens.focal, lens.centre, lens.size)
-            return Photo(view, path, modality)
+            return Photo(view, path, modality, mode=mode)
         straight = pinhole_of(lens)
         view = View.from_pinhole(world_from_camera, straight.focal, straight.centre, straight.size)
     except ValueError as error:
         raise BadFile(f"{where}: {error}") from None
-    return Photo(view, path, modality, lens=lens)
+    return Photo(view, path, modality, lens=lens, mode=mode)
 
 
 def as_it_lies(

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
+from shapeshift.runtime_models.files.json_fields import Fields, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_files import find_file
@@ -27,16 +27,18 @@ from shapeshift.scene.captures.capture_rules import (
     counts_from,
     rigid,
     split_every_8th,
-    spread_stops,
-    stops_from,
     with_counts,
 )
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
-from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import in_millimetres, refuse_other_units, with_depth
 from shapeshift.scene.captures.lenses.frame_lens import lens_of
 from shapeshift.scene.captures.lenses.panorama import is_panorama, stereo_sentences
+from shapeshift.scene.captures.modalities.frame_modalities import (
+    read_capture_json,
+    stops_of_frames,
+)
+from shapeshift.scene.captures.modalities.two_sorts import opened_photo, refuse_two_sorts
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
 from shapeshift.scene.captures.read_points import read_points
@@ -46,7 +48,6 @@ POSES = ("transform_matrix", "c2w_opencv", "c2w")
 SPLITS = {"train": "train", "test": "test", "val": "test"}
 # nerfstudio's lists of the photos of a split; what is in none of them is not used.
 LISTS = {"train_filenames": "train", "val_filenames": "test", "test_filenames": "test"}
-MOST_BYTES = 1 << 30  # of JSON
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,12 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
 
     where: of the file, for messages.  Raises BadFile.
     """
-    stops = stops_of(data, entries, where)
-    named = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
+    stops, usual, told = stops_of_frames(folder, data, entries, where)
+    named = [
+        shot
+        for number, (entry, modality) in enumerate(zip(entries, usual, strict=True))
+        for shot in shots_of(entry, number, modality, stops, folder, where)
+    ]
     shots = [shot for shot in named if os.path.isfile(shot.path)]
     missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
     refuse_all_missing(missing, len(named), where)
@@ -97,11 +102,12 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         where,
     )
     lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
-    photos, no_depth, no_normals = [], [], []
+    photos, opened, no_depth, no_normals = [], [], [], []
     rescaled: list[str] = []
     turned: list[str] = []
     for shot, lens in zip(shots, lenses, strict=True):
         photos += (made := photos_of(shot, lens, world, folder))
+        opened.append(opened_photo(shot.path.relative_to(shot.folder).as_posix(), made[0]))
         if made[0].file_size != lens.size:
             other = rescaled if fits(lens.size, made[0].file_size) else turned
             other.append(str(shot.path))
@@ -113,11 +119,13 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
     doubts += doubts_of_entries(shots, entries)
     photos, unsure = meant_by_masks(photos)
     doubts += unsure
-    photos = with_counts(photos, counts_from(data.get("modalities"), where))
+    photos = with_counts(photos, counts_from(data.get("modalities") or told, where))
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors, more = points_of(folder, data, where)
-    described = any(isinstance(m, dict) for m in data.get("modalities") or ())
+    described = any(isinstance(m, dict) for m in data.get("modalities") or told)
+    if not (described or data.get("modalities") or any("modality" in entry for entry in entries)):
+        refuse_two_sorts(opened, stops, folder)
     background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
     capture = world.capture(
         folder,
@@ -218,46 +226,12 @@ def plain_name(name: object) -> str:
     return PurePosixPath(name.replace("\\", "/")).as_posix() if isinstance(name, str) else ""
 
 
-def read_capture_json(file: Path) -> dict:
-    """The object of a file; a version of our own form that is not known is refused."""
-    data = read_json(file, most_bytes=MOST_BYTES)
-    if not isinstance(data, dict):
-        raise BadFile(f"{file} holds {shown(data)}; an object with 'frames' is wanted")
-    if data.get("format", "shapeshift-capture") == "shapeshift-capture":
-        version = data.get("version", 1)
-        if version != 1:
-            raise BadFile(
-                f"{file}: version {shown(version)} of the capture form; this program reads 1"
-            )
-    return data
-
-
-def stops_of(data: dict, entries: Sequence[Mapping], where: str) -> tuple[Stop, ...]:
-    listed = data.get("modalities")
-    if not listed:
-        names = [
-            Fields(entry, f"{where}: frame {i}").text("modality", usual_modality(entry, where, i))
-            for i, entry in enumerate(entries)
-        ]
-        if "" in names:
-            raise BadFile(f"{where}: frame {names.index('')}: 'modality' is empty; give it a name")
-        return spread_stops(dict.fromkeys(names))
-    if isinstance(listed, list) and all(isinstance(name, str) and name for name in listed):
-        if len(set(listed)) < len(listed):
-            raise BadFile(f"{where}: two modalities have the same name; rename one")
-        return spread_stops(listed)
-    return tuple(sorted(stops_from(listed, where), key=lambda stop: stop.x))
-
-
-def usual_modality(entry: Mapping, where: str, number: int) -> str:
-    """Of a frame that names none."""
-    return day_of_frame(entry, f"{where}: frame {number}") or "RGB"
-
-
 def shots_of(
-    entry: Mapping, number: int, data: dict, stops: tuple[Stop, ...], folder: Path, where: str
+    entry: Mapping, number: int, usual: str, stops: tuple[Stop, ...], folder: Path, where: str
 ) -> list[Shot]:
-    """The photos of one frame: one, or one a modality where the frame names none of several."""
+    """The photos of one frame: one, or one a modality where neither the frame names one of several
+    nor `usual`, what is known of it otherwise.
+    """
     where = f"{where}: frame {number}"
     fields = Fields(entry, where)
     file = fields.text("file_path", "") or fields.text("file", "")
@@ -271,9 +245,8 @@ def shots_of(
     if not opencv_axes(entry):
         matrix = matrix @ OPENCV_FROM_EYE
     names = [s.name for s in stops]
-    day = "" if "modality" in entry else day_of_frame(entry, where)
-    if "modality" in entry or day or len(names) == 1:
-        modality = fields.text("modality", day or names[0])
+    if "modality" in entry or usual or len(names) == 1:
+        modality = fields.text("modality", usual or names[0])
         if modality not in names:
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
