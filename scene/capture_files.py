@@ -10,6 +10,10 @@ from typing import NamedTuple
 
 ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG", ".webp", ".tif", ".tiff")
 SMALLER = (2, 4, 8)  # images_2, images_4 ... hold the photos of images with smaller sides
+# Of names that are no UTF-8, the likeliest first: Windows of the West, of Central Europe and in
+# Russian, Japanese, Chinese, Korean; DOS, which zip programs still write.
+CODE_PAGES = ("cp1252", "cp1250", "cp1251", "cp932", "gbk", "big5", "cp949", "cp437", "cp850")
+NAMES_TRIED = 200  # in each of them
 DRIVE = re.compile(r"^[A-Za-z]:[\\/]|^\\\\")  # of an absolute path of Windows
 
 
@@ -88,3 +92,33 @@ def with_ending(folder: Path, name: str, endings: Sequence[str]) -> Path | None:
         if os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
             return Path(path)
     return None
+
+
+def in_code_page(names: Sequence[str], folder: Path | None) -> list[str]:
+    """The names with those that are no UTF-8 (they hold surrogate escapes) read in the code page in
+    which most of them are files in `folder`; where none is, in that of western Windows.
+    """
+    raw = {n: n.encode("utf-8", "surrogateescape") for n in names if not is_text(n)}
+    if not raw:
+        return list(names)
+    tried = list(raw.values())[:NAMES_TRIED]
+    best, most = CODE_PAGES[0], 0
+    # In UTF-8 with its escapes: a file whose name has the same bytes, as Linux allows.
+    for page in ("utf-8", *CODE_PAGES) if folder is not None else ():
+        there = 0
+        for name in tried:
+            try:
+                text = name.decode(page, "surrogateescape" if page == "utf-8" else "strict")
+            except UnicodeDecodeError:
+                continue
+            there += os.path.isfile(find_file(folder, text, ("",)).path)
+        if there > most:
+            best, most = page, there
+    errors = "surrogateescape" if best == "utf-8" else "replace"
+    read = {name: data.decode(best, errors) for name, data in raw.items()}
+    return [read.get(name, name) for name in names]
+
+
+def is_text(name: str) -> bool:
+    """Whether it has no halves of surrogate pairs."""
+    return name.isascii() or not any("\ud800" <= letter <= "\udfff" for letter in name)

@@ -18,7 +18,7 @@ from shapeshift.decomposition.poses.write_posed import write_posed
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.colmap_child import Progress, run_child
+from shapeshift.scene.captures.colmap.colmap_child import Progress, run_child
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_colmap import find_mask
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
+from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
 from shapeshift.scene.pose import View
 
 LEFT_HANDED = "left_handed"  # in the notes: the file's world is, and its x was turned round
@@ -30,6 +31,10 @@ class Photo:
     mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
     float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
     mode: str = ""  # what its pixels are, as PIL names it ("RGB", "L", "I;16"); "": not looked at
+    no_value: NoValue = SAID_NOTHING  # which of its numbers are none, beside what its file says
+    may_lack_values: bool = (
+        False  # whether a pixel may have none: its header or its capture says so
+    )
 
     @property
     def file_size(self) -> tuple[int, int]:

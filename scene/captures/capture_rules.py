@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, rows_of, shown
+from shapeshift.runtime_models.files.json_fields import Fields, is_number, rows_of, shown
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_names import guess_kind
@@ -21,6 +21,8 @@ from shapeshift.scene.captures.dated_stops import (
     placed_by_date,
 )
 from shapeshift.scene.captures.photo import decoded, over_black
+from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
+from shapeshift.scene.captures.radiometric.number_photos import JPEGS
 from shapeshift.scene.captures.value_ranges import with_own_ranges
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
@@ -241,7 +243,7 @@ def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[St
 
     def grey(name: str) -> bool:
         photo = next(p for p in photos if p.modality == name)
-        image, _ = decoded(photo.path, photo.counts)
+        image = decoded(photo.path, photo.counts).image
         return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
     return tuple(
@@ -286,8 +288,41 @@ def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
     return out
 
 
-def with_counts(photos: list[Photo], counts: dict[str, tuple[float, float]]) -> list[Photo]:
-    return [replace(photo, counts=counts.get(photo.modality)) for photo in photos]
+def with_counts(photos: list[Photo], listed: object, where: str) -> list[Photo]:
+    """The photos with what the list of modalities says of the numbers in them."""
+    counts, no_value = counts_from(listed, where), no_value_from(listed, where)
+    out = []
+    for photo in photos:
+        ends, said = counts.get(photo.modality), no_value.get(photo.modality, SAID_NOTHING)
+        # A camera's own numbers lie in JPEG files, whose header is that of a picture.
+        numbers = ends is not None and photo.path.suffix.lower() in JPEGS
+        gaps = photo.may_lack_values or numbers or said != SAID_NOTHING
+        out.append(replace(photo, counts=ends, no_value=said, may_lack_values=gaps))
+    return out
+
+
+def no_value_from(listed: object, where: str) -> dict[str, NoValue]:
+    """Of the modalities that have 'no_data' or 'valid_range': what is no value in their photos."""
+    out: dict[str, NoValue] = {}
+    for entry in listed if isinstance(listed, list) else ():
+        if not isinstance(entry, dict):
+            continue
+        fields, numbers = Fields(entry, f"{where}: modality {shown(entry.get('name'))}"), ()
+        if fields.has("no_data"):
+            said = entry["no_data"]
+            numbers = tuple(said) if isinstance(said, list) else (said,)
+            numbers = tuple(n for n in numbers if not is_nan(n))  # is none in any case
+            if not all(is_number(n) for n in numbers):
+                raise fields.error("no_data", "a number, or a list of numbers, that hold no value")
+        valid = fields.pair("valid_range") if fields.has("valid_range") else None
+        if fields.has("no_data") or valid is not None:
+            out[fields.text("name")] = NoValue(tuple(map(float, numbers)), valid)
+    return out
+
+
+def is_nan(value: object) -> bool:
+    """As JSON may have it, or a text."""
+    return str(value).strip().lower() == "nan"
 
 
 def background_from(entry: Mapping, where: str) -> tuple[float, float, float] | None:
@@ -317,11 +352,14 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     """
     found = []
     for photo in photos[:: max(1, len(photos) // 8)][:8]:
-        image, _ = decoded(photo.path, photo.counts)
+        image, _, known = decoded(photo.path, photo.counts, no_value=photo.no_value)
         if photo.mask is not None or image.mode == "RGBA":
             return None
-        rgb = np.asarray(image.convert("RGB"))
-        border = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
+        border = border_of(np.asarray(image.convert("RGB")))
+        if known is not None:  # what has no value is no colour
+            border = border[border_of(np.asarray(known)) > 0]
+        if not len(border):
+            continue
         colors, counts = np.unique(border, axis=0, return_counts=True)
         if counts.max() >= PLAIN_BORDER * len(border):
             color = colors[counts.argmax()].astype(np.float32) / 255
@@ -329,3 +367,8 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     if not found or Counter(found).most_common(1)[0][1] < min(4, len(photos)):
         return None
     return Counter(found).most_common(1)[0][0]
+
+
+def border_of(pixels: np.ndarray) -> np.ndarray:
+    """(P, ...) the outermost pixels of a picture (H, W, ...)."""
+    return np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])

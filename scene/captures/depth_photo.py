@@ -18,14 +18,13 @@ from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.photo import (
     BROKEN,
-    FLOATS,
-    GREY_16,
     MOST_PIXELS,
     charge_pixels,
     open_image,
     quiet,
     refuse_other_view,
 )
+from shapeshift.scene.captures.radiometric.no_value import FLOATS, GREY_16
 from shapeshift.scene.captures.undistort import pixels_of, straight_pixels
 
 NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's

@@ -1,7 +1,7 @@
 """A COLMAP folder (sparse/0 and images/, text or binary) -> Capture."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import compress
 from pathlib import Path
@@ -13,7 +13,7 @@ from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import sort_of_name
-from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
+from shapeshift.scene.cameras.read_colmap_cameras import camera_pose, other_lengths
 from shapeshift.scene.capture_files import ENDINGS, SMALLER, find_file, parts_of
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
 from shapeshift.scene.capture_photos import (
@@ -28,12 +28,11 @@ from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    counts_from,
     split_every_8th,
     stops_from,
     with_counts,
 )
-from shapeshift.scene.captures.colmap_points import read_colmap_points
+from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
 from shapeshift.scene.captures.colmap_tables import Posed, find_model, read_tables
 from shapeshift.scene.captures.modalities.frame_modalities import said_beside
 from shapeshift.scene.captures.modalities.photo_modality import SPLITS, modalities_of, splits_of
@@ -53,9 +52,9 @@ def read_colmap(folder: Path) -> Capture:
     if (found := find_model(folder)) is None:
         raise BadFile(f"{folder} holds no COLMAP model; images.bin or images.txt is wanted.")
     model, ending = found
-    lenses, images = read_tables(model, ending)
     base = folder / "dense" if model == folder / "dense" / "sparse" else folder
     root = photos_folder(base)
+    lenses, images = read_tables(model, ending, root)
     posed, unpaired = with_twins(sorted(images, key=lambda image: image.name), root)
     names = [image.name for image in posed]
     paths = [find_file(root, name, ("",)).path for name in names]
@@ -84,15 +83,14 @@ def read_colmap(folder: Path) -> Capture:
         if made[0].file_size != lens.size:
             (rescaled if fits(lens.size, made[0].file_size) else turned).append(str(path))
     points, colors, more = points_of(model / f"points3D{ending}")
-    counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
-    by_folder = any(splits_of(names))
-    photos = with_counts(listed_split(photos, folder, root, by_folder), counts)
+    photos = listed_split(photos, folder, root, by_folder=any(splits_of(names)))
+    photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
     if guessed := not said.get("modalities"):
         refuse_two_sorts(opened, stops, folder)
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned)
-    doubts += unpaired + unsure + more
+    doubts += unpaired + unsure + more + other_lengths(images)
     return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
 
 

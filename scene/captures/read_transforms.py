@@ -24,7 +24,6 @@ from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    counts_from,
     rigid,
     split_every_8th,
     with_counts,
@@ -119,7 +118,7 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
     doubts += doubts_of_entries(shots, entries)
     photos, unsure = meant_by_masks(photos)
     doubts += unsure
-    photos = with_counts(photos, counts_from(data.get("modalities") or told, where))
+    photos = with_counts(photos, data.get("modalities") or told, where)
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors, more = points_of(folder, data, where)

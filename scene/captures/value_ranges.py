@@ -8,7 +8,8 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.photo import FLOATS, GREY_16, numbers_of, open_image
+from shapeshift.scene.captures.photo import numbers_of, open_image
+from shapeshift.scene.captures.radiometric.no_value import FLOATS, GREY_16
 from shapeshift.scene.captures.radiometric.number_photos import (
     cannot_read_radiometric,
     is_radiometric,
@@ -43,7 +44,8 @@ def with_own_ranges(
             out.append(stop)
             continue
         ends = stop.value_range or _own_range(mine)
-        photos = [replace(p, counts=ends) if p.modality == stop.name else p for p in photos]
+        gaps = {"may_lack_values": True} if kind == "radiometric" else {}
+        photos = [replace(p, counts=ends, **gaps) if p.modality == stop.name else p for p in photos]
         unit = stop.unit or ("°C" if kind == "radiometric" else "")
         palette = stop.palette or "ironbow"  # without one values are no scale
         out.append(replace(stop, value_range=ends, unit=unit, palette=palette))
@@ -63,18 +65,32 @@ def _kind(photos: list[Photo]) -> str:
 
 def _own_range(photos: list[Photo]) -> tuple[float, float]:
     """What some of the photos hold.  Raises BadFile."""
-    some = photos[:: -(-len(photos) // LOOKED_AT)]
-    known = [numbers[np.isfinite(numbers)] for numbers in map(numbers_of, some)]
-    every = np.concatenate([numbers[:: max(1, len(numbers) // 100_000)] for numbers in known])
+    step = -(-len(photos) // LOOKED_AT)
+    some, others = photos[::step], [p for i, p in enumerate(photos) if i % step]
+    every = np.concatenate([_sample(photo) for photo in some])
+    while not len(every) and others:  # of those, no pixel has a value
+        every = _sample(others.pop())
     if not len(every):
-        raise BadFile(f"{some[0].path}: no number in it nor in the others; copy them again")
+        raise BadFile(
+            f"{photos[0].path}: no pixel of it has a value, nor of the {len(photos)} photos of "
+            f"{photos[0].modality} (NaN, or what stands for no data); copy them again"
+        )
     low, high = np.percentile(every.astype(np.float64), PERCENTILES)
     if not max(abs(low), abs(high)) <= LARGEST:
+        end, way = (low, "down") if abs(low) > abs(high) else (high, "up")
         raise BadFile(
-            f"{some[0].path}: numbers up to {high:.3g}; say with 'value_range' what counts"
+            f"{photos[0].path}: numbers {way} to {end:.3g}; say with 'value_range' what counts, or "
+            f"with 'no_data' that {end:.3g} is no value"
         )
     more = MARGIN * (high - low) or 0.5
     digits = 2 - math.floor(math.log10(high - low + 2 * more))  # three of the range, outwards
     step = 10.0**-digits
     ends = (math.floor((low - more) / step) * step, math.ceil((high + more) / step) * step)
     return round(ends[0], digits), round(ends[1], digits)
+
+
+def _sample(photo: Photo) -> np.ndarray:
+    """(N,) some of the values in it."""
+    numbers = numbers_of(photo)
+    known = numbers[np.isfinite(numbers)]
+    return known[:: max(1, len(known) // 100_000)]
