@@ -39,6 +39,7 @@ LENSES = {
 # Not COLMAP's, with two focal lengths and a principal point first: captures/lenses.  COLMAP's own
 # EQUIRECTANGULAR, whose parameters are its width and height, becomes such a PANORAMA.
 PANORAMA, BROWN, BROWN_FISHEYE = "EQUIRECTANGULAR", "BROWN_CONRADY", "BROWN_CONRADY_FISHEYE"
+BROWN_EQUISOLID, RADIAL_BACKWARDS = "BROWN_CONRADY_EQUISOLID_FISHEYE", "RADIAL_BACKWARDS"
 SPHERE = 17, 2  # COLMAP's number for it, and how many parameters it has
 LENS_NUMBERS = {name: number for number, (name, _, _) in LENSES.items()}
 CAMERA, IMAGE = struct.Struct("<IiQQ"), struct.Struct("<I7dI")

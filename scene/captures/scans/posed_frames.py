@@ -20,6 +20,9 @@ class PosedFrames:
     where: str  # the file or folder that has the poses, for messages
     frames: list[dict]
     doubts: tuple[str, ...] = ()  # what a person should know, a sentence each
+    points: np.ndarray | None = None  # (P, 3) float64, the file's world
+    colors: np.ndarray | None = None  # (P, 3) 0..1
+    program: str = ""  # whose file it is, where not a data set's
 
 
 def table_of(path: Path, *shapes: tuple[int, ...]) -> np.ndarray:
