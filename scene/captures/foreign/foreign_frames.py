@@ -160,8 +160,9 @@ class Gathered:
         )
         folder, where = self.photos.folder, str(self.path)
         return PosedFrames(
-            folder, where, self.frames, doubts, self.points, self.colors, self.program
-        )
+            folder, where, self.frames, doubts, self.left,
+            points=self.points, colors=self.colors, program=self.program,
+        )  # fmt: skip
 
 
 def lens_words(lens: ColmapCamera | None) -> dict:

@@ -1,7 +1,8 @@
 """Photos of two sorts in one stop, which their pixels show where nothing else says it."""
 
+import os
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,8 +31,21 @@ class Opened(NamedTuple):
         return self.mode in ONE_CHANNEL or self.mode in NUMBERS
 
 
-def opened_photo(name: str, photo: Photo, camera: str = "") -> Opened:
-    return Opened(name, photo.modality, photo.mode, photo.file_size, camera)
+def opened_photos(
+    photos: Iterable[Photo], root: Path, cameras: Mapping[Path, str] | None = None
+) -> list[Opened]:
+    """Of a reader's photos, below `root`; cameras: as the capture numbers them."""
+    cameras = cameras or {}
+    return [
+        Opened(
+            os.path.relpath(path, root).replace(os.sep, "/"),
+            photo.modality,
+            photo.mode,
+            photo.file_size,
+            cameras.get(path, ""),
+        )
+        for path, photo in {photo.path: photo for photo in photos}.items()
+    ]
 
 
 def refuse_two_sorts(photos: Sequence[Opened], stops: Sequence[Stop], folder: Path) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.capture_files import find_file, photo_key
+from shapeshift.scene.capture_found import FileTable
 from shapeshift.scene.captures.capture import LEFT_HANDED, Capture
 from shapeshift.scene.captures.capture_rules import turn_of_world
 from shapeshift.scene.captures.read_transforms import capture_of
@@ -61,7 +63,12 @@ def capture_from(posed: PosedFrames) -> Capture:
         raise BadFile(f"{posed.where}: no photo has a pose here; copy the whole folder")
     first = posed.frames[0]
     said = {key: first[key] for key in ("up", "ply_file_path") if key in first}
-    capture = capture_of(posed.folder, posed.where, said, posed.frames)
+    table = FileTable()
+    for why, names in posed.left.items():
+        paths = [find_file(posed.folder, name).path for name in names]
+        table.left_out("photos", paths, f"they {why}", said=True)
+        table.accounted |= {photo_key(str(path)) for path in paths}
+    capture = capture_of(posed.folder, posed.where, said, posed.frames, table, posed.alone)
     if posed.points is not None and capture.points is None:
         capture = with_points(capture, posed)
     return replace(capture, doubts=capture.doubts + posed.doubts)

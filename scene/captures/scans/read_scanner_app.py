@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
-from shapeshift.scene.captures.scans.posed_frames import MOST_BYTES, PosedFrames, left_out
+from shapeshift.scene.captures.scans.posed_frames import MOST_BYTES, PosedFrames
 
 UP = (0, 1, 0)  # ARKit's
 POSE = b'"cameraPoseARFrame"'
@@ -20,15 +20,13 @@ def scanner_app_frames(folder: Path) -> PosedFrames:
     """cameraPoseARFrame: camera to world row by row, OpenGL axes; intrinsics rows of 3; depth in
     millimetres.  Every few frames have a photo.  Raises BadFile.
     """
-    frames, without = [], []
-    tables = sorted(folder.glob("frame_*.json"))
-    for path in tables:
+    frames = []
+    for path in sorted(folder.glob("frame_*.json")):
         photo = path.with_suffix(".jpg")
         if not photo.is_file():
             continue
         said = Fields(read_json(path, most_bytes=MOST_BYTES), str(path))
         if not said.has("cameraPoseARFrame"):
-            without.append(photo.name)
             continue
         pose, k = said.numbers("cameraPoseARFrame", 16), said.numbers("intrinsics", 9)
         frame = {
@@ -40,5 +38,4 @@ def scanner_app_frames(folder: Path) -> PosedFrames:
         if depth.is_file():
             frame["depth_path"] = depth.name
         frames.append(frame)
-    doubts = left_out(len(without), len(tables), without[0] if without else "")
-    return PosedFrames(folder, str(folder / "frame_*.json"), frames, doubts)
+    return PosedFrames(folder, str(folder / "frame_*.json"), frames)

@@ -267,9 +267,10 @@ def test_what_is_left_out_is_said(tmp_path, drawn):
     folder = tmp_path / "scene"
     folder.mkdir()
     scannet(folder, drawn)
-    assert any(
-        "1 of 6 frames have no pose, for example 5.png" in d for d in read_capture(folder).doubts
-    )
+    capture = read_capture(folder)
+    (row,) = [row for row in capture.files if row.left_out]
+    assert (row.kind, row.found, row.left_out, row.why) == ("photos", 1, 1, "they have no pose")
+    assert any("they have no pose" in d and "5.png" in d for d in capture.doubts)
     other = tmp_path / "other"
     other.mkdir()
     scannetpp(other, drawn)
