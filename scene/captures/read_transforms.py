@@ -94,11 +94,8 @@ def capture_of(
     """
     table = table or FileTable()
     stops, usual, told = stops_of_frames(folder, data, entries, where)
-    named = [
-        shot
-        for number, (entry, modality) in enumerate(zip(entries, usual, strict=True))
-        for shot in shots_of(entry, number, modality, stops, folder, where)
-    ]
+    rows = enumerate(zip(entries, usual, strict=True))
+    named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where)]
     shots = [shot for shot in named if os.path.isfile(shot.path)]
     missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
     refuse_all_missing(missing, len(named), where)
@@ -124,7 +121,7 @@ def capture_of(
     if alone:
         unnamed_files(folder, photos, table)
     described = any(isinstance(m, dict) for m in data.get("modalities") or told)
-    if not (told or data.get("modalities") or any("modality" in entry for entry in entries)):
+    if not (told or data.get("modalities") or any("modality" in e for e in entries)):
         refuse_two_sorts(opened_photos(photos, folder), stops, folder)
     background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
     capture = world.capture(
