@@ -32,7 +32,7 @@ class Options(ReadingOptions):
     sh_degree: int = 3
     """Degree of the colours' spherical harmonics, at most; 0: one colour from all sides."""
     palette: bool = True
-    """Write thermal stops in their false colours, as they are shown; --no-palette: as the networks
+    """Write value stops in their false colours, as they are shown; --no-palette: as the networks
     give them."""
     select: Annotated[tuple[str, ...], REGIONS] = ()
     """Regions with an X of their own (a stop's name or a number), in each object's frame:

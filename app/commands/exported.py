@@ -50,7 +50,7 @@ class ExportLook:
     """How it is exported."""
 
     sh_degree: int = 3  # at most
-    palette: bool = True  # thermal stops in their false colours, as they are shown
+    palette: bool = True  # value stops in their false colours, as they are shown
     eye: tuple[float, float, float] | None = None  # world metres, None: the first view's
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # float64 metres: where the files have
     #                                       the world's zero; far ones are shown nearer to it
@@ -109,7 +109,7 @@ def eye_of(obj: SceneObject, look: ExportLook) -> tuple[np.ndarray | None, tuple
 
 
 def shown_colors(obj: SceneObject, x: Controls) -> Recolor | None:
-    """Mixes colours and what thermal stops have in them, in their palettes, as much as x asks."""
+    """Mixes colours and what value stops have in them, in their palettes, as much as x asks."""
     model = obj.model
     shade = shade_of(model, x)
     if not shade.heats:

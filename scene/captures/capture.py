@@ -72,6 +72,7 @@ class Capture:
     background: tuple[float, float, float] | None = None  # what lies behind; None = black
     notes: dict = field(default_factory=dict)
     doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
+    formulas: tuple[Stop, ...] = ()  # stops of values by formula of its stops', without photos
     files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
 
     def of(self, modality: str, split: str) -> list[Photo]:

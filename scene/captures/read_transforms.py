@@ -100,7 +100,7 @@ def capture_of(
     missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
     refuse_all_missing(missing, len(named), where)
     for stop in stops:
-        if not any(s.modality == stop.name for s in shots):
+        if not stop.formula and not any(s.modality == stop.name for s in shots):
             raise BadFile(
                 f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
             )
@@ -301,7 +301,7 @@ def shots_of(
     matrix = rigid(entry[key], where, may_mirror=True)
     if not opencv_axes(entry):
         matrix = matrix @ OPENCV_FROM_EYE
-    names = [s.name for s in stops]
+    names = [s.name for s in stops if not s.formula]
     if "modality" in entry or usual or len(names) == 1:
         modality = fields.text("modality", usual or names[0])
         if modality not in names:

@@ -55,7 +55,7 @@ def export(
 
     out: its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, .usdz; .shift or a
     folder is our own package, which holds every x.  x: as of `Scene.at`.  sh_degree: 0 to 3, of the
-    colours' spherical harmonics.  palette: thermal stops in their false colours.  only: what lies
+    colours' spherical harmonics.  palette: value stops in their false colours.  only: what lies
     in one of these regions (their x means nothing here).  object: that object of a scene file
     alone.  label: what a labelled scene shows of that object alone, by its number or name; in a
     package, its anchors.  eye: (3,) metres, for scenes whose shape depends on it.  overwrite:

@@ -75,6 +75,8 @@ def said_modality_of(
     choices = [choice_of(Fields(e, where), s.name) for s, e in zip(stops, entries, strict=True)]
     out: list[tuple[int, str]] = [(0, "")] * len(names)
     for stop, choice in zip(stops, choices, strict=True):
+        if stop.formula:  # it is made of others and has no photos
+            continue
         depths = choice.depths(names, cameras_of)
         if not any(depths):
             depths = choice.folded().depths([name.lower() for name in names], cameras_of)
