@@ -6,12 +6,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from shapeshift.app.capture_facts import print_files
 from shapeshift.app.errors import UsageError, as_typed
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.progress import working
 from shapeshift.app.terminal import say
+from shapeshift.app.training.capture_facts import print_files
 from shapeshift.app.training.run_loop import (
     INTERRUPTED,
     READING,

@@ -30,6 +30,7 @@ class Photo:
     lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
     mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
     float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
+    mode: str = ""  # what its pixels are, as PIL names it ("RGB", "L", "I;16"); "": not looked at
     no_value: NoValue = SAID_NOTHING  # which of its numbers are none, beside what its file says
     may_lack_values: bool = (
         False  # whether a pixel may have none: its header or its capture says so

@@ -43,7 +43,8 @@ def test_a_whole_capture_leaves_nothing_out(model):
 
 NAMED = [
     "masks/rgb/1.png", "masks/rgb/1.png.png", "masks/rgb/1.PNG", "masks/rgb/1.jpg",
-    "Masks/RGB/1.JPG", "masks/rgb/1.jpeg", "masks/rgb/1.tif", "masks/rgb/1.webp", "masks/rgb/1.png.mask.png",
+    "Masks/RGB/1.JPG", "masks/rgb/1.jpeg", "masks/rgb/1.tif", "masks/rgb/1.webp",
+    "masks/rgb/1.png.mask.png",
     "masks/rgb/1.mask.png", "masks/rgb/1_mask.png", "masks/rgb/1.png_mask.png", "mask/rgb/1.png",
     "images_mask/rgb/1.png", "image_masks/rgb/1.png", "images/rgb/1.png.mask.png",
     "images/rgb/1_mask.png", "images/rgb/1.mask.PNG", "images/_mask/rgb/1.png",
