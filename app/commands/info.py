@@ -21,8 +21,8 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.inspection.capture_facts import capture_facts, print_capture
     from shapeshift.app.scene_files import describe_scene, open_scene_file
-    from shapeshift.app.training.capture_facts import capture_facts, print_capture
     from shapeshift.runtime_models.model import BadFile
     from shapeshift.runtime_models.read_scene import describe
     from shapeshift.scene.document.scene_file import is_scene_file

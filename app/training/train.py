@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.cluster.open_cluster import NONE, check_gpus
 from shapeshift.app.cluster.task import is_task
+from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
-from shapeshift.app.training.capture_facts import print_files
 from shapeshift.app.training.run_loop import (
     INTERRUPTED,
     READING,

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from shapeshift.app.errors import UsageError, as_typed
+from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.progress import working
 from shapeshift.app.terminal import say
-from shapeshift.app.training.capture_facts import print_files
 from shapeshift.app.training.run_loop import (
     INTERRUPTED,
     READING,

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.errors import UsageError, as_typed
+from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
-from shapeshift.app.training.capture_facts import print_files
 from shapeshift.app.training.train_options import Asked, Options
 
 if TYPE_CHECKING:

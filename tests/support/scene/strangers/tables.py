@@ -159,12 +159,12 @@ SITUATIONS = [
     Situation("a list with a lost name", "train_list.txt names a photo that is none",
               colmap_with(text("train_list.txt", b"0.png\r\n1.PNG\r\nimages\\2.png\r\nx.png")),
               "3 photos; left out: 3 photos, they are in none of train_list.txt, "
-              "validation_list.txt, test_list.txt; left out: 1 names in train_list.txt, no photo of "
-              "the model has them", files_in),
+              "validation_list.txt, test_list.txt; left out: 1 names in train_list.txt, no photo "
+              "of the model has them", files_in),
     Situation("depth beside COLMAP", "depth/0.png, which no table of COLMAP names",
               colmap_with(pictures("depth/0.png")),
-              "6 photos; left out: 1 depth photos, a COLMAP model names none, a transforms.json can",
-              files_in),
+              "6 photos; left out: 1 depth photos, a COLMAP model names none, a transforms.json "
+              "can", files_in),
     Situation("frames beside other photos", "a photo that no frame names",
               frames_with(pictures("images/9.png")),
               "6 photos; left out: 1 photos, they have no pose", files_in),
