@@ -9,6 +9,10 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import NamedTuple
 
 ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG", ".webp", ".tif", ".tiff")
+PICTURES = {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".heic", ".dng"}
+MOST_FILES = 200_000  # of a folder and those in it that are looked at
+# What other programs keep in folders of photos: of macOS, and of network drives' thumbnails.
+NO_PHOTOS = (".", "@", "__MACOSX")
 SMALLER = (2, 4, 8)  # images_2, images_4 ... hold the photos of images with smaller sides
 # Of names that are no UTF-8, the likeliest first: Windows of the West, of Central Europe and in
 # Russian, Japanese, Chinese, Korean; DOS, which zip programs still write.
@@ -73,6 +77,37 @@ def folded(name: str) -> str:
 def entries_of(folder: Path, changed_ns: int) -> dict[str, str]:
     """Names in a folder by how they are compared; changed_ns: when it was, to be read anew then."""
     return {folded(name): name for name in sorted(os.listdir(folder))}
+
+
+def files_below(folder: Path, deep: bool = True) -> list[str]:
+    """Names of the files in it, with / below it, sorted; hidden ones are passed over.
+
+    deep: those in its folders as well, also behind links, each folder once.
+    """
+    found: list[str] = []
+    seen: set[tuple[int, int]] = set()
+    for place, folders, names in os.walk(folder, followlinks=True):
+        status = os.stat(place)
+        if (status.st_dev, status.st_ino) in seen:
+            folders.clear()
+            continue
+        seen.add((status.st_dev, status.st_ino))
+        folders[:] = [name for name in folders if deep and not name.startswith(NO_PHOTOS)]
+        below = Path(place).relative_to(folder).as_posix()
+        prefix = "" if below == "." else f"{below}/"
+        found += [prefix + name for name in names if not name.startswith(NO_PHOTOS)]
+        if len(found) > MOST_FILES:
+            break
+    return sorted(found[:MOST_FILES])
+
+
+def is_picture(name: str) -> bool:
+    return os.path.splitext(name)[1].lower() in PICTURES
+
+
+def photo_key(name: str) -> str:
+    """A photo's name to be compared: / between folders, without ./, capitals or umlauts apart."""
+    return folded("/".join(part for part in parts_of(name) if part != "."))
 
 
 def parts_of(name: str) -> list[str]:

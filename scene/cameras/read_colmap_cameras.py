@@ -15,8 +15,9 @@ from shapeshift.scene.cameras.camera_list import (
     pinhole_view,
     read_name,
 )
+from shapeshift.scene.captures.colmap.rig_frames import refused_poses
 from shapeshift.scene.captures.colmap_tables import ColmapCamera, Posed, read_tables
-from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.pose import View
 
 UNIT = 1e-2  # by which a quaternion's length differs from 1 in rounded text files, at most
 
@@ -31,7 +32,7 @@ def read_colmap_cameras(folder: Path, ending: str, reading: CameraReading) -> Ca
             image, lenses[image.lens], turn, f"{folder / f'images{ending}'}: {image.name}"
         )
         views.append(view.resized(reading.size) if reading.size else view)
-    notes = other_lengths(posed)
+    notes = other_lengths(posed) + refused_poses(folder, ending, posed)
     if any(lenses[image.lens].bends for image in posed):
         notes += (
             f"{folder}: the lenses' distortion is left out; the views are those of pinholes.",
@@ -49,20 +50,18 @@ def view_of(image: Posed, lens: ColmapCamera, turn: np.ndarray, where: str) -> V
 
 def camera_pose(image: Posed, where: str) -> np.ndarray:
     """(4, 4) camera to world, OpenCV axes, COLMAP's world.  Raises BadFile."""
-    length = math.hypot(*image.wxyz)  # any but 0 is a turn: tables are rounded, or not divided
-    if not (0 < length < math.inf and np.isfinite(image.place).all()):
+    if not (0 < image.length < math.inf and np.isfinite(image.place).all()):
         raise BadFile(f"{where}: its pose is no rotation and place; run the mapper again.")
-    wxyz = np.array(image.wxyz) / max(map(abs, image.wxyz))  # of 1e-320, too
-    return np.linalg.inv(Pose(np.array(image.place), wxyz / np.linalg.norm(wxyz)).matrix())
+    return np.linalg.inv(image.camera_from_world())
 
 
 def other_lengths(posed: Sequence[Posed]) -> tuple[str, ...]:
     """A sentence where quaternions have other lengths than 1: other programs may read such poses
     otherwise."""
-    other = [image for image in posed if not abs(math.hypot(*image.wxyz) - 1) <= UNIT]
+    other = [image for image in posed if not abs(image.length - 1) <= UNIT]
     if not other:
         return ()
     return (
         f"{len(other)} of {len(posed)} quaternions have another length than 1, for example "
-        f"{math.hypot(*other[0].wxyz):.3g} of {path_end(other[0].name)}; they are divided by it.",
+        f"{other[0].length:.3g} of {path_end(other[0].name)}; they are divided by it.",
     )

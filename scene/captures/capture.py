@@ -50,6 +50,18 @@ class Photo:
 
 
 @dataclass(frozen=True)
+class FoundFiles:
+    """One row of what a capture found: files of one kind that met one fate."""
+
+    kind: str  # photos, masks, models ...
+    found: int  # that are there
+    used: int  # all of them, or none
+    left_out: int  # all that are there, or that should be
+    why: str = ""
+    example: str = ""  # the first that is left out
+
+
+@dataclass(frozen=True)
 class Capture:
     folder: Path
     stops: tuple[Stop, ...]
@@ -59,6 +71,7 @@ class Capture:
     background: tuple[float, float, float] | None = None  # what lies behind; None = black
     notes: dict = field(default_factory=dict)
     doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
+    files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]

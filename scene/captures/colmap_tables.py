@@ -2,11 +2,14 @@
 
 import math
 import mmap
+import os
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.capture_files import in_code_page
@@ -17,14 +20,11 @@ from shapeshift.scene.captures.colmap.text_lines import (
     numbers_of,
     rows_of_table,
 )
+from shapeshift.scene.pose import Pose
 
-MODELS = (
-    "sparse/0",
-    "sparse",
-    "colmap/sparse/0",
-    "dense/sparse",
-    ".",
-)  # where a folder may hold its model
+# Where a folder may hold its model; *: one of several that the mapper could not join.
+MODELS = ("sparse/*", "sparse", "colmap/sparse/*", "dense/sparse", ".")
+MOST_MODELS = 1000  # in one folder that are looked at
 TABLES = ("cameras", "images", "points3D")
 # name, how many focal lengths, how many parameters; COLMAP's src/colmap/sensor/models.h
 LENSES = {
@@ -39,6 +39,7 @@ LENSES = {
 # Not COLMAP's, with two focal lengths and a principal point first: captures/lenses.  COLMAP's own
 # EQUIRECTANGULAR, whose parameters are its width and height, becomes such a PANORAMA.
 PANORAMA, BROWN, BROWN_FISHEYE = "EQUIRECTANGULAR", "BROWN_CONRADY", "BROWN_CONRADY_FISHEYE"
+BROWN_EQUISOLID, RADIAL_BACKWARDS = "BROWN_CONRADY_EQUISOLID_FISHEYE", "RADIAL_BACKWARDS"
 SPHERE = 17, 2  # COLMAP's number for it, and how many parameters it has
 LENS_NUMBERS = {name: number for number, (name, _, _) in LENSES.items()}
 CAMERA, IMAGE = struct.Struct("<IiQQ"), struct.Struct("<I7dI")
@@ -96,14 +97,63 @@ class Posed:
     place: tuple[float, ...]  # (3,) of that transform
     lens: int  # of a ColmapCamera
 
+    @property
+    def length(self) -> float:
+        """Of its quaternion: any but 0 is a turn; tables are rounded, or were never divided."""
+        return math.hypot(*self.wxyz)
+
+    def camera_from_world(self) -> np.ndarray:
+        """(4, 4) of its quaternion divided by its length, which is neither 0 nor infinite."""
+        wxyz = np.array(self.wxyz) / max(map(abs, self.wxyz))  # 1e-320 has no square
+        return Pose(np.array(self.place), wxyz / np.linalg.norm(wxyz)).matrix()
+
 
 def find_model(folder: Path, tables: tuple[str, ...] = ("images",)) -> tuple[Path, str] | None:
-    """The folder and ending (.bin or .txt) of a COLMAP model in or under `folder`, or None."""
-    for name in MODELS:
-        for ending in (".bin", ".txt"):
-            if all((folder / name / (table + ending)).is_file() for table in tables):
-                return folder / name, ending
+    """The folder and ending (.bin or .txt) of a COLMAP model in or under `folder`, or None.
+
+    Of several that the mapper could not join it is the one with most images, the first of these.
+    """
+    for place in MODELS:
+        if place.endswith("/*"):
+            found = models_in(folder / place[:-2], tables)
+            numbered = [model for model in found if model[0].name.isdecimal()] or found
+            if len(numbered) > 1:
+                return max(numbered, key=lambda model: images_in(*model))
+            if numbered:
+                return numbered[0]
+        elif (ending := ending_of(folder / place, tables)) is not None:
+            return folder / place, ending
     return None
+
+
+def models_in(folder: Path, tables: tuple[str, ...] = ("images",)) -> list[tuple[Path, str]]:
+    """The models in the folders of one, in the order of their numbers."""
+    if not folder.is_dir():
+        return []
+    names = sorted(os.listdir(folder))[:MOST_MODELS]
+    names.sort(key=lambda name: int(name) if name.isdecimal() and len(name) < 9 else math.inf)
+    endings = [(folder / name, ending_of(folder / name, tables)) for name in names]
+    return [(model, ending) for model, ending in endings if ending is not None]
+
+
+def ending_of(folder: Path, tables: tuple[str, ...]) -> str | None:
+    """Of the tables of a model; as COLMAP does, binary ones before those of text."""
+    for ending in (".bin", ".txt"):
+        if all((folder / f"{table}{ending}").is_file() for table in tables):
+            return ending
+    return None
+
+
+def images_in(folder: Path, ending: str) -> int:
+    """How many images a model has; -1 where its table cannot be read."""
+    path = folder / f"images{ending}"
+    try:
+        if ending == ".txt":
+            return sum(1 for _ in image_rows(path))
+        with mapped(path) as data:
+            return count_of(data, IMAGE.size + 1 + COUNT.size, path)
+    except BadFile:
+        return -1
 
 
 def read_tables(

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import Fields, shown
-from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.read_colmap_cameras import camera_pose, other_lengths
-from shapeshift.scene.capture_files import SMALLER, find_file
+from shapeshift.scene.capture_files import find_file
+from shapeshift.scene.capture_found import FileTable
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
 from shapeshift.scene.capture_photos import doubts_of, fits, posed_photos, refuse_all_missing
 from shapeshift.scene.captures.capture import Capture, Photo
@@ -21,17 +21,21 @@ from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    split_every_8th,
     spread_stops,
     stops_from,
     with_counts,
 )
-from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
+from shapeshift.scene.captures.colmap.colmap_files import (
+    base_of,
+    left_beside,
+    listed_split,
+    masks_of,
+    photos_folder,
+    points_of,
+)
+from shapeshift.scene.captures.colmap.rig_frames import refused_poses
 from shapeshift.scene.captures.colmap_tables import find_model, read_tables
 from shapeshift.scene.captures.read_transforms import read_capture_json
-
-# nerfstudio's, beside the model
-LISTS = {"train_list.txt": "train", "validation_list.txt": "test", "test_list.txt": "test"}
 
 
 def read_colmap(folder: Path) -> Capture:
@@ -39,7 +43,8 @@ def read_colmap(folder: Path) -> Capture:
     if (found := find_model(folder)) is None:
         raise BadFile(f"{folder} holds no COLMAP model; images.bin or images.txt is wanted.")
     model, ending = found
-    base = folder / "dense" if model == folder / "dense" / "sparse" else folder
+    base = base_of(folder, model)
+    folder = base if model == folder else folder
     root = photos_folder(base)
     lenses, images = read_tables(model, ending, root)
     posed = sorted(images, key=lambda image: image.name)
@@ -51,6 +56,8 @@ def read_colmap(folder: Path) -> Capture:
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
+    table = FileTable()
+    masks = masks_of(base, root, list(compress(paths, there)), table)
     means = stated_meaning(Fields(said, f"{folder}/capture.json"))
     photos: list[Photo] = []
     rescaled: list[str] = []
@@ -59,54 +66,29 @@ def read_colmap(folder: Path) -> Capture:
         lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
         made = posed_photos(path, modality_of[image.name], matrix, lens, where)
-        mask = find_mask(base, image.name)
+        mask = masks.get(path)
         if mask is not None:
             refuse_other_mask(mask, made[0].file_size)
         photos += [replace(photo, mask=mask, mask_means=means) for photo in made]
         if made[0].file_size != lens.size:
             (rescaled if fits(lens.size, made[0].file_size) else turned).append(str(path))
-    points, colors, more = points_of(model / f"points3D{ending}")
-    photos = listed_split(photos, folder, root)
+    points, colors, more = points_of(model, ending)
+    table.used("points", 0 if points is None else len(points))
+    photos = listed_split(photos, folder, root, table)
     photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
     guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
-    doubts += other_lengths(posed)
-    return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
-
-
-def photos_folder(base: Path) -> Path:
-    """images/, else the first of those with smaller photos, else the folder itself."""
-    names = ("images", *(f"images_{factor}" for factor in SMALLER))
-    return next((base / name for name in names if (base / name).is_dir()), base)
-
-
-def points_of(path: Path) -> tuple[np.ndarray | None, np.ndarray | None, tuple[str, ...]]:
-    """Points and colours 0..1 of a model, and what is doubtful: a model may come without."""
-    if not path.is_file():
-        return None, None, (f"The points {path_end(path)} are not there.",)
-    xyz, rgb = read_colmap_points(path)
-    return (xyz, rgb.astype(np.float32) / 255, ()) if len(xyz) else (None, None, ())
-
-
-def listed_split(photos: list[Photo], folder: Path, root: Path) -> list[Photo]:
-    """By nerfstudio's lists beside the model, a name a line; without them every 8th is held out.
-
-    Photos in none of the lists are not used.
-    """
-    splits: dict[str, str] = {}
-    for name, split in LISTS.items():
-        if (folder / name).is_file():
-            lines = read_text_file(folder / name).decode("utf-8", "replace").split("\n")
-            splits |= {line.strip(): split for line in lines if line.strip()}
-    if not splits:
-        return split_every_8th(photos)
-    named = [(photo, splits.get(photo.path.relative_to(root).as_posix())) for photo in photos]
-    used = [replace(photo, split=split) for photo, split in named if split]
-    if not used:
-        raise BadFile(f"{folder}: its lists of training and test photos name none of its photos")
-    return used
+    doubts += other_lengths(posed) + refused_poses(model, ending, posed)
+    table.photos(photos, missing)
+    table.partners("masks", photos)
+    left_beside(base, model, ending, table)
+    doubts += tuple(table.sentences)
+    capture = world.capture(
+        folder, stops, photos, points, colors, background, guessed, doubts=doubts
+    )
+    return replace(capture, files=table.sorted_rows())
 
 
 def modalities(
@@ -135,11 +117,3 @@ def modalities(
     if left:
         raise BadFile(f"{where}: image {left[0]} belongs to no listed modality")
     return tuple(sorted(stops, key=lambda s: s.x)), of
-
-
-def find_mask(folder: Path, name: str) -> Path | None:
-    """COLMAP's masks/NAME.jpg.png, or masks/NAME.png."""
-    for path in (folder / "masks" / f"{name}.png", (folder / "masks" / name).with_suffix(".png")):
-        if path.is_file():
-            return path
-    return None
