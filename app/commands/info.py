@@ -45,7 +45,7 @@ def print_table(facts: dict) -> None:
         if value is None or (key == "anchors" and value == 0):  # made_of says what is there instead
             continue
         if key == "stops":
-            value = "\n".join(f"{s['x']:.3f}  {s['name']} ({s['kind']})" for s in value)
+            value = "\n".join(map(stop_line, value))
         elif key == "heads":
             value = "\n".join(
                 f"{name}: {' to '.join(map(str, head['layers']))}, {head['activation']}"
@@ -73,6 +73,15 @@ def print_table(facts: dict) -> None:
             value = f"{value:,}"
         table.add_row(key.replace("_", " "), Text(str(value)))  # names may hold brackets
     open_console(stderr=False).print(table)
+
+
+def stop_line(stop: dict) -> str:
+    """One stop."""
+    words = [stop["kind"]]
+    if ends := stop.get("value_range"):
+        words.append(f"{ends[0]:g} to {ends[1]:g} {stop['unit']}".rstrip())
+    words += [stop[key] for key in ("palette", "formula") if stop.get(key)]
+    return f"{stop['x']:.3f}  {stop['name']} ({', '.join(words)})"
 
 
 def level_line(level: dict) -> str:

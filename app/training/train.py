@@ -86,7 +86,7 @@ def run_whole(options: Options) -> int:
     step_s = seconds_a_step(trainer, before, time.monotonic() - began)
     save(trainer, options.out, checkpoint)
     if not interrupted:
-        pace_package(options.out)
+        pace_package(options.out, capture.formulas)
     more = [*refined(trainer, options.out), *trainer.exposures.warnings()]
     say(summary(trainer, options.out, interrupted), *more)
     lines, ended = what_next(options, trainer.iteration, step_s, interrupted), False

@@ -30,6 +30,7 @@ class Photo:
     lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
     mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
     float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
+    mode: str = ""  # what its pixels are, as PIL names it ("RGB", "L", "I;16"); "": not looked at
     no_value: NoValue = SAID_NOTHING  # which of its numbers are none, beside what its file says
     may_lack_values: bool = (
         False  # whether a pixel may have none: its header or its capture says so
@@ -71,6 +72,7 @@ class Capture:
     background: tuple[float, float, float] | None = None  # what lies behind; None = black
     notes: dict = field(default_factory=dict)
     doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
+    formulas: tuple[Stop, ...] = ()  # stops of values by formula of its stops', without photos
     files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
 
     def of(self, modality: str, split: str) -> list[Photo]:

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +11,9 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import Fields, is_number, rows_of, shown
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
+from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.runtime_models.stop_names import guess_kind
+from shapeshift.runtime_models.stops.stop_formula import check_formulas, read_formula
 from shapeshift.scene.cameras.photo_view import subject_distance
 from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
 from shapeshift.scene.captures.dated_stops import (
@@ -82,7 +84,13 @@ class CaptureWorld:
         doubts: tuple[str, ...] = (),
     ) -> Capture:
         """The finished capture; `guessed` = nobody said what the modalities are."""
+        formulas = tuple(stop for stop in stops if stop.formula)
+        stops = tuple(stop for stop in stops if not stop.formula)
         stops, photos, more = with_own_ranges(stops, photos)
+        try:
+            check_formulas((*stops, *formulas))
+        except ValueError as error:
+            raise BadFile(f"{folder}: {error}") from None
         notes = {"up_in_file": self.up} | (notes or {})
         if self.left_handed:
             notes[LEFT_HANDED] = True
@@ -112,6 +120,7 @@ class CaptureWorld:
             background,
             notes,
             doubts + more,
+            formulas,
         )
 
 
@@ -226,22 +235,20 @@ def upright_rotation(up: object, where: str) -> np.ndarray:
     return out
 
 
-def spread_stops(names: Iterable[str]) -> tuple[Stop, ...]:
-    """Stops evenly from 0 to 1 in the order of the names, the kind read from the name; names that
-    are dates are stops of visible light as far apart as these.
+def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop, ...]:
+    """Stops evenly from 0 to 1 in the order of the names, the kind read from the name unless it is
+    given; names that are dates are stops of visible light as far apart as these.
     """
     names = list(names)
+    kinds = kinds or [guess_kind(name, len(names)) for name in names]
     if dated := named_by_date(names):
         return dated
     xs = np.linspace(0, 1, len(names)) if len(names) > 1 else [0.0]
-    return tuple(
-        Stop(name, float(x), guess_kind(name, len(names)))
-        for name, x in zip(names, xs, strict=True)
-    )
+    return tuple(Stop(name, float(x), kind) for name, x, kind in zip(names, xs, kinds, strict=True))
 
 
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:
-    """Thermal stops of grey photos get a palette; false-colour photos keep their own colours."""
+    """Stops of values get a palette where their photos are grey; false colours stay as they are."""
 
     def grey(name: str) -> bool:
         photo = next(p for p in photos if p.modality == name)
@@ -249,7 +256,8 @@ def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[St
         return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
     return tuple(
-        replace(s, palette="ironbow") if s.kind == "thermal" and grey(s.name) else s for s in stops
+        replace(s, palette=USUAL_PALETTE[s.kind]) if s.is_measured and grey(s.name) else s
+        for s in stops
     )
 
 
@@ -260,24 +268,35 @@ def stops_from(listed: object, where: str) -> list[Stop]:
     stops = [stop_from(row, where) for row in rows_of(listed, f"{where}: modality", 1)]
     if len({stop.name for stop in stops}) < len(stops):
         raise BadFile(f"{where}: two modalities have the same name; rename one")
+    for stop in stops:  # what it is of is known when the photos are
+        refuse_formula(stop, where)
     return list(placed_by_date(stops, where))
+
+
+def refuse_formula(stop: Stop, where: str) -> None:
+    """Raises BadFile for a formula that is none, before any photo is looked for."""
+    try:
+        if stop.formula:
+            read_formula(stop.formula)
+    except ValueError as error:
+        raise BadFile(f"{where}: modality {shown(stop.name)}: {error}") from None
 
 
 def stop_from(entry: Fields, where: str) -> Stop:
     name = entry.text("name")
     entry.where = f"{where}: modality {shown(name)}"
     date = date_in_entry(entry)
-    return Stop(
-        name,
-        entry.number("x", wanted="0 to 1", low=0, high=1)
-        if entry.has("x") or not date
-        else NO_PLACE,
-        entry.line("kind", "rgb", known=STOP_KINDS) if entry.has("kind") else "rgb",
-        entry.text("palette", ""),
-        entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None,
-        entry.text("unit", ""),
-        date,
-    )
+    x, kind = NO_PLACE, "rgb"
+    if entry.has("x") or not date:
+        x = entry.number("x", wanted="0 to 1", low=0, high=1)
+    if entry.has("kind"):
+        kind = entry.line("kind", "rgb", known=STOP_KINDS)
+    ends = entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None
+    palette, unit, formula = (entry.text(key, "") for key in ("palette", "unit", "formula"))
+    try:
+        return Stop(name, x, kind, palette, ends, unit, date, formula)
+    except ValueError as error:
+        raise BadFile(f"{entry.where}: {error}") from None
 
 
 def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
