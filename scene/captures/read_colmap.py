@@ -35,6 +35,7 @@ from shapeshift.scene.captures.colmap.colmap_files import (
 )
 from shapeshift.scene.captures.colmap.rig_frames import refused_poses
 from shapeshift.scene.captures.colmap_tables import find_model, read_tables
+from shapeshift.scene.captures.radiometric.stated_bands import of_each_band, sharing_folders
 from shapeshift.scene.captures.read_transforms import read_capture_json
 
 
@@ -75,6 +76,7 @@ def read_colmap(folder: Path) -> Capture:
     points, colors, more = points_of(model, ending)
     table.used("points", 0 if points is None else len(points))
     photos = listed_split(photos, folder, root, table)
+    photos = of_each_band(photos, sharing_folders(said.get("modalities") or (), str(folder)))
     photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
     guessed = not said.get("modalities")
@@ -104,8 +106,10 @@ def modalities(
     where, entries = f"{folder}/capture.json", said["modalities"]
     stops = stops_from(entries, where)
     of: dict = {}
+    sharing = sharing_folders(entries, where)
+    bands = {name for names in sharing.values() for name in names[1:]}  # of the first's photos
     for stop, entry in zip(stops, entries, strict=True):
-        if stop.formula:
+        if stop.formula or stop.name in bands:
             continue
         prefix = Fields(entry, where).text("folder", stop.name).rstrip("/") + "/"
         mine = [n for n in names if n.startswith(prefix)]

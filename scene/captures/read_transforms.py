@@ -39,6 +39,7 @@ from shapeshift.scene.captures.lenses.frame_lens import lens_of
 from shapeshift.scene.captures.lenses.panorama import is_panorama, stereo_sentences
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
+from shapeshift.scene.captures.radiometric.stated_bands import stated_bands
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.mask_files import find_masks
 from shapeshift.scene.pose import OPENCV_FROM_EYE
@@ -341,9 +342,11 @@ def shots_of(
         path, elsewhere = find_file(folder, file)
         return [Shot(entry, modality, path, matrix, where, folder, elsewhere)]
     shots = []
+    bands = stated_bands(data.get("modalities"), where)
     for name in names:
-        path, elsewhere = find_file(folder / name, file)
-        shots.append(Shot(entry, name, path, matrix, where, folder / name, elsewhere))
+        place = folder if name in bands else folder / name
+        path, elsewhere = find_file(place, file)
+        shots.append(Shot(entry, name, path, matrix, where, place, elsewhere))
     return shots
 
 
