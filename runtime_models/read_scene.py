@@ -202,6 +202,8 @@ def describe(model: Model, path: str | Path) -> dict:
         if "sh_degree" in model.provenance:  # bands that are zero in every splat were left out
             facts["sh_degree_in_file"] = model.provenance["sh_degree"]
         drawn: dict[str, object] = {"antialiased": True} if model.antialiased else {}
+        if "axes" in model.provenance:  # where the format alone does not tell
+            drawn["axes"] = model.provenance["axes"]
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]
             drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))

@@ -39,9 +39,8 @@ def find_file(folder: Path, name: str, endings: Sequence[str] = ENDINGS) -> Name
     parts = parts_of(name)
     if "\\" in name and (found := with_ending(folder, "/".join(parts), endings)):
         return NamedFile(found)
-    strange = name.startswith("/") or ".." in parts or bool(DRIVE.match(name))
     below = [part for part in parts if part != ".."]
-    ends = [below[start:] for start in range(len(below))] if strange else [below]
+    ends = [below[start:] for start in range(len(below))] if is_strange(name) else [below]
     for end in ends:
         for first in ("", *SMALLER):
             place = "/".join([f"{end[0]}_{first}" if first else end[0], *end[1:]])
@@ -50,6 +49,11 @@ def find_file(folder: Path, name: str, endings: Sequence[str] = ENDINGS) -> Name
     if found := alike_named(folder, [part for part in parts if part != "."], endings):
         return NamedFile(found, elsewhere=True)
     return NamedFile(folder / name)
+
+
+def is_strange(name: str) -> bool:
+    """Whether a name begins at another machine's root, or goes up."""
+    return name.startswith("/") or ".." in parts_of(name) or bool(DRIVE.match(name))
 
 
 def alike_named(folder: Path, parts: Sequence[str], endings: Sequence[str]) -> Path | None:

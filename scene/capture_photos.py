@@ -66,19 +66,19 @@ def posed_photo(
     world_from_camera: (4, 4) OpenCV axes, our world; lens: of the size that the capture states.
     """
     with open_image(path) as image:
-        size, gaps = image.size, may_lack_values(image)
+        size, mode, gaps = image.size, image.mode, may_lack_values(image)
     if not fits(lens.size, size):
         world_from_camera, lens = as_it_lies(path, world_from_camera, lens)
     lens = of_size(lens, size, path)
     try:
         if is_straight(lens, where):
             view = View.from_pinhole(world_from_camera, lens.focal, lens.centre, lens.size)
-            return Photo(view, path, modality, may_lack_values=gaps)
+            return Photo(view, path, modality, mode=mode, may_lack_values=gaps)
         straight = pinhole_of(lens)
         view = View.from_pinhole(world_from_camera, straight.focal, straight.centre, straight.size)
     except ValueError as error:
         raise BadFile(f"{where}: {error}") from None
-    return Photo(view, path, modality, lens=lens, may_lack_values=gaps)
+    return Photo(view, path, modality, lens=lens, mode=mode, may_lack_values=gaps)
 
 
 def as_it_lies(

@@ -54,6 +54,8 @@ class ExportLook:
     eye: tuple[float, float, float] | None = None  # world metres, None: the first view's
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # float64 metres: where the files have
     #                                       the world's zero; far ones are shown nearer to it
+    spz_axes: str = "ply"  # of an .spz: one of write_spz.AXES
+    spz_version: int = 3  # of an .spz: one of write_spz.VERSIONS
 
 
 def export(parts: Sequence[Part], look: ExportLook, path: Path, progress) -> PlainSplats:
@@ -72,8 +74,9 @@ def export(parts: Sequence[Part], look: ExportLook, path: Path, progress) -> Pla
     x, y, z = np.add(splats.origin, look.origin).tolist()
     splats = replace(splats, origin=(x, y, z))
     path.parent.mkdir(parents=True, exist_ok=True)
+    options = {"version": look.spz_version, "axes": look.spz_axes} if writer.name == "spz" else {}
     try:
-        writer.write(splats, path)
+        writer.write(splats, path, **options)
     except ValueError as error:  # the format cannot hold them
         raise UsageError(f"{writer.name}: {error}") from None
     lost = [replace(finding, file=path.name) for finding in describe_losses(splats, writer)]

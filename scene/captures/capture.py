@@ -31,6 +31,7 @@ class Photo:
     mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
     float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
     band: int = 0  # which of several that its file holds, counted from 1; 0: it holds one
+    mode: str = ""  # what its pixels are, as PIL names it ("RGB", "L", "I;16"); "": not looked at
     no_value: NoValue = SAID_NOTHING  # which of its numbers are none, beside what its file says
     may_lack_values: bool = (
         False  # whether a pixel may have none: its header or its capture says so

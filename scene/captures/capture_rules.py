@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -236,18 +236,16 @@ def upright_rotation(up: object, where: str) -> np.ndarray:
     return out
 
 
-def spread_stops(names: Iterable[str]) -> tuple[Stop, ...]:
-    """Stops evenly from 0 to 1 in the order of the names, the kind read from the name; names that
-    are dates are stops of visible light as far apart as these.
+def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop, ...]:
+    """Stops evenly from 0 to 1 in the order of the names, the kind read from the name unless it is
+    given; names that are dates are stops of visible light as far apart as these.
     """
     names = list(names)
+    kinds = kinds or [guess_kind(name, len(names)) for name in names]
     if dated := named_by_date(names):
         return dated
     xs = np.linspace(0, 1, len(names)) if len(names) > 1 else [0.0]
-    return tuple(
-        Stop(name, float(x), guess_kind(name, len(names)))
-        for name, x in zip(names, xs, strict=True)
-    )
+    return tuple(Stop(name, float(x), kind) for name, x, kind in zip(names, xs, kinds, strict=True))
 
 
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:

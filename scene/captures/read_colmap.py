@@ -7,21 +7,24 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, shown
-from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.files.json_fields import Fields
 from shapeshift.runtime_models.model import BadFile, Stop
-from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.read_colmap_cameras import camera_pose, other_lengths
 from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.capture_found import FileTable
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
-from shapeshift.scene.capture_photos import doubts_of, fits, posed_photos, refuse_all_missing
+from shapeshift.scene.capture_photos import (
+    doubts_of,
+    fits,
+    image_size,
+    posed_photos,
+    refuse_all_missing,
+)
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    spread_stops,
     stops_from,
     with_counts,
 )
@@ -34,9 +37,13 @@ from shapeshift.scene.captures.colmap.colmap_files import (
     points_of,
 )
 from shapeshift.scene.captures.colmap.rig_frames import refused_poses
-from shapeshift.scene.captures.colmap_tables import find_model, read_tables
+from shapeshift.scene.captures.colmap_tables import Posed, find_model, read_tables
+from shapeshift.scene.captures.modalities.frame_modalities import said_beside
+from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
+from shapeshift.scene.captures.modalities.said_modalities import said_modality_of
+from shapeshift.scene.captures.modalities.twin_photos import with_twins
+from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
 from shapeshift.scene.captures.radiometric.stated_bands import of_each_band, sharing_folders
-from shapeshift.scene.captures.read_transforms import read_capture_json
 
 
 def read_colmap(folder: Path) -> Capture:
@@ -48,12 +55,13 @@ def read_colmap(folder: Path) -> Capture:
     folder = base if model == folder else folder
     root = photos_folder(base)
     lenses, images = read_tables(model, ending, root)
-    posed = sorted(images, key=lambda image: image.name)
-    said = read_capture_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
-    stops, modality_of = modalities(said, [i.name for i in posed], folder)
+    posed, unpaired = with_twins(sorted(images, key=lambda image: image.name), root)
+    names = [image.name for image in posed]
+    paths = [find_file(root, name, ("",)).path for name in names]
+    said = said_beside(folder)
+    stops, modality_of = modalities(said, posed, paths, folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
     world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
-    paths = [find_file(root, image.name, ("",)).path for image in posed]
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
@@ -63,26 +71,29 @@ def read_colmap(folder: Path) -> Capture:
     photos: list[Photo] = []
     rescaled: list[str] = []
     turned: list[str] = []
-    for image, path, world_from_camera in compress(zip(posed, paths, cameras, strict=True), there):
+    rows = zip(posed, paths, cameras, modality_of, splits_of(names), strict=True)
+    for image, path, world_from_camera, modality, split in compress(rows, there):
         lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
-        made = posed_photos(path, modality_of[image.name], matrix, lens, where)
+        made = posed_photos(path, modality, matrix, lens, where)
         mask = masks.get(path)
         if mask is not None:
             refuse_other_mask(mask, made[0].file_size)
-        photos += [replace(photo, mask=mask, mask_means=means) for photo in made]
+        photos += [replace(p, mask=mask, mask_means=means, split=split or p.split) for p in made]
         if made[0].file_size != lens.size:
             (rescaled if fits(lens.size, made[0].file_size) else turned).append(str(path))
     points, colors, more = points_of(model, ending)
     table.used("points", 0 if points is None else len(points))
-    photos = listed_split(photos, folder, root, table)
+    if guessed := not said.get("modalities"):
+        numbers = {path: str(image.lens) for path, image in zip(paths, posed, strict=True)}
+        refuse_two_sorts(opened_photos(photos, root, numbers), stops, folder)
+    photos = listed_split(photos, folder, root, table, by_folder=any(splits_of(names)))
     photos = of_each_band(photos, sharing_folders(said.get("modalities") or (), str(folder)))
     photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
-    guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
-    doubts += other_lengths(posed) + refused_poses(model, ending, posed)
+    doubts += unpaired + other_lengths(images) + refused_poses(model, ending, images)
     table.photos(photos, missing)
     table.partners("masks", photos)
     left_beside(base, model, ending, table)
@@ -94,32 +105,18 @@ def read_colmap(folder: Path) -> Capture:
 
 
 def modalities(
-    said: dict, names: list[str], folder: Path
-) -> tuple[tuple[Stop, ...], dict[str, str]]:
-    """Stops, and image name -> stop name, from capture.json or else from the sub-folders."""
+    said: dict, posed: list[Posed], paths: list[Path], folder: Path
+) -> tuple[tuple[Stop, ...], list[str]]:
+    """Stops, and of each image the name of its stop: from capture.json, or else from the names."""
+    names = [image.name for image in posed]
     if not said.get("modalities"):
-        first = {n: n.split("/")[0] if "/" in n else "RGB" for n in names}
-        # Visible light first, then heat, then the rest by name.
-        order = {"rgb": 0, "thermal": 1, "layer": 2}
-        found = sorted(set(first.values()), key=lambda n: (order[guess_kind(n, 2)], n))
-        return spread_stops(found), first
+        return modalities_of(names, folder)
     where, entries = f"{folder}/capture.json", said["modalities"]
     stops = stops_from(entries, where)
-    of: dict = {}
-    sharing = sharing_folders(entries, where)
-    bands = {name for names in sharing.values() for name in names[1:]}  # of the first's photos
-    for stop, entry in zip(stops, entries, strict=True):
-        if stop.formula or stop.name in bands:
-            continue
-        prefix = Fields(entry, where).text("folder", stop.name).rstrip("/") + "/"
-        mine = [n for n in names if n.startswith(prefix)]
-        if not mine:
-            raise BadFile(
-                f"{where}: modality {shown(stop.name)} has no images under "
-                f"images/{path_end(prefix)}; add them to the COLMAP model or drop the modality"
-            )
-        of |= dict.fromkeys(mine, stop.name)
-    left = sorted(set(names) - set(of))
-    if left:
-        raise BadFile(f"{where}: image {left[0]} belongs to no listed modality")
+
+    def cameras_of(row: int) -> set[str]:
+        size = image_size(paths[row], None) if os.path.isfile(paths[row]) else (0, 0)
+        return {str(posed[row].lens), "{}x{}".format(*size)}
+
+    of = said_modality_of(entries, stops, names, where, cameras_of)
     return tuple(sorted(stops, key=lambda s: s.x)), of

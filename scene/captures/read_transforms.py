@@ -2,13 +2,13 @@
 
 import os
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
+from shapeshift.runtime_models.files.json_fields import Fields, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_files import files_below, find_file, photo_key
@@ -27,19 +27,26 @@ from shapeshift.scene.captures.capture_rules import (
     background_from,
     rigid,
     split_every_8th,
-    spread_stops,
-    stops_from,
     with_counts,
 )
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
-from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import in_millimetres, refuse_other_units, with_depth
 from shapeshift.scene.captures.lenses.frame_lens import lens_of
 from shapeshift.scene.captures.lenses.panorama import is_panorama, stereo_sentences
+from shapeshift.scene.captures.modalities.frame_modalities import (
+    read_capture_json,
+    stops_of_frames,
+)
+from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
-from shapeshift.scene.captures.radiometric.stated_bands import stated_bands
+from shapeshift.scene.captures.radiometric.stated_bands import (
+    of_each_band,
+    only_bands,
+    sharing_folders,
+    stated_bands,
+)
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.mask_files import find_masks
 from shapeshift.scene.pose import OPENCV_FROM_EYE
@@ -92,16 +99,15 @@ def capture_of(
     that frames name are worth a word.  Raises BadFile.
     """
     table = table or FileTable()
-    stops = stops_of(data, entries, where)
-    named = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
+    stops, usual, told = stops_of_frames(folder, data, entries, where)
+    listed = data.get("modalities") or told
+    rows, bands = enumerate(zip(entries, usual, strict=True)), stated_bands(listed, where)
+    sharing = sharing_folders(told, where)
+    named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where, bands)]
     shots = [shot for shot in named if os.path.isfile(shot.path)]
     missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
     refuse_all_missing(missing, len(named), where)
-    for stop in stops:
-        if not stop.formula and not any(s.modality == stop.name for s in shots):
-            raise BadFile(
-                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
-            )
+    refuse_without_images(stops, shots, only_bands(sharing), where)
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
         (0, 0, 1),
@@ -111,14 +117,16 @@ def capture_of(
     photos, doubts = photos_and_doubts(shots, world, folder, missing, table)
     doubts += doubts_of_entries(shots, entries)
     photos, unsure = meant_by_masks(photos)
-    photos = with_counts(photos, data.get("modalities"), where)
+    photos = with_counts(of_each_band(photos, sharing), listed, where)
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors, more = points_of(folder, data, where)
     table.used("points", 0 if points is None else len(points))
     if alone:
         unnamed_files(folder, photos, table)
-    described = any(isinstance(m, dict) for m in data.get("modalities") or ())
+    described = any(isinstance(m, dict) for m in listed)
+    if not (told or data.get("modalities") or any("modality" in e for e in entries)):
+        refuse_two_sorts(opened_photos(photos, folder), stops, folder)
     background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
     capture = world.capture(
         folder,
@@ -279,46 +287,30 @@ def listed(frames: list[dict], data: dict, file: Path, table: FileTable) -> list
     return used
 
 
-def read_capture_json(file: Path) -> dict:
-    """The object of a file; a version of our own form that is not known is refused."""
-    data = read_json(file, most_bytes=MOST_BYTES)
-    if not isinstance(data, dict):
-        raise BadFile(f"{file} holds {shown(data)}; an object with 'frames' is wanted")
-    if data.get("format", "shapeshift-capture") == "shapeshift-capture":
-        version = data.get("version", 1)
-        if version != 1:
+def refuse_without_images(
+    stops: tuple[Stop, ...], shots: Sequence[Shot], bands: Container[str], where: str
+) -> None:
+    """Raises BadFile for a modality without one.  bands: those whose photos are of another."""
+    there = {shot.modality for shot in shots}
+    for stop in stops:
+        if not (stop.formula or stop.name in bands or stop.name in there):
             raise BadFile(
-                f"{file}: version {shown(version)} of the capture form; this program reads 1"
+                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
             )
-    return data
-
-
-def stops_of(data: dict, entries: Sequence[Mapping], where: str) -> tuple[Stop, ...]:
-    listed = data.get("modalities")
-    if not listed:
-        names = [
-            Fields(entry, f"{where}: frame {i}").text("modality", usual_modality(entry, where, i))
-            for i, entry in enumerate(entries)
-        ]
-        if "" in names:
-            raise BadFile(f"{where}: frame {names.index('')}: 'modality' is empty; give it a name")
-        return spread_stops(dict.fromkeys(names))
-    if isinstance(listed, list) and all(isinstance(name, str) and name for name in listed):
-        if len(set(listed)) < len(listed):
-            raise BadFile(f"{where}: two modalities have the same name; rename one")
-        return spread_stops(listed)
-    return tuple(sorted(stops_from(listed, where), key=lambda stop: stop.x))
-
-
-def usual_modality(entry: Mapping, where: str, number: int) -> str:
-    """Of a frame that names none."""
-    return day_of_frame(entry, f"{where}: frame {number}") or "RGB"
 
 
 def shots_of(
-    entry: Mapping, number: int, data: dict, stops: tuple[Stop, ...], folder: Path, where: str
+    entry: Mapping,
+    number: int,
+    usual: str,
+    stops: tuple[Stop, ...],
+    folder: Path,
+    where: str,
+    bands: Container[str] = (),
 ) -> list[Shot]:
-    """The photos of one frame: one, or one a modality where the frame names none of several."""
+    """The photos of one frame: one, or one a modality where neither the frame names one of several
+    nor `usual`, what is known of it otherwise.  bands: modalities that are bands of its own file.
+    """
     where = f"{where}: frame {number}"
     fields = Fields(entry, where)
     file = fields.text("file_path", "") or fields.text("file", "")
@@ -332,9 +324,8 @@ def shots_of(
     if not opencv_axes(entry):
         matrix = matrix @ OPENCV_FROM_EYE
     names = [s.name for s in stops if not s.formula]
-    day = "" if "modality" in entry else day_of_frame(entry, where)
-    if "modality" in entry or day or len(names) == 1:
-        modality = fields.text("modality", day or names[0])
+    if "modality" in entry or usual or len(names) == 1:
+        modality = fields.text("modality", usual or names[0])
         if modality not in names:
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
@@ -342,7 +333,6 @@ def shots_of(
         path, elsewhere = find_file(folder, file)
         return [Shot(entry, modality, path, matrix, where, folder, elsewhere)]
     shots = []
-    bands = stated_bands(data.get("modalities"), where)
     for name in names:
         place = folder if name in bands else folder / name
         path, elsewhere = find_file(place, file)

@@ -121,8 +121,11 @@ def unread_folders(base: Path, table: FileTable) -> None:
         table.left_out(kind, files, "a COLMAP model names none; a transforms.json can")
 
 
-def listed_split(photos: list[Photo], folder: Path, root: Path, table: FileTable) -> list[Photo]:
-    """By nerfstudio's lists beside the model, a name a line; without them every 8th is held out.
+def listed_split(
+    photos: list[Photo], folder: Path, root: Path, table: FileTable, by_folder: bool
+) -> list[Photo]:
+    """By nerfstudio's lists beside the model, a name a line; without them as it is where the
+    photos' folders say it, else every 8th is held out.
 
     Photos in none of the lists are not used.  Names are compared as photos are found.
     """
@@ -133,7 +136,7 @@ def listed_split(photos: list[Photo], folder: Path, root: Path, table: FileTable
                 if text := line.decode("utf-8", "replace").strip():
                     splits[photo_key(text).removeprefix("images/")] = name, text, split
     if not splits:
-        return split_every_8th(photos)
+        return photos if by_folder else split_every_8th(photos)
     used, left, taken = [], [], set()
     for photo in photos:
         key = photo_key(Path(os.path.relpath(photo.path, root)).as_posix())

@@ -49,8 +49,9 @@ class PhotoIndex:
         """
         if "/" in name or "\\" in name:
             found = find_file(self.folder, name, ("",))
-            if os.path.isfile(found.path) and not found.elsewhere:
-                return [name]
+            inside = not os.path.isabs(name) and ".." not in parts_of(name)
+            if inside and os.path.isfile(found.path) and not found.elsewhere:
+                return [found.path.relative_to(self.folder).as_posix()]
         parts = parts_of(name)
         last = folded(parts[-1])
         alike = self.by_name.get(last) or self.by_stem.get(last)
@@ -113,7 +114,8 @@ class Gathered:
 
     def leave(self, name: str, why: str) -> None:
         self.named += 1
-        self.left.setdefault(why, []).append(name)
+        found = self.photos.find(name)
+        self.left.setdefault(why, []).append(found[0] if len(found) == 1 else name)
 
     def add(
         self,
@@ -158,11 +160,26 @@ class Gathered:
             *said,
             *self.doubts,
         )
-        folder, where = self.photos.folder, str(self.path)
+        folder, where = self.photos_where_they_were(), str(self.path)
         return PosedFrames(
             folder, where, self.frames, doubts, self.left,
             points=self.points, colors=self.colors, program=self.program,
         )  # fmt: skip
+
+    def photos_where_they_were(self) -> Path:
+        """The folder of the photos; where none lies with the file, as in Meshroom's cache, that of
+        the photos which it names by whole paths of this machine."""
+        names = [str(frame["file_path"]) for frame in self.frames]
+        folder = self.photos.folder
+        whole = [os.path.isabs(name) for name in names]
+        if all(whole) and any(map(os.path.isfile, names)):
+            folder = Path(os.path.commonpath([os.path.dirname(name) for name in names]))
+        for frame, name, absolute in zip(self.frames, names, whole, strict=True):
+            if absolute and Path(name).is_relative_to(folder):
+                frame["file_path"] = Path(name).relative_to(folder).as_posix()
+            elif absolute:  # one of them may be there: it is of another place
+                frame["file_path"] = "/".join(parts_of(name))
+        return folder
 
 
 def lens_words(lens: ColmapCamera | None) -> dict:

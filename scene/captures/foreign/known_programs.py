@@ -53,8 +53,6 @@ PROGRAMS = (
     Program("Pix4D's matrices without lenses", PIX4D, ("_pmatrix.txt",)),
     Program("a pickle or arrays of a network (VGGT, DUSt3R, MASt3R, VGGSfM)", NETWORK,
             (".npz", ".npy", ".pkl", ".pt", ".pth")),
-    Program("RealityScan's XMP beside each photo, whose places are those of its own grid",
-            REALITYSCAN, (".xmp",), within=(b"xcr:",)),
 )  # fmt: skip
 
 

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 from shapeshift.scene.captures.colmap_tables import RADIAL_BACKWARDS, ColmapCamera
 from shapeshift.scene.captures.foreign.foreign_frames import (
     Gathered,
@@ -36,13 +38,18 @@ class Words:
             value = math.nan if word is None else float(word)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
+        if not abs(value) <= LARGEST_NUMBER:  # NaN is not
             found = "the file ends" if word is None else f"{word[:40]!r} stands"
             raise BadFile(f"{self.path}: {found} where a number is wanted; {AGAIN}.")
         return value
 
     def numbers(self, count: int) -> list[float]:
         return [self.number() for _ in range(count)]
+
+    def skip(self, count: int) -> None:
+        """Raises BadFile at the end, so that no count in a file makes this long."""
+        if sum(1 for _ in islice(self.words, count)) < count:
+            raise BadFile(f"{self.path} ends before its last row; {AGAIN}.")
 
     def count(self, most: int) -> int:
         value = self.number()
@@ -79,8 +86,7 @@ def bundler_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     out.points, out.colors = np.zeros((points, 3)), np.zeros((points, 3))
     for i in range(points):
         out.points[i], out.colors[i] = words.numbers(3), words.numbers(3)
-        for _ in range(4 * words.count(most)):
-            next(words.words, None)
+        words.skip(4 * words.count(most))
     out.colors /= 255
     return out.finished()
 

@@ -19,11 +19,13 @@ from shapeshift.scene.captures.foreign.read_pix4d import MARK as PIX4D_MARK
 from shapeshift.scene.captures.foreign.read_pix4d import pix4d_frames
 from shapeshift.scene.captures.foreign.read_realityscan import realityscan_frames
 from shapeshift.scene.captures.foreign.read_scaniverse import scaniverse_frames
+from shapeshift.scene.captures.foreign.read_xmp import xmp_frames
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 
 PEEK_BYTES = 1 << 16
 MOST_LOOKED_AT = 400  # files of a folder, and folders in it
-ENDINGS = {".xml", ".csv", ".json", ".sfm", ".out", ".nvm", ".txt", ".geojson"}
+ENDINGS = {".xml", ".csv", ".json", ".sfm", ".out", ".nvm", ".txt", ".geojson", ".xmp"}
+XMP = ".xmp"  # one beside each photo
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ FORMS = (
     Form("Metashape", metashape_frames, (r"<document\b", r"<chunk\b"), (".xml",)),
     Form("Blocks Exchange", blocks_frames, (r"<BlocksExchange\b",), (".xml",)),
     Form("RealityScan", realityscan_frames,
-         (r"(?im)^\W*#?name\s*[,;\t]\s*x\s*[,;\t]\s*y\s*[,;\t].*(heading|yaw)",), (".csv", ".txt")),
+         (r"(?im)^\ufeff?#?name *[,;\t] *x *[,;\t] *y *[,;\t].*(heading|yaw)",), (".csv", ".txt")),
     Form("OpenMVG", openmvg_frames, (r'"sfm_data_version"',), (".json",)),
     Form("Scaniverse", scaniverse_frames, (r'"largeImageSize"', r'"smallImageSize"'), (".json",)),
     Form("Meshroom", alicevision_frames, (r'"version"', r'"viewId"|"intrinsicId"|"poseId"'),
@@ -49,6 +51,7 @@ FORMS = (
          (".geojson", ".json")),
     Form("OpenSfM", opensfm_frames, (r"^\s*\[\s*\{", r'"projection_type"'), (".json",)),
     Form("Bundler", bundler_frames, (r"^\s*# Bundle file",), (".out", ".txt")),
+    Form("RealityScan", xmp_frames, (r"xcr:Rotation",), (XMP,)),
     Form("VisualSFM", nvm_frames, (r"^\s*NVM_V3",), (".nvm",)),
     Form("Pix4D", pix4d_frames, (PIX4D_MARK,), (".txt",)),
 )  # fmt: skip
@@ -94,7 +97,9 @@ def files_of(folder: Path) -> list[Path]:
 def forms_in(folder: Path) -> list[tuple[Path, Form]]:
     """The files of other programs' poses in a folder, the newest first."""
     found = [(p, form) for p in files_of(folder) if (form := form_of(p)) is not None]
-    return sorted(found, key=lambda row: -row[0].stat().st_mtime_ns)
+    found.sort(key=lambda row: -row[0].stat().st_mtime_ns)
+    whole = [row for row in found if row[0].suffix.lower() != XMP]
+    return whole or found[:1]  # all of them are read together
 
 
 def find_foreign(folder: Path) -> list[tuple[Path, Form]]:

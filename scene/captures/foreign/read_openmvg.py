@@ -31,19 +31,19 @@ def openmvg_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     said = Fields(read_json(path, most_bytes=MOST_BYTES), str(path))
     out = Gathered(path, "OpenMVG", photos)
     names: dict[int, str] = {}  # of polymorphic types: only the first of a kind says its name
-    lenses: dict[object, ColmapCamera | None] = {}
+    lenses: dict[str, ColmapCamera | None] = {}
     for row in said.rows("intrinsics", MOST_ROWS, "intrinsic", 0):
-        lenses[row.value("key", None)] = lens_of(row, names)
+        lenses[str(row.value("key", None))] = lens_of(row, names)
     poses = {}
     for row in said.rows("extrinsics", MOST_ROWS, "extrinsic", 0):
         pose = row.object("value")
         rotation = rows_of(pose, "rotation", 3)
-        poses[row.value("key", None)] = world_from(rotation, pose.numbers("center", 3))
+        poses[str(row.value("key", None))] = world_from(rotation, pose.numbers("center", 3))
     for row in said.rows("views", MOST_ROWS, "view", 0):
         view = row.object("value").object("ptr_wrapper").object("data")
         name = "/".join(filter(None, (view.text("local_path", ""), view.text("filename"))))
-        pose = poses.get(view.value("id_pose", None))
-        lens = lenses.get(view.value("id_intrinsic", None))
+        pose = poses.get(str(view.value("id_pose", None)))
+        lens = lenses.get(str(view.value("id_intrinsic", None)))
         if pose is None:
             out.leave(name, "have no pose")
         elif lens is None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.foreign.foreign_frames import (
     Z_UP,
@@ -94,7 +95,7 @@ def number_in(text: str, where: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) <= LARGEST_NUMBER:  # NaN is not
         raise BadFile(f"{where}: {text[:40]!r} is no number; export it again with decimal points")
     return value
 

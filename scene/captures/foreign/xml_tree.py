@@ -6,8 +6,9 @@ from xml.parsers import expat
 
 from shapeshift.runtime_models.files.memory import Memory, refuse_empty
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 
-A_BYTE = 32  # of memory for each byte: "<a/>" becomes an element of over 100
+A_BYTE = 48  # of memory for each byte: "<a b=''/>" becomes an element with a dictionary, 400
 MOST_BYTES = 1 << 30
 DEEPEST = 100  # elements in elements
 
@@ -85,6 +86,6 @@ def numbers_in(text: str, count: int, where: str) -> list[float]:
 
 
 def finite(value: float) -> float:
-    if not abs(value) < float("inf"):
+    if not abs(value) <= LARGEST_NUMBER:  # NaN is not
         raise ValueError
     return value

@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.capture_files import find_file, photo_key
 from shapeshift.scene.capture_found import FileTable
-from shapeshift.scene.captures.capture import LEFT_HANDED, Capture
+from shapeshift.scene.captures.capture import LEFT_HANDED, Capture, FoundFiles
 from shapeshift.scene.captures.capture_rules import turn_of_world
 from shapeshift.scene.captures.read_transforms import capture_of
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
@@ -85,4 +85,5 @@ def with_points(capture: Capture, posed: PosedFrames) -> Capture:
     ours = (points[good] @ turn.T - np.array(capture.origin)).astype(np.float32)
     if colors is not None:
         colors = np.clip(colors[good], 0, 1).astype(np.float32)
-    return replace(capture, points=ours, point_colors=colors)
+    files = (*capture.files, FoundFiles("points", len(ours), len(ours), 0))
+    return replace(capture, points=ours, point_colors=colors, files=files)

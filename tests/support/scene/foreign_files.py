@@ -152,6 +152,22 @@ def realityscan(folder, shots, lens, newer=False) -> Path:
     return written(folder / "cameras.csv", "\r\n".join(filter(None, rows)) + "\r\n")
 
 
+def xmp(folder, shots, lens) -> Path:
+    each = [lens[k] for k in ("k1", "k2", "k3", "k4", "t1", "t2")]
+    for shot in shots:
+        file = written(
+            folder / Path(shot.name).with_suffix(".xmp"),
+            '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="r"><rdf:Description '
+            'xcr:Version="3" xcr:PosePrior="locked" xcr:DistortionModel="brown4t2" '
+            f'xcr:FocalLength35mm="{lens["f"]}" xcr:Skew="0" xcr:AspectRatio="1" '
+            f'xcr:PrincipalPointU="{lens["px"]}" xcr:PrincipalPointV="{lens["py"]}" '
+            f'xmlns:xcr="c"><xcr:Rotation>{words(shot.rotation)}</xcr:Rotation>'
+            f"<xcr:Position>{words(shot.centre)}</xcr:Position><xcr:DistortionCoeficients>"
+            f"{words(each)}</xcr:DistortionCoeficients></rdf:Description></rdf:RDF></x:xmpmeta>",
+        )
+    return file
+
+
 def openmvg(folder, shots, lens, kind, bends: dict, nested=False) -> Path:
     base = {"width": SIZE[0], "height": SIZE[1]}
     if lens:

@@ -15,6 +15,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.foreign.read_realityscan import world_from_angles
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.undistort import pixels_of
 from tests.support.scene import foreign_files as write
@@ -179,6 +180,7 @@ def cases():
         epic,
         (0, 0, 1),
     )
+    out["realityscan, xmp"] = (lambda d: write.xmp(d, air, r), air, epic, (0, 0, 1))
     lens = (37.0, 21.0, 14.5)
     out["openmvg k3"] = (
         lambda d: write.openmvg(d, sfm, lens, "pinhole_radial_k3",
@@ -360,6 +362,16 @@ def test_points_lie_where_the_programs_own_formula_puts_them(name, tmp_path):
     capture = read_capture(folder)
     centre = np.mean([s.centre for s in shots], axis=0)
     compare(capture, shots, formula, up, POINTS * 0.9 + middle_of(shots) - centre)
+
+
+def test_realityscans_angles_are_its_matrix():
+    """A camera that a user published with both, from its XMP and its CSV (two decimals less)."""
+    matrix = [[0.982594073038806, 0.185426733553445, -0.0112166890261935],
+              [-0.032113633044729, 0.11008102707942, -0.993403685341366],
+              [-0.18296885582437, 0.976472781986697, 0.114]]  # fmt: skip
+    angles = np.radians([163.736597399311, 83.4154313461628, 174.386496244756])
+    found = np.diag([1, -1, -1]) @ world_from_angles(*angles).T
+    assert np.abs(found - matrix)[:2].max() < 1e-12 and np.abs(found - matrix).max() < 2e-4
 
 
 def middle_of(shots: list[Shot]) -> np.ndarray:

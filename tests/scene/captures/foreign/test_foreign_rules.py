@@ -147,6 +147,18 @@ def test_survey_coordinates_keep_their_places(photos):
     assert max(map(abs, capture.photos[0].view.world_from_eye.position)) < 1000
 
 
+def test_photos_that_a_file_names_by_whole_paths_are_used_where_they_are(tmp_path):
+    """Meshroom's cache lies elsewhere."""
+    save_photos(tmp_path / "photos", SHOTS)
+    file = write.alicevision(
+        tmp_path / "MeshroomCache/StructureFromMotion/a1", SHOTS, (1, 0, 0),
+        {"type": "radial1", "pxFocalLength": "37", "principalPoint": ["20", "15"],
+         "distortionParams": ["0"]},
+    )  # fmt: skip
+    file.write_text(file.read_text().replace("/home/them/photos", str(tmp_path / "photos")))
+    assert {p.path for p in read_capture(file).photos} == {tmp_path / "photos" / n for n in ALL}
+
+
 BOMB = """<?xml version="1.0"?><!DOCTYPE document [<!ENTITY a "aaaaaaaaaa">
 <!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>"""
 
@@ -188,6 +200,9 @@ def test_xml_of_a_gigabyte_is_refused_before_it_is_read(photos, monkeypatch):
         (lambda d: write.bundler(d, SHOTS, (38.0, 0.0, 0.0)), ("\n5 1\n", "\n9999999 1\n"),
          "claims"),
         (lambda d: write.bundler(d, SHOTS, (38.0, 0.0, 0.0)), ("38.0", "inf"), "'inf' stands"),
+        (lambda d: write.bundler(d, SHOTS, (38.0, 0.0, 0.0)), ("\n2 0 1 1", "\n900 0 1 1"), "ends"),
+        (lambda d: write.openmvg(d, SHOTS, (38.0, 20.0, 15.0), "pinhole", {}),
+         ('"key": 0', '"key": [0]'), "lens|pose"),
         (lambda d: write.nvm(d, SHOTS, 38.0, 0.0), ("38.0", "x"), "'x' stands"),
         (lambda d: write.nvm(d, SHOTS, 38.0, 0.0), ("\n5\n", "\n6\n"), "no name with ten numbers"),
         (lambda d: write.opensfm(d, SHOTS, CAMERA),

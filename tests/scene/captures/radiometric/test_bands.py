@@ -190,6 +190,26 @@ def test_bands_of_a_colmap_model_share_a_folder(tmp_path):
     assert [stop.name for stop in capture.formulas] == ["NDVI"]
 
 
+def test_capture_json_says_the_bands_of_frames_beside_it(tmp_path):
+    wanted = [numbers("u2", 4) // (i + 1) for i in range(2)]
+    frames, rest = simple(tmp_path, 2)
+    for i, frame in enumerate(frames):
+        write_bands(tmp_path / f"{i}.tif", wanted[i])
+        frame["file_path"] = f"{i}.tif"
+    write_transforms(tmp_path, frames, **rest)
+    said = [band | {"folder": ""} for band in of_bands("Blue", "Green")] + [
+        NDVI | {"formula": "blue / green"}
+    ]
+    (tmp_path / "capture.json").write_text(json.dumps({"modalities": said}), encoding="utf-8")
+    capture = read_capture(tmp_path)
+    counts = Counter(photo.modality for photo in capture.photos)
+    assert counts == {"Blue": 2, "Green": 2} and len(capture.formulas) == 1
+    for photo in capture.photos:
+        shown = load_photo(photo).rgb[..., 0]
+        bands = wanted[int(photo.path.stem)][photo.band - 1]
+        assert np.abs(shown - np.clip(bands / 60000, 0, 1) * 255).max() <= 0.5
+
+
 def test_a_tiff_of_bands_without_a_band_is_refused(tmp_path):
     write_bands(tmp_path / "0.tif", numbers("u2", 4))
     write_bands(tmp_path / "1.tif", numbers("u2", 4))
