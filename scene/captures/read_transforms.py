@@ -2,7 +2,7 @@
 
 import os
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,6 +41,12 @@ from shapeshift.scene.captures.modalities.frame_modalities import (
 from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
+from shapeshift.scene.captures.radiometric.stated_bands import (
+    of_each_band,
+    only_bands,
+    sharing_folders,
+    stated_bands,
+)
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.mask_files import find_masks
 from shapeshift.scene.pose import OPENCV_FROM_EYE
@@ -94,16 +100,14 @@ def capture_of(
     """
     table = table or FileTable()
     stops, usual, told = stops_of_frames(folder, data, entries, where)
-    rows = enumerate(zip(entries, usual, strict=True))
-    named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where)]
+    listed = data.get("modalities") or told
+    rows, bands = enumerate(zip(entries, usual, strict=True)), stated_bands(listed, where)
+    sharing = sharing_folders(told, where)
+    named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where, bands)]
     shots = [shot for shot in named if os.path.isfile(shot.path)]
     missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
     refuse_all_missing(missing, len(named), where)
-    for stop in stops:
-        if not stop.formula and not any(s.modality == stop.name for s in shots):
-            raise BadFile(
-                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
-            )
+    refuse_without_images(stops, shots, only_bands(sharing), where)
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
         (0, 0, 1),
@@ -113,14 +117,14 @@ def capture_of(
     photos, doubts = photos_and_doubts(shots, world, folder, missing, table)
     doubts += doubts_of_entries(shots, entries)
     photos, unsure = meant_by_masks(photos)
-    photos = with_counts(photos, data.get("modalities") or told, where)
+    photos = with_counts(of_each_band(photos, sharing), listed, where)
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors, more = points_of(folder, data, where)
     table.used("points", 0 if points is None else len(points))
     if alone:
         unnamed_files(folder, photos, table)
-    described = any(isinstance(m, dict) for m in data.get("modalities") or told)
+    described = any(isinstance(m, dict) for m in listed)
     if not (told or data.get("modalities") or any("modality" in e for e in entries)):
         refuse_two_sorts(opened_photos(photos, folder), stops, folder)
     background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
@@ -283,11 +287,29 @@ def listed(frames: list[dict], data: dict, file: Path, table: FileTable) -> list
     return used
 
 
+def refuse_without_images(
+    stops: tuple[Stop, ...], shots: Sequence[Shot], bands: Container[str], where: str
+) -> None:
+    """Raises BadFile for a modality without one.  bands: those whose photos are of another."""
+    there = {shot.modality for shot in shots}
+    for stop in stops:
+        if not (stop.formula or stop.name in bands or stop.name in there):
+            raise BadFile(
+                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
+            )
+
+
 def shots_of(
-    entry: Mapping, number: int, usual: str, stops: tuple[Stop, ...], folder: Path, where: str
+    entry: Mapping,
+    number: int,
+    usual: str,
+    stops: tuple[Stop, ...],
+    folder: Path,
+    where: str,
+    bands: Container[str] = (),
 ) -> list[Shot]:
     """The photos of one frame: one, or one a modality where neither the frame names one of several
-    nor `usual`, what is known of it otherwise.
+    nor `usual`, what is known of it otherwise.  bands: modalities that are bands of its own file.
     """
     where = f"{where}: frame {number}"
     fields = Fields(entry, where)
@@ -312,8 +334,9 @@ def shots_of(
         return [Shot(entry, modality, path, matrix, where, folder, elsewhere)]
     shots = []
     for name in names:
-        path, elsewhere = find_file(folder / name, file)
-        shots.append(Shot(entry, name, path, matrix, where, folder / name, elsewhere))
+        place = folder if name in bands else folder / name
+        path, elsewhere = find_file(place, file)
+        shots.append(Shot(entry, name, path, matrix, where, place, elsewhere))
     return shots
 
 
