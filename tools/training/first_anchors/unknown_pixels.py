@@ -1,7 +1,7 @@
 """What pixels without a value cost: trained with them, against photos that have all values.
 
-    python3 tools/training/first_anchors/unknown_pixels.py --out docs/bench/unknown.csv [--iterations 400] \
-        [--side 96] [--photos 24] [--seeds 0 1]
+    python3 tools/training/first_anchors/unknown_pixels.py --out docs/bench/unknown.csv \
+        [--iterations 300] [--side 64] [--photos 24] [--seeds 0 1]
 
 A ray-traced capture of balls, its heat as TIFF files of floats.  border: two pixels along the edges
 are -9999, as GDAL's tag says; halves: the left half of every second photo is NaN; corners: what a
@@ -86,8 +86,8 @@ def heat_capture(source: Capture, folder: Path, case: str, how: str) -> Capture:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--iterations", type=int, default=400)
-    parser.add_argument("--side", type=int, default=96)
+    parser.add_argument("--iterations", type=int, default=300)
+    parser.add_argument("--side", type=int, default=64)
     parser.add_argument("--photos", type=int, default=24)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1])
     options = parser.parse_args()

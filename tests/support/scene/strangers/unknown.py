@@ -52,7 +52,8 @@ def known(path: Path) -> str:
     share = sum(p.unknown for p in (*opened.train, *opened.test)) / (COUNT * warm(0).size)
     left = COUNT - len(opened.train) - len(opened.test)
     out = f", {left} photo left out" if left else ""
-    return f"{low:g} to {high:g}, {share:.0%} unknown{out}"
+    asked = ", asked about" if any("'no_data'" in doubt for doubt in capture.doubts) else ""
+    return f"{low:g} to {high:g}, {share:.0%} unknown{out}{asked}"
 
 
 def form(name: str, title: str, met: str, found: str) -> Situation:
@@ -68,11 +69,32 @@ SITUATIONS = [
     form("csv of blanks", "a CSV with blanks", "cells without a number", INSIDE),
     form("tag of counts", "counts with no data", "16-bit TIFF, 0 is no data by GDAL's tag", INSIDE),
     form("said", "no data that only you know", "'no_data': -32767 in capture.json", INSIDE),
-    form("above the range", "more than a camera measures",
-         "'valid_range': [-40, 550], pixels at 550.5", INSIDE),
-    Situation("untold -9999", "no data of which nothing says that it is none",
-              heat(".tif", -9999, None, {}), "", known),
-    Situation("a photo of NaN", "one of the photos was never measured",
-              without_one(np.nan, range(1, 2)), "16 to 103, 0% unknown, 1 photo left out", known),
-    Situation("photos of NaN", "none was measured", without_one(LOWEST, range(COUNT)), "", known),
+    form(
+        "above the range",
+        "more than a camera measures",
+        "'valid_range': [-40, 550], pixels at 550.5",
+        INSIDE,
+    ),
+    Situation(
+        "untold -9999",
+        "no data of which nothing says that it is none",
+        heat(".tif", -9999, None, {}),
+        "-10600 to 700, 0% unknown, asked about",
+        known,
+    ),
+    Situation(
+        "a photo of NaN",
+        "one of the photos was never measured",
+        without_one(np.nan, range(1, 2)),
+        "16 to 103, 0% unknown, 1 photo left out",
+        known,
+    ),
+    Situation(
+        "photos of NaN",
+        "none was measured",
+        without_one(LOWEST, range(COUNT)),
+        "refused: 0.tif: no pixel of it has a value, nor of the 3 photos of Thermal (NaN, or "
+        "what stands for no data)",
+        known,
+    ),
 ]
