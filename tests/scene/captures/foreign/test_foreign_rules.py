@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.cameras.read_cameras import read_camera_list
@@ -76,7 +75,7 @@ def test_the_newest_of_two_is_used_and_the_other_named(photos):
         os.utime(last, (2_000_000, 2_000_000))
         capture = read_capture(photos)
         assert f"The poses are those of {program}" in said(capture)
-        assert f"1 other files of poses lie there, for example {path_end(first)}" in said(capture)
+        assert f"Beside it lie {first.name} (" in said(capture)
 
 
 def test_photos_without_pose_and_missing_photos_are_counted(photos):
