@@ -65,7 +65,7 @@ def read_colmap(folder: Path) -> Capture:
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
-    table = FileTable()
+    table = FileTable(folder)
     masks = masks_of(base, root, list(compress(paths, there)), table)
     means = stated_meaning(Fields(said, f"{folder}/capture.json"))
     photos: list[Photo] = []

@@ -4,6 +4,7 @@ import os
 from collections import ChainMap
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +82,7 @@ class Shot:
 
 def read_transforms(*files: Path) -> Capture:
     """A capture from one JSON file, or from the train/val/test files of a Blender data set."""
-    table = FileTable()
+    table = FileTable(files[0].parent)
     return capture_of(files[0].parent, str(files[0]), *gather(files, table), table)
 
 
@@ -98,14 +99,15 @@ def capture_of(
     where: of the file, for messages; table: what was left out so far; alone: files beside those
     that frames name are worth a word.  Raises BadFile.
     """
-    table = table or FileTable()
+    table = table or FileTable(folder)
     stops, usual, told = stops_of_frames(folder, data, entries, where)
     listed = data.get("modalities") or told
     rows, bands = enumerate(zip(entries, usual, strict=True)), stated_bands(listed, where)
     sharing = sharing_folders(told, where)
     named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where, bands)]
-    shots = [shot for shot in named if os.path.isfile(shot.path)]
-    missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
+    there = [os.path.isfile(shot.path) for shot in named]
+    shots = list(compress(named, there))
+    missing = [str(shot.path) for shot, found in zip(named, there, strict=True) if not found]
     refuse_all_missing(missing, len(named), where)
     refuse_without_images(stops, shots, only_bands(sharing), where)
     world = CaptureWorld.of(
@@ -114,8 +116,7 @@ def capture_of(
         data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
-    photos, doubts = photos_and_doubts(shots, world, folder, missing, table)
-    doubts += doubts_of_entries(shots, entries)
+    photos, doubts = photos_and_doubts(shots, entries, world, folder, missing, table)
     photos, unsure = meant_by_masks(photos)
     photos = with_counts(of_each_band(photos, sharing), listed, where)
     if not any("split" in e for e in entries):
@@ -146,7 +147,12 @@ def capture_of(
 
 
 def photos_and_doubts(
-    shots: Sequence[Shot], world: CaptureWorld, folder: Path, missing: list[str], table: FileTable
+    shots: Sequence[Shot],
+    entries: Sequence[Mapping],
+    world: CaptureWorld,
+    folder: Path,
+    missing: list[str],
+    table: FileTable,
 ) -> tuple[list[Photo], tuple[str, ...]]:
     """missing: photos that are named and not there.  Raises BadFile."""
     lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
@@ -169,7 +175,7 @@ def photos_and_doubts(
     table.left_out("depth photos and normal maps", round_depth, "their photos are panoramas")
     named = len(shots) + len(missing)
     doubts = doubts_of(named, missing, photos, rescaled, no_depth, no_normals, turned)
-    return photos, doubts + stereo_sentences(lenses)
+    return photos, doubts + stereo_sentences(lenses) + doubts_of_entries(shots, entries)
 
 
 def unnamed_files(folder: Path, photos: Sequence[Photo], table: FileTable) -> None:
@@ -238,7 +244,7 @@ def gather(files: tuple[Path, ...], table: FileTable | None = None) -> tuple[dic
 
     table: gets what their lists leave out.
     """
-    table = table or FileTable()
+    table = table or FileTable(files[0].parent)
     everything: dict = {}
     entries: list[Mapping] = []
     for file in files:
