@@ -16,7 +16,7 @@ from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
-from tests.runtime_models.stops.test_formula_stop import model_of
+from tests.support.band_model import band_model
 from tests.support.scene.warm_wall import celsius_at, wall_view, write_wall
 
 INDEX = "(nir - red) / (nir + red)"
@@ -102,7 +102,7 @@ def test_packages_and_layers_with_other_formulas_are_refused(wall, tmp_path, for
 
 def test_style_adds_it_and_takes_it_out(tmp_path, capsys):
     path, out = tmp_path / "bands.shift", tmp_path / "ndvi.shift"
-    write_package(model_of(), path)
+    write_package(band_model(), path)
     words = ["style", str(path), "--formula", INDEX, "--name", "NDVI", "--range", "-1", "1"]
     assert (
         cli.main([*words, "--palette", "turbo", "--after", "red", "--no-pace", "--out", str(out)])
@@ -142,7 +142,7 @@ def test_style_adds_it_and_takes_it_out(tmp_path, capsys):
 )  # fmt: skip
 def test_what_style_cannot_add(tmp_path, capsys, words, said):
     path = tmp_path / "bands.shift"
-    write_package(model_of(), path)
+    write_package(band_model(), path)
     assert cli.main(["style", str(path), *words, "--out", str(tmp_path / "out.shift")]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and re.search(said, lines[0]), lines
