@@ -249,16 +249,19 @@ def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop,
 
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:
     """Stops of values get a palette where their photos are grey; false colours stay as they are."""
-
-    def grey(name: str) -> bool:
-        photo = next(p for p in photos if p.modality == name)
-        image = decoded(photo.path, photo.counts).image
-        return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
-
+    first = {photo.modality: photo for photo in reversed(photos)}
     return tuple(
-        replace(s, palette=USUAL_PALETTE[s.kind]) if s.is_measured and grey(s.name) else s
+        replace(s, palette=USUAL_PALETTE[s.kind])
+        if s.is_measured and is_grey(first[s.name].path, first[s.name].counts)
+        else s
         for s in stops
     )
+
+
+def is_grey(path: Path, counts: tuple[float, float] | None) -> bool:
+    """Whether no pixel of a photo has a colour.  counts: as of Photo."""
+    image = decoded(path, counts).image
+    return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
 
 def stops_from(listed: object, where: str) -> list[Stop]:
