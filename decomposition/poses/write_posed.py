@@ -74,7 +74,7 @@ def modalities_said(photos: PhotoList, placed: set[str], images: Path) -> list[d
         if not mine:
             continue
         usual = "" if photos.said else USUAL_PALETTE.get(stop.kind, "")
-        grey = usual and is_grey(images / names[mine[0]], None)
+        grey = usual and is_grey(images / names[mine[0]])
         palette = stop.palette or (usual if grey else "")
         groups.append(Group(stop.name, stop.kind, palette, mine))
         kept = own.get(stop.name, {}).items()

@@ -25,6 +25,7 @@ from shapeshift.scene.captures.dated_stops import (
 from shapeshift.scene.captures.photo import decoded, over_black
 from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
 from shapeshift.scene.captures.radiometric.number_photos import JPEGS
+from shapeshift.scene.captures.radiometric.stated_bands import with_bands
 from shapeshift.scene.captures.value_ranges import with_own_ranges
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
@@ -250,17 +251,20 @@ def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop,
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:
     """Stops of values get a palette where their photos are grey; false colours stay as they are."""
     first = {photo.modality: photo for photo in reversed(photos)}
+
+    def grey(name: str) -> bool:
+        photo = first[name]
+        return is_grey(photo.path, photo.counts, photo.band)
+
     return tuple(
-        replace(s, palette=USUAL_PALETTE[s.kind])
-        if s.is_measured and is_grey(first[s.name].path, first[s.name].counts)
-        else s
+        replace(s, palette=USUAL_PALETTE[s.kind]) if s.is_measured and grey(s.name) else s
         for s in stops
     )
 
 
-def is_grey(path: Path, counts: tuple[float, float] | None) -> bool:
-    """Whether no pixel of a photo has a colour.  counts: as of Photo."""
-    image = decoded(path, counts).image
+def is_grey(path: Path, counts: tuple[float, float] | None = None, band: int = 0) -> bool:
+    """Whether no pixel of a photo has a colour.  counts, band: as of Photo."""
+    image = decoded(path, counts, band=band).image
     return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
 
@@ -271,18 +275,7 @@ def stops_from(listed: object, where: str) -> list[Stop]:
     stops = [stop_from(row, where) for row in rows_of(listed, f"{where}: modality", 1)]
     if len({stop.name for stop in stops}) < len(stops):
         raise BadFile(f"{where}: two modalities have the same name; rename one")
-    for stop in stops:  # what it is of is known when the photos are
-        refuse_formula(stop, where)
     return list(placed_by_date(stops, where))
-
-
-def refuse_formula(stop: Stop, where: str) -> None:
-    """Raises BadFile for a formula that is none, before any photo is looked for."""
-    try:
-        if stop.formula:
-            read_formula(stop.formula)
-    except ValueError as error:
-        raise BadFile(f"{where}: modality {shown(stop.name)}: {error}") from None
 
 
 def stop_from(entry: Fields, where: str) -> Stop:
@@ -297,6 +290,8 @@ def stop_from(entry: Fields, where: str) -> Stop:
     ends = entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None
     palette, unit, formula = (entry.text(key, "") for key in ("palette", "unit", "formula"))
     try:
+        if formula:  # of which stops is looked at when their photos are there
+            read_formula(formula)
         return Stop(name, x, kind, palette, ends, unit, date, formula)
     except ValueError as error:
         raise BadFile(f"{entry.where}: {error}") from None
@@ -316,10 +311,10 @@ def with_counts(photos: list[Photo], listed: object, where: str) -> list[Photo]:
     """The photos with what the list of modalities says of the numbers in them."""
     counts, no_value = counts_from(listed, where), no_value_from(listed, where)
     out = []
-    for photo in photos:
+    for photo in with_bands(photos, listed, where):
         ends, said = counts.get(photo.modality), no_value.get(photo.modality, SAID_NOTHING)
         # A camera's own numbers lie in JPEG files, whose header is that of a picture.
-        numbers = ends is not None and photo.path.suffix.lower() in JPEGS
+        numbers = ends is not None and photo.path.suffix.lower() in JPEGS and not photo.band
         gaps = photo.may_lack_values or numbers or said != SAID_NOTHING
         out.append(replace(photo, counts=ends, no_value=said, may_lack_values=gaps))
     return out
@@ -376,7 +371,9 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     """
     found = []
     for photo in photos[:: max(1, len(photos) // 8)][:8]:
-        image, _, known = decoded(photo.path, photo.counts, no_value=photo.no_value)
+        image, _, known = decoded(
+            photo.path, photo.counts, no_value=photo.no_value, band=photo.band
+        )
         if photo.mask is not None or image.mode == "RGBA":
             return None
         border = border_of(np.asarray(image.convert("RGB")))
