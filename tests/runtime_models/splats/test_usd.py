@@ -101,6 +101,34 @@ def test_a_stage_says_its_up_and_its_units(tmp_path, up, metres):
     assert told == ([] if metres else ["it does not state metersPerUnit"])
 
 
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_a_writer_that_leaves_axes_as_they_are_is_known_by_its_comment(tmp_path, up):
+    """NVIDIA's gsplat2USD 0.1.5: a PLY's numbers under whatever upAxis it was asked for."""
+    splats = some_splats(20, 4)
+    stage = stage_with(tmp_path / "a.usda", splats, up)
+    stage.GetRootLayer().comment = "Converted from PLY/SPZ to USD using gsplat2USD\nSource file: a"
+    stage.Save()
+    back = read_plain(tmp_path / "a.usda", HUGE)
+    np.testing.assert_allclose(back.means, splats.means * (1, -1, -1), atol=1e-6)
+    assert back.findings[0].done == f"read with -Y up; --up=+{up} reads it as it says"
+    asked = read_plain(tmp_path / "a.usda", replace(HUGE, up=f"+{up}"))
+    wanted = rotate_splats(splats, ours_from_file(f"+{up}"))
+    np.testing.assert_allclose(asked.means, wanted.means, atol=1e-6)
+
+
+def test_arrays_that_are_too_short_are_told_with_both_counts(tmp_path):
+    splats = some_splats(200, 1)
+    stage = stage_with(tmp_path / "a.usda", splats)
+    prim = stage.GetPrimAtPath("/World/A")
+    prim.GetAttribute("scales").Set(Vt.Vec3fArray.FromNumpy(splats.scales[:100].copy()))
+    prim.RemoveProperty("radiance:sphericalHarmonicsDegree")
+    stage.Save()
+    told = [finding.what for finding in read_plain(tmp_path / "a.usda", HUGE).findings]
+    assert "scales has 100 entries for 200 splats" in told
+    assert any("has 200 entries; degree 3, which is meant" in what for what in told)
+    assert any(what.endswith("wants 3,200") for what in told)
+
+
 def full_covariance(scales, wxyz):
     return covariance(scales, wxyz)[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
 
