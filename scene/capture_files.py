@@ -111,6 +111,8 @@ def is_picture(name: str) -> bool:
 
 def photo_key(name: str) -> str:
     """A photo's name to be compared: / between folders, without ./, capitals or umlauts apart."""
+    if name.isascii() and not any(part in name for part in ("\\", "./", "//")):
+        return name.lstrip("/").lower()  # nearly all are so
     return folded("/".join(part for part in parts_of(name) if part != "."))
 
 
@@ -123,7 +125,7 @@ def parts_of(name: str) -> list[str]:
 
 def with_ending(folder: Path, name: str, endings: Sequence[str]) -> Path | None:
     for ending in endings:
-        path = f"{folder / name}{ending}"
+        path = os.path.join(folder, name) + ending
         if os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
             return Path(path)
     return None

@@ -1,5 +1,6 @@
 """What a capture's reader found, used and left out, and why: one table for all readers."""
 
+import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -19,7 +20,8 @@ NOT_THERE = "the capture names them and they are not there"
 class FileTable:
     """Rows as a reader goes along, and a sentence for each that a person has to know."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder  # names below it are said without it
         self.rows: list[FoundFiles] = []
         self.sentences: list[str] = []
         self.accounted: set[str] = set()  # photo_key of paths that a row has already
@@ -34,10 +36,13 @@ class FileTable:
         """names: of all of it; there: else it should be; said: a sentence says it already."""
         if not names:
             return
-        count, first = len(names), path_end(names[0])
+        count, first = len(names), self.short(names[0])
         self.rows.append(FoundFiles(kind, count if there else 0, 0, count, why, first))
         if not said:
             self.sentences.append(f"{count} {kind} are left out: {why}, for example {first}.")
+
+    def short(self, name: object) -> str:
+        return path_end(str(name).removeprefix(f"{self.folder}{os.sep}"))
 
     def photos(self, photos: Sequence[Photo], missing: Sequence[str]) -> None:
         """Of a panorama all faces are one photo.  missing: named, and not there."""
@@ -63,7 +68,7 @@ class FileTable:
                 self.left_out(kind, lack, why, there=False, said=True)
                 self.sentences.append(
                     f"{len(lack)} photos of {name} have none of the {kind} that {have} others "
-                    f"have, for example {path_end(lack[0])}."
+                    f"have, for example {self.short(lack[0])}."
                 )
 
     def sorted_rows(self) -> tuple[FoundFiles, ...]:

@@ -30,6 +30,7 @@ class Photo:
     lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
     mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
     float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
+    band: int = 0  # which of several that its file holds, counted from 1; 0: it holds one
     mode: str = ""  # what its pixels are, as PIL names it ("RGB", "L", "I;16"); "": not looked at
     no_value: NoValue = SAID_NOTHING  # which of its numbers are none, beside what its file says
     may_lack_values: bool = (
@@ -43,11 +44,12 @@ class Photo:
 
     @property
     def name(self) -> str:
-        """Its file; of a panorama's faces also where they look, since they share one."""
+        """Its file; of bands also which, of a panorama's faces where they look: they share one."""
+        path = f"{self.path} (band {self.band})" if self.band else str(self.path)
         if self.lens is None or self.lens.model != PANORAMA:
-            return str(self.path)
+            return path
         right, up = self.lens.params[4:6]
-        return f"{self.path} ({right:g} degrees right, {up:g} up)"
+        return f"{path} ({right:g} degrees right, {up:g} up)"
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from shapeshift.scene.captures.dated_stops import (
 from shapeshift.scene.captures.photo import decoded, over_black
 from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
 from shapeshift.scene.captures.radiometric.number_photos import JPEGS
+from shapeshift.scene.captures.radiometric.stated_bands import with_bands
 from shapeshift.scene.captures.value_ranges import with_own_ranges
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
@@ -252,7 +253,7 @@ def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[St
 
     def grey(name: str) -> bool:
         photo = next(p for p in photos if p.modality == name)
-        image = decoded(photo.path, photo.counts).image
+        image = decoded(photo.path, photo.counts, band=photo.band).image
         return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
     return tuple(
@@ -268,18 +269,7 @@ def stops_from(listed: object, where: str) -> list[Stop]:
     stops = [stop_from(row, where) for row in rows_of(listed, f"{where}: modality", 1)]
     if len({stop.name for stop in stops}) < len(stops):
         raise BadFile(f"{where}: two modalities have the same name; rename one")
-    for stop in stops:  # what it is of is known when the photos are
-        refuse_formula(stop, where)
     return list(placed_by_date(stops, where))
-
-
-def refuse_formula(stop: Stop, where: str) -> None:
-    """Raises BadFile for a formula that is none, before any photo is looked for."""
-    try:
-        if stop.formula:
-            read_formula(stop.formula)
-    except ValueError as error:
-        raise BadFile(f"{where}: modality {shown(stop.name)}: {error}") from None
 
 
 def stop_from(entry: Fields, where: str) -> Stop:
@@ -294,6 +284,8 @@ def stop_from(entry: Fields, where: str) -> Stop:
     ends = entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None
     palette, unit, formula = (entry.text(key, "") for key in ("palette", "unit", "formula"))
     try:
+        if formula:  # of which stops is looked at when their photos are there
+            read_formula(formula)
         return Stop(name, x, kind, palette, ends, unit, date, formula)
     except ValueError as error:
         raise BadFile(f"{entry.where}: {error}") from None
@@ -313,10 +305,10 @@ def with_counts(photos: list[Photo], listed: object, where: str) -> list[Photo]:
     """The photos with what the list of modalities says of the numbers in them."""
     counts, no_value = counts_from(listed, where), no_value_from(listed, where)
     out = []
-    for photo in photos:
+    for photo in with_bands(photos, listed, where):
         ends, said = counts.get(photo.modality), no_value.get(photo.modality, SAID_NOTHING)
         # A camera's own numbers lie in JPEG files, whose header is that of a picture.
-        numbers = ends is not None and photo.path.suffix.lower() in JPEGS
+        numbers = ends is not None and photo.path.suffix.lower() in JPEGS and not photo.band
         gaps = photo.may_lack_values or numbers or said != SAID_NOTHING
         out.append(replace(photo, counts=ends, no_value=said, may_lack_values=gaps))
     return out
@@ -373,7 +365,9 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     """
     found = []
     for photo in photos[:: max(1, len(photos) // 8)][:8]:
-        image, _, known = decoded(photo.path, photo.counts, no_value=photo.no_value)
+        image, _, known = decoded(
+            photo.path, photo.counts, no_value=photo.no_value, band=photo.band
+        )
         if photo.mask is not None or image.mode == "RGBA":
             return None
         border = border_of(np.asarray(image.convert("RGB")))

@@ -33,6 +33,7 @@ from shapeshift.scene.captures.radiometric.number_photos import (
     open_grid,
     radiometric_celsius,
 )
+from shapeshift.scene.captures.radiometric.tiff_bands import band_header, open_band
 from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27
@@ -46,9 +47,16 @@ ROWS = 256  # that become floats at a time
 BROKEN = (OSError, SyntaxError, ValueError, EOFError, RuntimeError)  # of Pillow, in broken files
 
 
-def open_image(path: Path) -> Image.Image:
-    """The image file, its header read; BadFile when it is missing or no image."""
+def open_image(path: Path, band: int = 0) -> Image.Image:
+    """The image file, its header read; BadFile when it is missing or no image.
+
+    band: which of several, counted from 1; 0: the file holds one.  Of a TIFF that has several, and
+    colours of more than 8 bits, band 0 is its header alone, with "bands" in its info.
+    """
     try:
+        if band:
+            with quiet():
+                return open_band(path, band)
         if path.suffix.lower() in GRIDS:
             return open_grid(path)
         with quiet():
@@ -60,6 +68,8 @@ def open_image(path: Path) -> Image.Image:
     except BadFile:  # of a grid, in its own words
         raise
     except UnidentifiedImageError as error:
+        if not band and (header := band_header(path)) is not None:
+            return header
         if path.stat().st_size == 0:
             raise BadFile(f"{path}: the image file is empty; copy it again") from None
         if path.suffix.lower() in HEIC:
@@ -106,7 +116,9 @@ def load_photo(photo: Photo, factor: int = 1, one_of_many: bool = False) -> Pixe
     """
     if photo.lens is not None:  # what is made of it is in memory at the same time
         charge_pixels(photo.path, photo.view.size)
-    image, file_size, known = decoded(photo.path, photo.counts, factor, 0, photo.no_value)
+    image, file_size, known = decoded(
+        photo.path, photo.counts, factor, 0, photo.no_value, photo.band
+    )
     mask_image, has_alpha = None, image.mode == "RGBA"
     if photo.mask is not None:
         image = over_black(image)
@@ -152,7 +164,7 @@ def refuse_other_view(own: tuple[int, int], size: tuple[int, int], what: str) ->
 
 def has_alpha_channel(photo: Photo) -> bool:
     """Whether load_photo finds an alpha channel in the photo's file: its header says so."""
-    if photo.counts is not None:
+    if photo.counts is not None or photo.band:
         return False
     with open_image(photo.path) as image:
         return is_see_through(image)
@@ -210,16 +222,21 @@ def decoded(
     factor: int = 1,
     most: int = 0,
     no_value: NoValue = SAID_NOTHING,
+    band: int = 0,
 ) -> Decoded:
     """An image file as bytes, and which of its pixels hold a value.
+
+    band: as of open_image.
 
     most: pixels that it may have however few its bytes, where a photo of as many goes with it.
     no_value: what its capture says of them, beside what the file does.
     A JPEG comes smaller by a divisor of `factor`, at most half of it: it is decoded so, which
     costs less and is nearly the mean over the area.
     """
-    own = counts is not None and is_radiometric(path)  # its numbers, not the picture's colours
-    with loaded(path, 1 if own else factor, most) as (image, size):
+    own = (
+        not band and counts is not None and is_radiometric(path)
+    )  # its numbers, not the picture's colours
+    with loaded(path, 1 if own else factor, most, band) as (image, size):
         if own or counts is not None or image.mode in (*GREY_16, FLOATS):
             numbers = radiometric_celsius(path, size) if own else np.asarray(image, np.float32)
             grey = shares(numbers, FLOATS if own else image.mode, counts, path)
@@ -250,10 +267,15 @@ def known_mask(gone: np.ndarray) -> Image.Image:
 
 @contextmanager
 def loaded(
-    path: Path, factor: int = 1, most: int = 0
+    path: Path, factor: int = 1, most: int = 0, band: int = 0
 ) -> Iterator[tuple[Image.Image, tuple[int, int]]]:
     """The image with its pixels read, see `decoded`, and the size of its file.  Raises BadFile."""
-    with open_image(path) as image:
+    with open_image(path, band) as image:
+        if bands := image.info.get("bands"):
+            raise BadFile(
+                f"{path}: a TIFF of {bands} bands; say with its modality's 'band', 1 to {bands}, "
+                "which of them counts"
+            )
         charge_pixels(path, image.size, most)
         width, height = image.size
         divisor = next((d for d in (8, 4, 2) if factor % d == 0 and factor >= 2 * d), 1)
@@ -291,8 +313,8 @@ def read_pixels(
 
 def numbers_of(photo: Photo) -> np.ndarray:
     """(H, W) float32 of a grey photo's own numbers, as they are in its file; NaN: none."""
-    with loaded(photo.path) as (image, size):
-        own = is_radiometric(photo.path)
+    with loaded(photo.path, band=photo.band) as (image, size):
+        own = not photo.band and is_radiometric(photo.path)
         numbers = radiometric_celsius(photo.path, size) if own else np.asarray(image, np.float32)
         gone = without_value(image, numbers, photo.no_value)
         return numbers if gone is None else np.where(gone, np.float32(np.nan), numbers)

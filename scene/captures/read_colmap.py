@@ -43,6 +43,7 @@ from shapeshift.scene.captures.modalities.photo_modality import modalities_of, s
 from shapeshift.scene.captures.modalities.said_modalities import said_modality_of
 from shapeshift.scene.captures.modalities.twin_photos import with_twins
 from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
+from shapeshift.scene.captures.radiometric.stated_bands import of_each_band, sharing_folders
 
 
 def read_colmap(folder: Path) -> Capture:
@@ -64,7 +65,7 @@ def read_colmap(folder: Path) -> Capture:
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
-    table = FileTable()
+    table = FileTable(folder)
     masks = masks_of(base, root, list(compress(paths, there)), table)
     means = stated_meaning(Fields(said, f"{folder}/capture.json"))
     photos: list[Photo] = []
@@ -87,6 +88,7 @@ def read_colmap(folder: Path) -> Capture:
         numbers = {path: str(image.lens) for path, image in zip(paths, posed, strict=True)}
         refuse_two_sorts(opened_photos(photos, root, numbers), stops, folder)
     photos = listed_split(photos, folder, root, table, by_folder=any(splits_of(names)))
+    photos = of_each_band(photos, sharing_folders(said.get("modalities") or (), str(folder)))
     photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
     photos, unsure = meant_by_masks(photos)

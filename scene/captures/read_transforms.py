@@ -2,8 +2,9 @@
 
 import os
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,12 @@ from shapeshift.scene.captures.modalities.frame_modalities import (
 from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
+from shapeshift.scene.captures.radiometric.stated_bands import (
+    of_each_band,
+    only_bands,
+    sharing_folders,
+    stated_bands,
+)
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.mask_files import find_masks
 from shapeshift.scene.pose import OPENCV_FROM_EYE
@@ -75,7 +82,7 @@ class Shot:
 
 def read_transforms(*files: Path) -> Capture:
     """A capture from one JSON file, or from the train/val/test files of a Blender data set."""
-    table = FileTable()
+    table = FileTable(files[0].parent)
     return capture_of(files[0].parent, str(files[0]), *gather(files, table), table)
 
 
@@ -92,35 +99,33 @@ def capture_of(
     where: of the file, for messages; table: what was left out so far; alone: files beside those
     that frames name are worth a word.  Raises BadFile.
     """
-    table = table or FileTable()
+    table = table or FileTable(folder)
     stops, usual, told = stops_of_frames(folder, data, entries, where)
-    rows = enumerate(zip(entries, usual, strict=True))
-    named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where)]
-    shots = [shot for shot in named if os.path.isfile(shot.path)]
-    missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
+    listed = data.get("modalities") or told
+    rows, bands = enumerate(zip(entries, usual, strict=True)), stated_bands(listed, where)
+    sharing = sharing_folders(told, where)
+    named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where, bands)]
+    there = [os.path.isfile(shot.path) for shot in named]
+    shots = list(compress(named, there))
+    missing = [str(shot.path) for shot, found in zip(named, there, strict=True) if not found]
     refuse_all_missing(missing, len(named), where)
-    for stop in stops:
-        if not stop.formula and not any(s.modality == stop.name for s in shots):
-            raise BadFile(
-                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
-            )
+    refuse_without_images(stops, shots, only_bands(sharing), where)
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
         (0, 0, 1),
         data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
-    photos, doubts = photos_and_doubts(shots, world, folder, missing, table)
-    doubts += doubts_of_entries(shots, entries)
+    photos, doubts = photos_and_doubts(shots, entries, world, folder, missing, table)
     photos, unsure = meant_by_masks(photos)
-    photos = with_counts(photos, data.get("modalities") or told, where)
+    photos = with_counts(of_each_band(photos, sharing), listed, where)
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors, more = points_of(folder, data, where)
     table.used("points", 0 if points is None else len(points))
     if alone:
         unnamed_files(folder, photos, table)
-    described = any(isinstance(m, dict) for m in data.get("modalities") or told)
+    described = any(isinstance(m, dict) for m in listed)
     if not (told or data.get("modalities") or any("modality" in e for e in entries)):
         refuse_two_sorts(opened_photos(photos, folder), stops, folder)
     background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
@@ -142,7 +147,12 @@ def capture_of(
 
 
 def photos_and_doubts(
-    shots: Sequence[Shot], world: CaptureWorld, folder: Path, missing: list[str], table: FileTable
+    shots: Sequence[Shot],
+    entries: Sequence[Mapping],
+    world: CaptureWorld,
+    folder: Path,
+    missing: list[str],
+    table: FileTable,
 ) -> tuple[list[Photo], tuple[str, ...]]:
     """missing: photos that are named and not there.  Raises BadFile."""
     lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
@@ -165,7 +175,7 @@ def photos_and_doubts(
     table.left_out("depth photos and normal maps", round_depth, "their photos are panoramas")
     named = len(shots) + len(missing)
     doubts = doubts_of(named, missing, photos, rescaled, no_depth, no_normals, turned)
-    return photos, doubts + stereo_sentences(lenses)
+    return photos, doubts + stereo_sentences(lenses) + doubts_of_entries(shots, entries)
 
 
 def unnamed_files(folder: Path, photos: Sequence[Photo], table: FileTable) -> None:
@@ -234,7 +244,7 @@ def gather(files: tuple[Path, ...], table: FileTable | None = None) -> tuple[dic
 
     table: gets what their lists leave out.
     """
-    table = table or FileTable()
+    table = table or FileTable(files[0].parent)
     everything: dict = {}
     entries: list[Mapping] = []
     for file in files:
@@ -283,11 +293,29 @@ def listed(frames: list[dict], data: dict, file: Path, table: FileTable) -> list
     return used
 
 
+def refuse_without_images(
+    stops: tuple[Stop, ...], shots: Sequence[Shot], bands: Container[str], where: str
+) -> None:
+    """Raises BadFile for a modality without one.  bands: those whose photos are of another."""
+    there = {shot.modality for shot in shots}
+    for stop in stops:
+        if not (stop.formula or stop.name in bands or stop.name in there):
+            raise BadFile(
+                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
+            )
+
+
 def shots_of(
-    entry: Mapping, number: int, usual: str, stops: tuple[Stop, ...], folder: Path, where: str
+    entry: Mapping,
+    number: int,
+    usual: str,
+    stops: tuple[Stop, ...],
+    folder: Path,
+    where: str,
+    bands: Container[str] = (),
 ) -> list[Shot]:
     """The photos of one frame: one, or one a modality where neither the frame names one of several
-    nor `usual`, what is known of it otherwise.
+    nor `usual`, what is known of it otherwise.  bands: modalities that are bands of its own file.
     """
     where = f"{where}: frame {number}"
     fields = Fields(entry, where)
@@ -312,8 +340,9 @@ def shots_of(
         return [Shot(entry, modality, path, matrix, where, folder, elsewhere)]
     shots = []
     for name in names:
-        path, elsewhere = find_file(folder / name, file)
-        shots.append(Shot(entry, name, path, matrix, where, folder / name, elsewhere))
+        place = folder if name in bands else folder / name
+        path, elsewhere = find_file(place, file)
+        shots.append(Shot(entry, name, path, matrix, where, place, elsewhere))
     return shots
 
 

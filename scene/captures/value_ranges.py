@@ -72,15 +72,15 @@ def _kind(photos: list[Photo]) -> str:
     if not photos or any(photo.counts is not None for photo in photos):
         return ""
     path = photos[0].path
-    if is_radiometric(path):
+    if not photos[0].band and is_radiometric(path):
         return "radiometric"
-    with open_image(path) as image:
+    with open_image(path, photos[0].band) as image:
         return "values" if image.mode == FLOATS else "counts" if image.mode in GREY_16 else "bytes"
 
 
 def refuse_colors(photo: Photo) -> None:
     """BadFile where a photo holds colours: a value is one number a pixel."""
-    image = decoded(photo.path, photo.counts).image
+    image = decoded(photo.path, photo.counts, band=photo.band).image
     pixels = np.asarray(image.convert("RGB"))
     if np.ptp(pixels, axis=2).max(initial=0) > GREY_STEPS:
         raise BadFile(

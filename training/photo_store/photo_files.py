@@ -136,7 +136,7 @@ class PhotoFiles:
                 state = os.stat(path)
                 about.append(f"{path.absolute()} {state.st_mtime_ns} {state.st_size}")
         units = photo.depth_unit, photo.float_depth_unit
-        of_files = photo.counts, photo.no_value, units, photo.lens, photo.normal_axes
+        of_files = photo.counts, photo.band, photo.no_value, units, photo.lens, photo.normal_axes
         about += [repr(self.reader.way(photo)), repr(of_files)]
         return hashlib.blake2b("\n".join(about).encode(), digest_size=16).digest()
 

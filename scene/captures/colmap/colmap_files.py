@@ -118,7 +118,7 @@ def unread_folders(base: Path, table: FileTable) -> None:
             if name in there and (base / there[name]).is_dir()
             for below in files_below(base / there[name])
         ]
-        table.left_out(kind, files, "a COLMAP model names none; a transforms.json can")
+        table.left_out(kind, files, "a COLMAP model names none, a transforms.json can")
 
 
 def listed_split(

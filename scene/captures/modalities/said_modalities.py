@@ -12,6 +12,7 @@ from shapeshift.runtime_models.files.json_fields import Fields, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_files import SMALLER, is_strange, parts_of
+from shapeshift.scene.captures.radiometric.stated_bands import only_bands, sharing_folders
 
 IMAGES = {"images", *(f"images_{factor}" for factor in SMALLER)}
 MOST_LISTED = 20  # photos in a line that is proposed
@@ -74,8 +75,9 @@ def said_modality_of(
     """
     choices = [choice_of(Fields(e, where), s.name) for s, e in zip(stops, entries, strict=True)]
     out: list[tuple[int, str]] = [(0, "")] * len(names)
+    bands = only_bands(sharing_folders(entries, where))
     for stop, choice in zip(stops, choices, strict=True):
-        if stop.formula:  # it is made of others and has no photos
+        if stop.formula or stop.name in bands:  # it has no photos of its own
             continue
         depths = choice.depths(names, cameras_of)
         if not any(depths):

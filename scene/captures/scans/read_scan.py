@@ -63,7 +63,7 @@ def capture_from(posed: PosedFrames) -> Capture:
         raise BadFile(f"{posed.where}: no photo has a pose here; copy the whole folder")
     first = posed.frames[0]
     said = {key: first[key] for key in ("up", "ply_file_path") if key in first}
-    table = FileTable()
+    table = FileTable(posed.folder)
     for why, names in posed.left.items():
         paths = [find_file(posed.folder, name).path for name in names]
         table.left_out("photos", paths, f"they {why}", said=True)
