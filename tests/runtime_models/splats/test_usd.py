@@ -23,9 +23,10 @@ from tests.support.splats.ply_files import some_splats
 pytest.importorskip("pxr", reason="usd-core is not installed (an optional extra)")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdVol, Vt
 
+from tests.support.splats.usd_stages import add_field, stage_with
+
 HUGE = Reading(allow_huge=True)
 ENDINGS = ("usda", "usdc", "usd", "usdz")
-SH = "radiance:sphericalHarmonicsCoefficients"
 
 
 def same(ours, theirs, atol: float = 1e-6) -> None:
@@ -57,34 +58,6 @@ def test_a_far_origin_is_kept(tmp_path):
     np.testing.assert_allclose(
         np.add(back.means, back.origin), np.add(splats.means, splats.origin), rtol=0, atol=1e-6
     )
-
-
-def stage_with(path: Path, splats, up: str = "Y", metres: float | None = 1.0) -> Usd.Stage:
-    """A stage as others write it: usd-core alone, attribute by attribute."""
-    stage = Usd.Stage.CreateNew(str(path))
-    UsdGeom.SetStageUpAxis(stage, up)
-    if metres is not None:
-        UsdGeom.SetStageMetersPerUnit(stage, metres)
-    add_field(stage, "/World/A", splats)
-    stage.Save()
-    return stage
-
-
-def add_field(stage: Usd.Stage, at: str, splats, half: bool = False) -> Usd.Prim:
-    prim = UsdVol.ParticleField3DGaussianSplat.Define(stage, at).GetPrim()
-    arrays = {
-        "positions": splats.means, "scales": splats.scales,
-        "orientations": splats.wxyz[:, [1, 2, 3, 0]], "opacities": splats.opacity,
-        SH: splats.sh.reshape(-1, 3),
-    }  # fmt: skip
-    kinds = {1: (Vt.FloatArray, Vt.HalfArray), 3: (Vt.Vec3fArray, Vt.Vec3hArray),
-             4: (Vt.QuatfArray, Vt.QuathArray)}  # fmt: skip
-    for name, array in arrays.items():
-        kind = kinds[1 if array.ndim == 1 else array.shape[1]][half]
-        array = np.ascontiguousarray(array, np.float16 if half else np.float32)
-        prim.GetAttribute(name + "h" * half).Set(kind.FromNumpy(array))
-    prim.GetAttribute("radiance:sphericalHarmonicsDegree").Set(round(splats.sh.shape[1] ** 0.5) - 1)
-    return prim
 
 
 @pytest.mark.parametrize("up", ["Y", "Z"])
