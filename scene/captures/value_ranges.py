@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import shown
-from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.scene.captures.capture import Photo
@@ -90,7 +89,7 @@ def refuse_colors(photo: Photo) -> None:
     pixels = np.asarray(image.convert("RGB"))
     if np.ptp(pixels, axis=2).max(initial=0) > GREY_STEPS:
         raise BadFile(
-            f"{path_end(photo.path)}: a photo of colours in {shown(photo.modality)}, which is of "
+            f"{photo.path}: a photo of colours in {shown(photo.modality)}, which is of "
             "kind values; photos of one number a pixel are wanted, or say with 'band' which of "
             "its channels counts"
         )
