@@ -36,7 +36,7 @@ from shapeshift.scene.captures.colmap.colmap_files import (
     photos_folder,
     points_of,
 )
-from shapeshift.scene.captures.colmap.rig_frames import refused_poses
+from shapeshift.scene.captures.colmap.rig_frames import refused_poses, refused_text
 from shapeshift.scene.captures.colmap_tables import Posed, find_model, read_tables
 from shapeshift.scene.captures.modalities.frame_modalities import said_beside
 from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
@@ -95,6 +95,7 @@ def read_colmap(folder: Path) -> Capture:
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
     doubts += unpaired + other_lengths(images) + refused_poses(model, ending, images)
+    doubts += refused_text(model, ending, images)
     table.photos(photos, missing)
     table.partners("masks", photos)
     left_beside(base, model, ending, table)

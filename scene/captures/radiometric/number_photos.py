@@ -8,7 +8,9 @@ temperatures of them by Planck's law.  flyr (EUPL 1.2, an optional extra) knows 
 import io
 import math
 import re
+import struct
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
@@ -19,6 +21,9 @@ from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.radiometric.dji_photo import ADVICE, converter, dji_celsius, is_dji
 from shapeshift.scene.captures.radiometric.no_value import resized_numbers
+
+if TYPE_CHECKING:
+    from flyr.thermogram import FlyrThermogram
 
 GRIDS = (".npy", ".csv")
 JPEGS = (".jpg", ".jpeg", ".jfif")
@@ -33,6 +38,9 @@ NO_NUMBER = frozenset(
 )
 HEAD_LINES = 20  # of words that programs write before a grid
 FLIR = re.compile(rb"\xff\xe1..FLIR\x00", re.DOTALL)  # where such a segment begins
+# Of FLIR's segments and of the directory in them; ExifTool documents both.
+FLIR_HEAD, MOST_RECORDS, CAMERA_INFO = 8, 256, 32
+SATURATED = 168  # bytes into the record of the camera: its largest temperature, then its smallest
 LOOKED_AT = 1 << 16  # bytes of a JPEG: the first segment begins before
 PNG_SIZE = re.compile(rb"\x89PNG\r\n\x1a\n....IHDR(....)(....)", re.DOTALL)
 ASPECT = 0.02  # by how much the numbers may be wider or narrower than their picture
@@ -188,8 +196,49 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
     try:
         opened = flyr.unpack(io.BytesIO(data))
         with np.errstate(all="ignore"):  # of a camera set to nonsense: NaN stays
-            return np.asarray(opened.celsius, np.float32), dict(opened.metadata)
+            celsius = np.asarray(opened.celsius, np.float32)
+            if (gone := _saturated(opened, data)) is not None:
+                celsius = np.where(gone, np.float32(np.nan), celsius)
+            return celsius, dict(opened.metadata)
     except Exception as error:  # of a parser that checks nothing: any
         raise BadFile(
             f"{where}: its thermal numbers cannot be read ({error}); copy it again"
         ) from None
+
+
+def _saturated(opened: "FlyrThermogram", data: bytes) -> np.ndarray | None:
+    """(H, W) bool where a FLIR camera says that it measured nothing: at its limits or beyond; None
+    where its file states none.
+
+    The limits are of a black body without air before it, whatever the camera is set to.
+    """
+    low, high = saturation_kelvin(data)
+    if high == math.inf:
+        return None
+    apparent = opened.adjust_metadata(
+        emissivity=1.0, object_distance=0.0, ir_window_transmission=1.0
+    ).kelvin
+    return ~((apparent > low) & (apparent < high))
+
+
+def saturation_kelvin(jpeg: bytes) -> tuple[float, float]:
+    """Where a FLIR camera's numbers end, as its JPEG states; all temperatures where it does not.
+
+    ExifTool's CameraTemperatureMinSaturated and CameraTemperatureMaxSaturated.
+    """
+    nothing, held, start = (-math.inf, math.inf), b"", 2
+    while jpeg[start : start + 1] == b"\xff" and jpeg[start + 1 : start + 2] == b"\xe1":
+        end = start + 2 + int.from_bytes(jpeg[start + 2 : start + 4], "big")
+        segment, start = jpeg[start + 4 : end], max(end, start + 4)
+        held += segment[FLIR_HEAD:] if segment.startswith(b"FLIR\0") else b""
+    try:
+        first, count = struct.unpack_from(">II", held, 24)
+        for number in range(min(count, MOST_RECORDS)):
+            kind, _, _, _, at = struct.unpack_from(">HHIII", held, first + 32 * number)
+            if kind == CAMERA_INFO:
+                order = ">" if held[at : at + 2] == b"\0\2" else "<"
+                high, low = struct.unpack_from(f"{order}ff", held, at + SATURATED)
+                return (low, high) if 0 < low < high < math.inf else nothing
+    except struct.error:
+        pass
+    return nothing
