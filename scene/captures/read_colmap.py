@@ -71,7 +71,8 @@ def read_colmap(folder: Path) -> Capture:
     photos: list[Photo] = []
     rescaled: list[str] = []
     turned: list[str] = []
-    rows = zip(posed, paths, cameras, modality_of, splits_of(names), strict=True)
+    splits = splits_of(names)
+    rows = zip(posed, paths, cameras, modality_of, splits, strict=True)
     for image, path, world_from_camera, modality, split in compress(rows, there):
         lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
@@ -87,7 +88,7 @@ def read_colmap(folder: Path) -> Capture:
     if guessed := not said.get("modalities"):
         numbers = {path: str(image.lens) for path, image in zip(paths, posed, strict=True)}
         refuse_two_sorts(opened_photos(photos, root, numbers), stops, folder)
-    photos = listed_split(photos, folder, root, table, by_folder=any(splits_of(names)))
+    photos = listed_split(photos, folder, root, table, by_folder=any(splits))
     photos = of_each_band(photos, sharing_folders(said.get("modalities") or (), str(folder)))
     photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
