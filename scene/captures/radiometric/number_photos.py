@@ -2,11 +2,12 @@
 
 A radiometric JPEG (R-JPEG) is a picture for people with the camera's own numbers in APP1 segments
 that begin with "FLIR": records of a directory "FFF", one with the raw numbers, one with what makes
-temperatures of them by Planck's law.  flyr (EUPL 1.2, an optional extra) knows them.
+temperatures of them by Planck's law.  flyr (EUPL 1.2, an optional extra) knows them; it works
+behind the gate, flir_run.py.
 """
 
-import io
 import re
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from PIL import Image
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.radiometric.dji_photo import ADVICE, converter, dji_celsius, is_dji
 
@@ -111,8 +113,6 @@ def _is_flir(path: Path) -> bool:
 
 def cannot_read_radiometric(path: Path) -> str:
     """What is to be installed for the temperatures of such a photo; "": nothing."""
-    from importlib.util import find_spec
-
     if is_dji(path):
         return "" if converter() else ADVICE
     return "" if find_spec("flyr") is not None else "for degrees: pip install flyr"
@@ -125,6 +125,8 @@ def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
     """
     celsius = dji_celsius(path) if is_dji(path) else read_radiometric(path)[0]
     height, width = celsius.shape
+    if not celsius.size:
+        raise BadFile(f"{path_end(path)}: it has {width}x{height} thermal numbers; copy it again")
     if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
         raise BadFile(
             f"{path_end(path)}: {width}x{height} numbers in a picture of {size[0]}x{size[1]}; both "
@@ -144,12 +146,10 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
     where = path_end(path)
     if is_dji(path):
         raise BadFile(f"{where}: a DJI camera's settings are not read; say them")
-    try:
-        import flyr
-    except ImportError:
+    if find_spec("flyr") is None:
         raise BadFile(
             f"{where}: a radiometric JPEG; its temperatures want the package flyr: pip install flyr"
-        ) from None
+        )
     data = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b""
     sides = [
         [int.from_bytes(side, "big") for side in found.groups()]
@@ -159,11 +159,5 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
         raise BadFile(f"{where}: more numbers than a thermal camera has; copy it again")
     most = max([len(data) // 2, *(width * height for width, height in sides)])
     Memory().of(path).charge(RAW * most, f"{most:,} numbers")
-    try:
-        opened = flyr.unpack(io.BytesIO(data))
-        with np.errstate(all="ignore"):  # of a camera set to nonsense: NaN stays
-            return np.asarray(opened.celsius, np.float32), dict(opened.metadata)
-    except Exception as error:  # of a parser that checks nothing: any
-        raise BadFile(
-            f"{where}: its thermal numbers cannot be read ({error}); copy it again"
-        ) from None
+    found = ask("thermal photo", path, [str(path.absolute())])
+    return found["celsius"], found["settings"]
