@@ -160,7 +160,7 @@ def say_levels(models: Iterable[Model], path: Path, options: ReadingOptions) -> 
 
 
 def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
-    """Posed photos, not their pixels; progress and doubts of its files go to stderr.
+    """Posed photos, not their pixels; progress, what its stops hold and doubts go to stderr.
 
     memory_gb: --memory, for all that this process reads from now on; None: what is usual.  Raises
     BadFile, UsageError.
@@ -168,6 +168,7 @@ def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
     from shapeshift.app.errors import UsageError
     from shapeshift.app.progress import working
     from shapeshift.runtime_models.files.memory import MOST_GB, VARIABLE
+    from shapeshift.scene.captures.modalities.stop_contents import contents_of
     from shapeshift.scene.captures.read_capture import read_capture
 
     if memory_gb is not None:
@@ -179,8 +180,7 @@ def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
         os.environ[VARIABLE] = str(memory_gb)  # where its pixels are read, also by children
     with working("reading the capture"):
         capture = read_capture(path)
-    for doubt in capture.doubts:
-        say(doubt)
+    say(*contents_of(capture), *capture.doubts)
     return capture
 
 

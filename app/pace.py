@@ -3,18 +3,19 @@
 from dataclasses import replace
 from pathlib import Path
 
-from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.runtime_models.model import AnchorModel, Stop
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.stops.formula_stop import with_placed_formulas
 
 PATIENCE_S = 2.0  # a bar is shown from then on
 
 
-def pace_package(path: Path) -> None:
-    """A package that was just written, with its pace."""
+def pace_package(path: Path, formulas: tuple[Stop, ...] = ()) -> None:
+    """A package that was just written, with the stops by formula of its capture, and its pace."""
     model = read_package(path)
-    if len(model.stops) > 1:
-        write_package(with_pace(model), path)
+    if len(model.stops) + len(formulas) > 1:
+        write_package(with_pace(with_placed_formulas(model, formulas)), path)
 
 
 def with_pace(model: AnchorModel) -> AnchorModel:

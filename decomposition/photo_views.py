@@ -47,7 +47,7 @@ def photo_views(
         if picture is not None:
             labels = np.where(picture.labels == SILENT, labels, picture.labels)
         pixels = None
-        if stop.kind != "thermal":  # false colours are no display values
+        if not stop.is_measured:  # false colours are no display values
             pixels = load_photo(photo, factor).rgb.astype(np.float32) / 255
         fits = pixels is not None and pixels.shape[:2] == labels.shape
         labelled = LabelledView(view, stop.x, labels, photo.path)

@@ -123,11 +123,11 @@ def walked_mask(
 
 
 def heat_of(shown: ShownAnchors, photo: WorkPhoto) -> list[np.ndarray]:
-    """(H, W, 1) uint8 of each thermal stop of the model other than the photo's own."""
+    """(H, W, 1) uint8 of each value stop of the model other than the photo's own."""
     return [
         np.rint(255 * np.clip(shown.look(photo.view, stop.x)[..., :1], 0, 1)).astype(np.uint8)
         for stop in shown.model.stops
-        if stop.kind == "thermal" and stop.name != photo.stop.name
+        if stop.is_measured and stop.name != photo.stop.name
     ]
 
 

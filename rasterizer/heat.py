@@ -1,4 +1,4 @@
-"""heat: what thermal stops have in the colours of splats, apart from what the other stops have."""
+"""heat: what value stops have in the colours of splats, apart from what the other stops have."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ def add_heat(
     palette: np.ndarray | None = None,
     first: bool = True,
 ) -> None:
-    """Heat of `rows` (a plain slice) of the arena from color (N, 4), a thermal stop's as decoded.
+    """Heat of `rows` (a plain slice) of the arena from color (N, 4), a value stop's as decoded.
 
     heat (N, 4): weight * luminance, 0, 0, weight; with a palette (256, 3) weight * its colour,
     weight.  weights (n,) 0..1, one for as many splats side by side each.  first: what is there is

@@ -52,7 +52,7 @@ SLOTS = {
     "CONTROL": 6,  # vec4 (A, d / 4)  Psi of a control an anchor
     "LIGHT": 7,  # vec4 (A, 2 C)  light by direction: harmonics of degree 1 and 2
     "PALETTE": 3,  # vec4 (256,)    display sRGB
-    "TINT": 4,  # float (A,)     weight of a thermal stop
+    "TINT": 4,  # float (A,)     weight of a value stop
     "HEAT": 0,  # vec4 (N,)      value times weight 0 0 weight: what is thermal of a splat
 }
 WEIGHTS_BLOCK = 0  # uniform block

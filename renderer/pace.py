@@ -86,7 +86,14 @@ def even_curve(shares: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """
     even = max(float(steps.sum()), LEAST) * np.diff(shares)  # what even changes would be
     way = np.concatenate([[0], np.cumsum(steps + FLOOR * even)])
-    curve = np.interp(np.linspace(0, 1, STEPS + 1), way / way[-1], shares)
+    evenly = np.linspace(0, 1, STEPS + 1)
+    curve = np.interp(evenly, way / way[-1], shares)
+    rounded = np.concatenate([[0], np.round(curve[1:-1], DECIMALS), [1]])
+    if (np.diff(rounded) > 0).all():
+        return rounded
+    # The picture jumps somewhere, as between two palettes: what rounding made one is drawn apart.
+    part = 2 * STEPS * 10.0**-DECIMALS
+    curve = (1 - part) * curve + part * evenly
     return np.concatenate([[0], np.round(curve[1:-1], DECIMALS), [1]])
 
 

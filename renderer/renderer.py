@@ -305,7 +305,7 @@ class Renderer:
 
     def image(self, i: int = 0) -> np.ndarray:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
-        row 0 on top.  At a pure thermal stop it holds values, else colours.
+        row 0 on top.  At a pure value stop it holds values, else colours.
         """
         image, palette = self.drawing.image(i), self._ways[i].palette
         if not self._has_heat(i):

@@ -64,7 +64,7 @@ class RenderSettings:
     recolor_degrees: float = 0.0  # colours again after the eye has moved so far around an object
     skip_unseen: bool = False  # no colours (Scaffold-GS: nothing) for anchors that no view can see
 
-    # Shares of a thermal stop's range that the ends of its palette stand for: level and span.  Not
+    # Shares of a value stop's range that the ends of its palette stand for: level and span.  Not
     # where several palettes show at once, which have no one picture of values.
     heat_ends: tuple[float, float] = (0.0, 1.0)
     debug: str = ""  # one of DEBUG_VIEWS instead of the picture

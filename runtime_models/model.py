@@ -10,6 +10,7 @@ from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.shapes import check
 from shapeshift.runtime_models.splat_motion import SplatMotion
+from shapeshift.runtime_models.stop import STOP_KINDS as STOP_KINDS
 from shapeshift.runtime_models.stop import ControlEncoding, Stop
 from shapeshift.runtime_models.stop_weights import Controls, Pace, StopBlend, encode_control
 
@@ -17,7 +18,6 @@ HEADS = ("offset", "scale", "rotation", "opacity", "color")
 SIZE_PER_SPLAT = {"offset": 3, "scale": 3, "rotation": 4, "opacity": 1, "color": 3}
 SCAFFOLD_HEADS = {"opacity": 1, "covariance": 7, "color": 3}  # numbers a splat
 OCTREE_RULES = ("round", "floor", "ceil", "progressive")
-STOP_KINDS = ("rgb", "thermal", "layer", "style")
 BETWEEN_STOPS = ("blend", "encoding")
 MOST_LABEL = 254  # of an object; 255 of a label map says nothing of a pixel
 FARTHEST_ORIGIN = 1e12  # metres

@@ -25,6 +25,7 @@ from shapeshift.runtime_models.model import (
     Model,
     ScaffoldModel,
     SplatLayers,
+    Stop,
 )
 from shapeshift.runtime_models.package.feature_codes import EXACT, encode_light
 from shapeshift.runtime_models.package.lint_package import refuse_filling
@@ -172,6 +173,17 @@ def is_package(path: Path) -> bool:
     return any(name in (MANIFEST, ANCHORS) or name.endswith(".onnx") for name in names)
 
 
+def describe_stop(stop: Stop) -> dict:
+    """A stop, and what its values are where it has other ones than heat."""
+    row: dict[str, object] = {"name": stop.name, "x": stop.x, "kind": stop.kind}
+    if stop.kind == "values":
+        ends = list(stop.value_range) if stop.value_range else None
+        row |= {"value_range": ends, "unit": stop.unit, "palette": stop.palette}
+    if stop.formula:
+        row["formula"] = stop.formula
+    return row
+
+
 def describe(model: Model, path: str | Path) -> dict:
     """What `launch.py info --json` prints; `path` is where the model was read from."""
     file_format = model.provenance.get("format", "splats")
@@ -183,13 +195,15 @@ def describe(model: Model, path: str | Path) -> dict:
         "sh_degree": (
             round(model.sh.shape[1] ** 0.5) - 1 if isinstance(model, SplatLayers) else None
         ),
-        "stops": [{"name": s.name, "x": s.x, "kind": s.kind} for s in model.stops],
+        "stops": [describe_stop(s) for s in model.stops],
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
     if isinstance(model, SplatLayers):
         if "sh_degree" in model.provenance:  # bands that are zero in every splat were left out
             facts["sh_degree_in_file"] = model.provenance["sh_degree"]
         drawn: dict[str, object] = {"antialiased": True} if model.antialiased else {}
+        if "axes" in model.provenance:  # where the format alone does not tell
+            drawn["axes"] = model.provenance["axes"]
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]
             drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))

@@ -1,10 +1,28 @@
-"""What a stop shows, by its name: thermal images, colour photographs, or a layer of something."""
+"""What a name says of a stop or of a photo: heat, visible light, or nothing of the two."""
 
 import re
+from functools import lru_cache
 
 COLOR_NAMES = {"rgb", "color", "colour", "visible", "images", "photo"}
-THERMAL_PARTS = ("therm", "lwir", "infrared")  # anywhere in a name
-THERMAL_WORDS = {"ir", "tir", "flir"}  # alone, between other signs than letters
+THERMAL_PARTS = (
+    "thermal", "thermog", "thermic", "thermisch", "termic", "termogra", "warmebild", "wärmebild",
+    "waermebild", "lwir", "mwir", "infrared", "infrarot", "infrarouge",
+)  # fmt: skip  # anywhere in a word
+# Words with such a part that are about something else: places, and light that is no heat.
+NOT_THERMAL = ("geothermal", "hydrothermal", "isothermal", "nearinfrared")
+# Whole words.  What cameras write: irx is Autel's, thrm an older one of DJI's.
+THERMAL_WORDS = re.compile(
+    r"ir|tir|flir|irx|thrm|heat|therm|thermo(cam\w*|ima\w*|vision|s(can|hot)s?)?"
+    r"|ir(cam|camera|img|image|images|photo|photos)"
+)
+LIGHT_WORDS = {
+    "rgb", "color", "colour", "colors", "colours", "visible", "visual", "vis", "optical", "wide",
+    "zoom", "eo",
+}  # fmt: skip
+LETTERS = re.compile(r"[^\W\d_]+")
+NEAR = re.compile(r"near[\W_]*infra[\W_]*red", re.IGNORECASE)  # light: a lamp's, no heat
+# The words of "thermalCam", "leftIR" and "IRcam".
+CAMEL = re.compile(r"(?:LW|MW|T)?IR(?![A-Z])|RGB(?![A-Z])|[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
 def guess_kind(name: str, stops: int) -> str:
@@ -15,9 +33,36 @@ def guess_kind(name: str, stops: int) -> str:
 
 
 def is_thermal_name(name: str) -> bool:
-    low = name.lower()
-    words = re.split(r"[^a-z]+", low)
-    return any(part in low for part in THERMAL_PARTS) or not THERMAL_WORDS.isdisjoint(words)
+    return any(map(is_thermal_word, words_of(name)))
+
+
+def is_thermal_word(word: str) -> bool:
+    """Of a word as words_of gives it."""
+    part = any(part in word for part in THERMAL_PARTS)
+    return (part and word not in NOT_THERMAL) or THERMAL_WORDS.fullmatch(word) is not None
+
+
+def sort_of_name(name: str) -> str:
+    """The kind "thermal" or "rgb" that a name says, by its words; "": neither, or both."""
+    words = words_of(name)
+    thermal, light = any(map(is_thermal_word, words)), not LIGHT_WORDS.isdisjoint(words)
+    thermal |= light and "t" in words  # "RGB-T"
+    return "" if thermal == light else "thermal" if thermal else "rgb"
+
+
+@lru_cache(maxsize=4096)
+def words_of(name: str) -> tuple[str, ...]:
+    """The words of a name, in small letters: between other signs, digits, and capitals.
+
+    Letters between digits are none ("a3ir9f"): such names are made up by a program.
+    """
+    words = []
+    for token in re.split(r"[\W_]+", NEAR.sub("nearinfrared", name)):
+        if len(found := LETTERS.findall(token)) == 1:
+            inside = CAMEL.findall(found[0])
+            whole = len("".join(inside)) < len(found[0])  # other letters than ASCII's
+            words += map(str.lower, found if whole else inside)
+    return tuple(dict.fromkeys(words))
 
 
 def stems_named(stems: list[str]) -> list[str]:

@@ -21,7 +21,7 @@ class Appearance:
     """What is shown of a colour c, display sRGB, is (gain c) ^ (1 / gamma), channel by channel;
     gain = tint * 2 ^ (exposure / 2.2).
 
-    What a thermal stop has measured keeps its colours: they stand for values.
+    What a value stop has measured keeps its colours: they stand for values.
     """
 
     exposure: float = 0.0  # stops of light: each doubles it, which is 2 ^ (1 / 2.2) as displayed

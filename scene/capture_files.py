@@ -9,7 +9,15 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import NamedTuple
 
 ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG", ".webp", ".tif", ".tiff")
+PICTURES = {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".heic", ".dng"}
+MOST_FILES = 200_000  # of a folder and those in it that are looked at
+# What other programs keep in folders of photos: of macOS, and of network drives' thumbnails.
+NO_PHOTOS = (".", "@", "__MACOSX")
 SMALLER = (2, 4, 8)  # images_2, images_4 ... hold the photos of images with smaller sides
+# Of names that are no UTF-8, the likeliest first: Windows of the West, of Central Europe and in
+# Russian, Japanese, Chinese, Korean; DOS, which zip programs still write.
+CODE_PAGES = ("cp1252", "cp1250", "cp1251", "cp932", "gbk", "big5", "cp949", "cp437", "cp850")
+NAMES_TRIED = 200  # in each of them
 DRIVE = re.compile(r"^[A-Za-z]:[\\/]|^\\\\")  # of an absolute path of Windows
 
 
@@ -31,9 +39,8 @@ def find_file(folder: Path, name: str, endings: Sequence[str] = ENDINGS) -> Name
     parts = parts_of(name)
     if "\\" in name and (found := with_ending(folder, "/".join(parts), endings)):
         return NamedFile(found)
-    strange = name.startswith("/") or ".." in parts or bool(DRIVE.match(name))
     below = [part for part in parts if part != ".."]
-    ends = [below[start:] for start in range(len(below))] if strange else [below]
+    ends = [below[start:] for start in range(len(below))] if is_strange(name) else [below]
     for end in ends:
         for first in ("", *SMALLER):
             place = "/".join([f"{end[0]}_{first}" if first else end[0], *end[1:]])
@@ -42,6 +49,11 @@ def find_file(folder: Path, name: str, endings: Sequence[str] = ENDINGS) -> Name
     if found := alike_named(folder, [part for part in parts if part != "."], endings):
         return NamedFile(found, elsewhere=True)
     return NamedFile(folder / name)
+
+
+def is_strange(name: str) -> bool:
+    """Whether a name begins at another machine's root, or goes up."""
+    return name.startswith("/") or ".." in parts_of(name) or bool(DRIVE.match(name))
 
 
 def alike_named(folder: Path, parts: Sequence[str], endings: Sequence[str]) -> Path | None:
@@ -71,6 +83,39 @@ def entries_of(folder: Path, changed_ns: int) -> dict[str, str]:
     return {folded(name): name for name in sorted(os.listdir(folder))}
 
 
+def files_below(folder: Path, deep: bool = True) -> list[str]:
+    """Names of the files in it, with / below it, sorted; hidden ones are passed over.
+
+    deep: those in its folders as well, also behind links, each folder once.
+    """
+    found: list[str] = []
+    seen: set[tuple[int, int]] = set()
+    for place, folders, names in os.walk(folder, followlinks=True):
+        status = os.stat(place)
+        if (status.st_dev, status.st_ino) in seen:
+            folders.clear()
+            continue
+        seen.add((status.st_dev, status.st_ino))
+        folders[:] = [name for name in folders if deep and not name.startswith(NO_PHOTOS)]
+        below = Path(place).relative_to(folder).as_posix()
+        prefix = "" if below == "." else f"{below}/"
+        found += [prefix + name for name in names if not name.startswith(NO_PHOTOS)]
+        if len(found) > MOST_FILES:
+            break
+    return sorted(found[:MOST_FILES])
+
+
+def is_picture(name: str) -> bool:
+    return os.path.splitext(name)[1].lower() in PICTURES
+
+
+def photo_key(name: str) -> str:
+    """A photo's name to be compared: / between folders, without ./, capitals or umlauts apart."""
+    if name.isascii() and not any(part in name for part in ("\\", "./", "//")):
+        return name.lstrip("/").lower()  # nearly all are so
+    return folded("/".join(part for part in parts_of(name) if part != "."))
+
+
 def parts_of(name: str) -> list[str]:
     """Of a path as Windows or others write it, without its root."""
     windows = "\\" in name and ("/" not in name or DRIVE.match(name))
@@ -80,7 +125,37 @@ def parts_of(name: str) -> list[str]:
 
 def with_ending(folder: Path, name: str, endings: Sequence[str]) -> Path | None:
     for ending in endings:
-        path = f"{folder / name}{ending}"
+        path = os.path.join(folder, name) + ending
         if os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
             return Path(path)
     return None
+
+
+def in_code_page(names: Sequence[str], folder: Path | None) -> list[str]:
+    """The names with those that are no UTF-8 (they hold surrogate escapes) read in the code page in
+    which most of them are files in `folder`; where none is, in that of western Windows.
+    """
+    raw = {n: n.encode("utf-8", "surrogateescape") for n in names if not is_text(n)}
+    if not raw:
+        return list(names)
+    tried = list(raw.values())[:NAMES_TRIED]
+    best, most = CODE_PAGES[0], 0
+    # In UTF-8 with its escapes: a file whose name has the same bytes, as Linux allows.
+    for page in ("utf-8", *CODE_PAGES) if folder is not None else ():
+        there = 0
+        for name in tried:
+            try:
+                text = name.decode(page, "surrogateescape" if page == "utf-8" else "strict")
+            except UnicodeDecodeError:
+                continue
+            there += os.path.isfile(find_file(folder, text, ("",)).path)
+        if there > most:
+            best, most = page, there
+    errors = "surrogateescape" if best == "utf-8" else "replace"
+    read = {name: data.decode(best, errors) for name, data in raw.items()}
+    return [read.get(name, name) for name in names]
+
+
+def is_text(name: str) -> bool:
+    """Whether it has no halves of surrogate pairs."""
+    return name.isascii() or not any("\ud800" <= letter <= "\udfff" for letter in name)

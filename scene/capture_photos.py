@@ -18,6 +18,7 @@ from shapeshift.scene.captures.lenses.panorama import (
 )
 from shapeshift.scene.captures.lenses.turned import quarter_of, turned_lens
 from shapeshift.scene.captures.photo import open_image
+from shapeshift.scene.captures.radiometric.no_value import may_lack_values
 from shapeshift.scene.captures.undistort import is_straight, lost, pinhole_of
 from shapeshift.scene.pose import View
 
@@ -64,19 +65,20 @@ def posed_photo(
 
     world_from_camera: (4, 4) OpenCV axes, our world; lens: of the size that the capture states.
     """
-    size = image_size(path, None)
+    with open_image(path) as image:
+        size, mode, gaps = image.size, image.mode, may_lack_values(image)
     if not fits(lens.size, size):
         world_from_camera, lens = as_it_lies(path, world_from_camera, lens)
     lens = of_size(lens, size, path)
     try:
         if is_straight(lens, where):
             view = View.from_pinhole(world_from_camera, lens.focal, lens.centre, lens.size)
-            return Photo(view, path, modality)
+            return Photo(view, path, modality, mode=mode, may_lack_values=gaps)
         straight = pinhole_of(lens)
         view = View.from_pinhole(world_from_camera, straight.focal, straight.centre, straight.size)
     except ValueError as error:
         raise BadFile(f"{where}: {error}") from None
-    return Photo(view, path, modality, lens=lens)
+    return Photo(view, path, modality, lens=lens, mode=mode, may_lack_values=gaps)
 
 
 def as_it_lies(

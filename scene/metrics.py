@@ -21,16 +21,22 @@ def ssim(a: np.ndarray, b: np.ndarray) -> float:
     return float(ssim_map(a, b).mean())
 
 
-def ssim_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def ssim_map(a: np.ndarray, b: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
     """(H, W, C) float64 structural similarity around each pixel, each channel by itself.
 
     Equation 13 of Wang et al., 2004.  Beyond the border lie zeros, as in the loss of 3DGS.
+    known: (H, W) bool, of which pixels alone windows take their means; None: of all.
     """
     check_alike(a, b)
     a, b = a.astype(np.float64), b.astype(np.float64)
-    mean_a, mean_b = windowed(a), windowed(b)
-    var_a, var_b = windowed(a * a) - mean_a**2, windowed(b * b) - mean_b**2
-    covariance = windowed(a * b) - mean_a * mean_b
+    whole: float | np.ndarray = 1.0  # over the share of its window that a pixel knows
+    if known is not None:
+        counts = known[..., None].astype(np.float64)
+        a, b = (np.where(known[..., None], of, 0) for of in (a, b))
+        whole = windowed(np.ones_like(counts)) / np.maximum(windowed(counts), 1e-12)
+    mean_a, mean_b = windowed(a) * whole, windowed(b) * whole
+    var_a, var_b = windowed(a * a) * whole - mean_a**2, windowed(b * b) * whole - mean_b**2
+    covariance = windowed(a * b) * whole - mean_a * mean_b
     c1, c2 = K1**2, K2**2
     return ((2 * mean_a * mean_b + c1) * (2 * covariance + c2)) / (
         (mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2)

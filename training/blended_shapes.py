@@ -1,6 +1,6 @@
 """Which steps draw a photo on shapes between two stops, with the photo's own stop's colours.
 
-Near a thermal stop a viewer draws the colours of both stops on the shapes of x.  Such steps teach
+Near a value stop a viewer draws the colours of both stops on the shapes of x.  Such steps teach
 the colours of each stop to fit there, too: docs/between.md.
 """
 

@@ -2,11 +2,14 @@
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
@@ -14,6 +17,7 @@ from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.lens_resampling import LEAST_PHOTOS
 from shapeshift.scene.captures.normal_photo import load_normals
 from shapeshift.scene.captures.photo import has_alpha_channel, load_photo
+from shapeshift.scene.captures.undistort import lost
 from shapeshift.scene.pose import View
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
@@ -32,6 +36,7 @@ class LoadedPhoto:
     depth: np.ndarray | None = None  # (H, W) float32 metres along the view, 0 = not known
     masked: bool = False  # whether a mask or an alpha channel says what lies outside of it
     normals: np.ndarray | None = None  # (H, W, 4) int8, as load_normals gives them
+    unknown: int = 0  # pixels without a value; their weight is 0
 
     @property
     def has_depth(self) -> bool:
@@ -58,6 +63,11 @@ class LoadedPhoto:
     @property
     def see_through(self) -> bool:
         return bool((self.rgba[..., 3] < 255).any())
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether no pixel of it counts."""
+        return self.unknown > 0 and self.weight is not None and not self.weight.any()
 
     def over(self, background: tuple[float, float, float]) -> np.ndarray:
         """(H, W, 3) float32 the photo over a background, display sRGB 0..1."""
@@ -90,7 +100,7 @@ def memory_of(photos: tuple[Photo, ...], factor: int) -> int:
 
 
 def bytes_a_pixel(photo: Photo) -> int:
-    weighted = photo.mask is not None or photo.lens is not None
+    weighted = photo.mask is not None or photo.lens is not None or photo.may_lack_values
     mapped = (photo.depth is not None) + (photo.normals is not None)
     return 4 + 4 * weighted + 4 * mapped
 
@@ -106,7 +116,7 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
     Masks that mean "valid" leave it unmasked: they say of no pixel that it is empty.
     one_of_many: as in load_photo.
     """
-    rgb, mask, lost = load_photo(photo, factor, one_of_many)
+    rgb, mask, gone = load_photo(photo, factor, one_of_many)
     alpha, weight = np.full(rgb.shape[:2], 255, np.uint8), None
     masks = meaning(photo, masks)
     masked = mask is not None and (photo.mask is None or masks == "object")
@@ -119,9 +129,12 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
                 f"{photo.mask} is black all over: nothing of its photo would count; leave the "
                 "photo out, or its mask."
             )
-    if lost is not None and lost.any():  # neither object nor background: nothing is known there
-        alpha = np.where(lost, np.uint8(255), alpha)
-        weight = np.where(lost, np.float32(0), np.float32(1) if weight is None else weight)
+    unknown = 0
+    if gone is not None and gone.any():  # neither object nor background: nothing is known there
+        alpha = np.where(gone, np.uint8(255), alpha)
+        weight = np.where(gone, np.float32(0), np.float32(1) if weight is None else weight)
+        beyond = False if photo.lens is None else lost(photo.lens, rgb.shape[1::-1], factor)
+        unknown = int((gone & ~np.asarray(beyond)).sum()) if photo.may_lack_values else 0
     rgba = np.concatenate([rgb, alpha[..., None]], axis=2)
     depth = None if photo.depth is None else load_depth(photo, factor)
     normals = None if photo.normals is None else load_normals(photo, factor)
@@ -131,7 +144,9 @@ def read(photo: Photo, factor: int, masks: str, one_of_many: bool = False) -> Lo
         if values is not None:
             values[~seen] = 0
     view = photo.view.divided(factor)
-    return LoadedPhoto(view, photo.modality, rgba, weight, photo.name, depth, masked, normals)
+    return LoadedPhoto(
+        view, photo.modality, rgba, weight, photo.name, depth, masked, normals, unknown
+    )
 
 
 def meaning(photo: Photo, masks: str) -> str:
@@ -172,7 +187,9 @@ class PhotoReader:
 
 
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
-    """All photos of a split, in memory: see open_photos where they may not fit.  Raises BadFile."""
+    """All photos of a split that have a pixel with a value, in memory: see open_photos where they
+    may not fit.  Raises BadFile.
+    """
     mine = tuple(photo for photo in capture.photos if photo.split == split)
     reader = PhotoReader.of(mine, factor, masks)
     # Photos of one lens after each other: of the matrices one is kept.
@@ -181,4 +198,31 @@ def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[L
         of_lens.setdefault(photo.lens, []).append(i)
     order = [i for numbers in of_lens.values() for i in numbers]
     loaded = {i: reader.read(mine[i]) for i in order}
-    return [loaded[i] for i in range(len(mine))]
+    return [photo for i in range(len(mine)) if not (photo := loaded[i]).is_blank]
+
+
+def unknown_pixels(
+    photos: Sequence[LoadedPhoto], blank: Sequence[LoadedPhoto | Photo]
+) -> list[str]:
+    """A sentence for each modality that has pixels without a value.
+
+    photos: what is used; blank: photos of which no pixel has one, which are left out.
+    """
+    said = []
+    for name in dict.fromkeys(photo.modality for photo in (*photos, *blank)):
+        mine = [photo for photo in photos if photo.modality == name and photo.unknown]
+        out = [photo for photo in blank if photo.modality == name]
+        pixels = sum(math.prod(photo.view.size) for photo in photos if photo.modality == name)
+        if mine:
+            share = 100 * sum(photo.unknown for photo in mine) / pixels
+            said.append(
+                f"{name}: {share:.2g} % of the pixels, in {len(mine)} photos, have no value (no "
+                "data, NaN, or beyond what was measured); they are unknown and count for nothing."
+            )
+        if out:
+            plural = "s" if len(out) > 1 else ""
+            said.append(
+                f"{name}: no pixel of {len(out)} photo{plural} has a value, for example of "
+                f"{path_end(Path(out[0].name))}; left out."
+            )
+    return said

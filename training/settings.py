@@ -158,7 +158,7 @@ class TrainSettings:
     0: no bound."""
     blended_shapes: float = 0.0
     """Share of the steps, 0 to 1, in which a photo is drawn with its stop's colours on shapes
-    between its stop and a neighbouring one (docs/between.md).  For scenes with a thermal stop: 0.5
+    between its stop and a neighbouring one (docs/between.md).  For scenes with a value stop: 0.5
     makes the picture between two stops their cross-fade."""
     view_dependent: bool = True
     """Let colours depend on the direction from which one looks."""

@@ -101,7 +101,7 @@ class Page {
         camera.zoom(Math.hypot(...point.map((value, i) => value - camera.pose.position[i])) / camera.distance);
     }
 
-    /** The value of a thermal stop under the pointer. @param {PointerEvent} e */
+    /** The value of a stop under the pointer. @param {PointerEvent} e */
     read(e) {
         if (e.buttons || e.timeStamp - this.readAt < READING_MS || byId("legend").hidden) return;
         this.readAt = e.timeStamp;

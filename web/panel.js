@@ -130,7 +130,7 @@ export class Panel {
         const choice = byId("palette");
         Object.keys(this.renderer.palettes).forEach((name) => element("option", { value: name, textContent: name }, choice));
         choice.addEventListener("change", () => {
-            const found = this.renderer.thermal(this.shown);
+            const found = this.renderer.measured(this.shown);
             if (found) for (const model of this.renderer.models) for (const stop of model.stops) if (stop.palette === found.stop.palette) stop.palette = choice.value;
             this.show();
             this.onChange();
@@ -155,7 +155,7 @@ export class Panel {
 
     /** What a colour stands for; as clear as the weight of its stop. */
     showLegend() {
-        const found = this.renderer.thermal(this.shown), box = byId("legend");
+        const found = this.renderer.measured(this.shown), box = byId("legend");
         box.hidden = !found;
         if (!found) return;
         const rgb = this.renderer.palettes[found.stop.palette], context = box.querySelector("canvas").getContext("2d"), pixels = context.createImageData(256, 1);
@@ -170,7 +170,7 @@ export class Panel {
 
     /** The value of a place of the picture beside the legend; null: there is none. @param {number | null} intensity  0..1 */
     read(intensity) {
-        const found = this.renderer.thermal(this.shown), [low, high] = found?.stop.valueRange ?? [0, 1];
-        byId("reading").textContent = found && intensity !== null ? `${(low + (high - low) * intensity).toFixed(1)} ${found.stop.unit}` : "";
+        const found = this.renderer.measured(this.shown), [low, high] = found?.stop.valueRange ?? [0, 1];
+        byId("reading").textContent = found && intensity !== null ? `${(low + (high - low) * intensity).toFixed(Math.min(9, found.stop.digits ?? 1))} ${found.stop.unit}` : "";
     }
 }

@@ -1,4 +1,4 @@
-"""launch.py change: what moved, appeared, vanished, got hotter or colder between two captures."""
+"""launch.py change: what moved, appeared or vanished, and whose values changed, from A to B."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,15 +25,19 @@ class Options(ReadingOptions):
     """Print one object instead of a table."""
     overwrite: bool = False
     """Replace what an earlier run wrote into --out."""
-    degrees: float = 5.0
-    """From how many degrees on (of the thermal stops' unit) heat counts as changed."""
+    degrees: float | None = None
+    """From how much on values count as changed, in their unit.  Default: 5 of heat, of others a
+    twentieth of their range."""
     millimetres: float = 0.0
     """From how many millimetres on a surface counts as moved; 0: a thirty-second of the scene's
     radius."""
     stop: str = ""
-    """The stop whose colours and shapes are compared.  Default: the first that is not thermal."""
+    """The stop whose colours and shapes are compared.  Default: the first that shows no values."""
+    values: Annotated[str, Opt(metavar="STOP")] = ""
+    """The stop whose values are compared.  Default: the first thermal one, else the first of other
+    values."""
     range: tuple[float, float] | None = None
-    """The values that black and white of the thermal stops stand for.  Default: what the scenes
+    """The values that black and white of the value stops stand for.  Default: what the scenes
     say."""
     camera: Annotated[str, Opt(metavar="CAMERA")] = ""
     """A file or folder of cameras in A's world to draw both from (docs/cameras.md), for rooms and
@@ -81,7 +85,7 @@ def run(options: Options) -> int:
         cameras = named_cameras(options.camera, options.scene_a, options, size)
     documents = [open_document(path, options) for path in (options.scene_a, options.scene_b)]
     before, after = (
-        visit_of(document, name, options.stop, options.range)
+        visit_of(document, name, options.stop, options.range, options.values)
         for document, name in zip(documents, names, strict=True)
     )
     visits = before, after
@@ -112,5 +116,5 @@ def refuse_amounts(options: Options) -> None:
         if not 0 <= value < float("inf"):
             raise UsageError(f"{name} is {value:g}; 0 (by the scene) or more is wanted.")
     for name, value in (("--degrees", options.degrees), ("--colour", options.colour)):
-        if not 0 < value < float("inf"):
+        if value is not None and not 0 < value < float("inf"):
             raise UsageError(f"{name} is {value:g}; more than 0 is wanted.")

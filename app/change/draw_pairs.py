@@ -9,10 +9,10 @@ import numpy as np
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.inspection.draw_values import (
-    ThermalChoice,
-    ThermalScene,
+    MeasuredScene,
+    ValueChoice,
     draw_values,
-    thermal_scene,
+    measured_scene,
 )
 from shapeshift.renderer.surface import SOLID
 from shapeshift.runtime_models.model import Stop
@@ -37,42 +37,50 @@ class Visit:
 
     document: Document
     photo: Stop | None  # that its colours and shapes are drawn at; None: it has values alone
-    thermal: ThermalScene | None  # None: no thermal stop
+    measured: MeasuredScene | None  # None: no value stop
 
     @property
     def shape(self) -> Scene:
         """What depths are drawn of."""
         if self.photo is not None:
             return self.document.placed(self.photo.name).scene
-        assert self.thermal is not None
-        return self.thermal.scene
+        assert self.measured is not None
+        return self.measured.scene
 
 
-def visit_of(document: Document, name: str, stop: str = "", value_range=None) -> Visit:
+def visit_of(
+    document: Document, name: str, stop: str = "", value_range=None, values: str = ""
+) -> Visit:
     """A scene with the stops that are compared.  stop: the one of colours; "": the first that is
-    not thermal.  value_range: of the thermal stop, where the scene has none.  Raises UsageError.
+    not measured.  value_range: of the value stop, where the scene has none.
+    values: the stop whose values are; "": the first thermal one, else the first of others.  Raises
+    UsageError.
     """
     if document.file is not None:
         raise UsageError(f"{name} is a scene file of objects; change compares two models.")
     stops = document.models[0].stops
-    photos = [each for each in stops if each.kind != "thermal"]
+    photos = [each for each in stops if not each.is_measured]
     if stop:
         photos = [each for each in stops if each.name.casefold() == stop.casefold()]
         if not photos:
             names = ", ".join(each.name for each in stops)
             raise UsageError(f"{name} has no stop '{stop}'; it has {names}.")
-    thermal = None
-    hot = [each for each in stops if each.kind == "thermal" and each.palette]
+    measured = None
+    hot = sorted((s for s in stops if s.has_false_colors), key=lambda s: not s.is_heat)
+    if values:
+        hot = [each for each in hot if each.name.casefold() == values.casefold()]
+        if not hot:
+            raise UsageError(f"{name} has no stop '{values}' of values with a palette.")
     if hot:
         if hot[0].value_range is None and value_range is None:
             raise UsageError(
                 f"the stop '{hot[0].name}' of {name} does not say which values black and white "
                 "stand for; say it: --range LOW HIGH."
             )
-        thermal = thermal_scene(document, ThermalChoice(hot[0].name, value_range))
-    if not photos and thermal is None:
+        measured = measured_scene(document, ValueChoice(hot[0].name, value_range))
+    if not photos and measured is None:
         raise UsageError(f"{name} has no stop whose values or colours could be compared.")
-    return Visit(document, photos[0] if photos else None, thermal)
+    return Visit(document, photos[0] if photos else None, measured)
 
 
 def rings_around(centre: np.ndarray, radius: float, size: tuple[int, int]) -> list[View]:
@@ -103,10 +111,10 @@ def draw_side(
         color = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
         depth = renderer.surface(view).depth(SOLID).astype(np.float64) * a_from_b.scale
         sides.append(SeenSide(np.clip(color, 0, 1), rgba[..., 3], depth))
-    if heat and visit.thermal is not None:
+    if heat and visit.measured is not None:
         for i, view in enumerate(own):
             progress(f"drawing the heat of {what}", i / len(own))
-            seen = draw_values(renderer, visit.thermal, view)
+            seen = draw_values(renderer, visit.measured, view)
             sides[i] = replace(sides[i], value=seen.values)
     return sides
 

@@ -8,8 +8,15 @@ import numpy as np
 from shapeshift.app.change.draw_pairs import Progress, Visit, draw_side, rings_around
 from shapeshift.app.change.register import common_world, register
 from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.change.cells import SurfaceCells, cells_of
-from shapeshift.scene.change.places import ChangedPlace, ChangeSettings, find_places
+from shapeshift.scene.change.places import (
+    HEAT_WORDS,
+    VALUE_WORDS,
+    ChangedPlace,
+    ChangeSettings,
+    find_places,
+)
 from shapeshift.scene.change.seen_pair import SeenPair, samples_of
 from shapeshift.scene.change.similarity import Registration, Similarity
 from shapeshift.scene.pose import View
@@ -18,6 +25,7 @@ if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer
 
 CELLS = 64  # of the scene's radius, where no size is asked for
+LEAST_DEGREES, LEAST_PART = 5.0, 0.05  # of heat; of other values' range
 APART = 2.0  # cells that a surface must be off, where no metres are asked for
 
 
@@ -27,24 +35,30 @@ class ChangeChoice:
 
     cell_m: float = 0.0
     least_m: float = 0.0
-    least_value: float = 5.0
+    least_value: float | None = None  # None: by the values
     least_color: float = 14.0
     size: tuple[int, int] = (320, 240)
 
-    def settings(self, radius: float) -> ChangeSettings:
-        """Raises UsageError for what is no amount."""
+    def settings(self, radius: float, stop: Stop | None = None) -> ChangeSettings:
+        """Raises UsageError for what is no amount.  stop: of the values."""
+        least_value = usual_least(stop) if self.least_value is None else self.least_value
         for name, value in (("cell", self.cell_m), ("least shift", self.least_m)):
             if not 0 <= value < np.inf:
                 raise UsageError(f"the {name} is {value:g} m; 0 (by the scene) or more is wanted.")
-        for name, value in (("value", self.least_value), ("colour", self.least_color)):
+        for name, value in (("value", least_value), ("colour", self.least_color)):
             if not 0 < value < np.inf:
                 raise UsageError(
                     f"the least {name} that counts is {value:g}; more than 0 is wanted."
                 )
         cell = self.cell_m or radius / CELLS
-        return ChangeSettings(
-            cell, self.least_m or APART * cell, self.least_value, self.least_color
-        )
+        return ChangeSettings(cell, self.least_m or APART * cell, least_value, self.least_color)
+
+
+def usual_least(stop: Stop | None) -> float:
+    """From how much on values count as changed, in their unit."""
+    if stop is None or stop.kind != "values" or stop.value_range is None:
+        return LEAST_DEGREES
+    return LEAST_PART * (stop.value_range[1] - stop.value_range[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +69,7 @@ class SceneChange:
     registration: Registration
     settings: ChangeSettings
     unit: str  # of values; "" without
-    compared: tuple[str, ...]  # of "shape", "colour", "heat"
+    compared: tuple[str, ...]  # of "shape", "colour", "heat" or "values"
     overall: float  # the median of all values less those before: the air, the load; NaN: no values
 
 
@@ -82,7 +96,8 @@ def find_change(
     before, after = visits
     heat = check_values(before, after, names)
     centre, radius = before.document.bounds()
-    settings = choice.settings(radius)
+    stop = before.measured.stop if heat and before.measured else None
+    settings = choice.settings(radius, stop)
     chosen = views or rings_around(centre, radius, choice.size)
     common = common_world(before, after)
     first = draw_side(renderer, before, chosen, Similarity.identity(), heat, "A", progress)
@@ -98,11 +113,13 @@ def find_change(
         cells_of(samples[0], samples[1], settings.cell_m),
         cells_of(samples[1], samples[0], settings.cell_m),
     )
-    unit = before.thermal.stop.unit if heat and before.thermal else ""
+    unit = stop.unit if stop else ""
+    said = VALUE_WORDS if stop and stop.kind == "values" else HEAT_WORDS
     both = (before.photo is not None and after.photo is not None) and "colour"
     counted = settings if both else replace(settings, least_color=np.inf)
-    places = find_places(*cells, counted, unit)
-    compared = tuple(word for word in ("shape", both, heat and "heat") if word)
+    places = find_places(*cells, counted, unit, said)
+    values = heat and ("heat" if said == HEAT_WORDS else "values")
+    compared = tuple(word for word in ("shape", both, values) if word)
     change = cells[1].value_change
     known = change[np.isfinite(change)]
     overall = -float(np.median(known)) if len(known) else float("nan")
@@ -112,12 +129,12 @@ def find_change(
 
 def check_values(before: Visit, after: Visit, names: tuple[str, str]) -> bool:
     """Whether both have values, in one unit.  Raises UsageError."""
-    if before.thermal is None or after.thermal is None:
+    if before.measured is None or after.measured is None:
         return False
-    first, second = before.thermal.stop.unit, after.thermal.stop.unit
+    first, second = before.measured.stop.unit, after.measured.stop.unit
     if first != second:
         raise UsageError(
-            f"the heat of {names[0]} is in '{first}' and of {names[1]} in '{second}'; one unit is "
+            f"the values of {names[0]} are in '{first}', of {names[1]} in '{second}'; one unit is "
             "wanted: train both captures with the same."
         )
     return True
@@ -125,7 +142,7 @@ def check_values(before: Visit, after: Visit, names: tuple[str, str]) -> bool:
 
 def without_heat(before: Visit, after: Visit, names: tuple[str, str]) -> str:
     """What is said where values are not compared; "": they are."""
-    lacking = [n for n, v in zip(names, (before, after), strict=True) if v.thermal is None]
+    lacking = [n for n, v in zip(names, (before, after), strict=True) if v.measured is None]
     if not lacking:
         return ""
     verb = "has" if len(lacking) == 1 else "have"

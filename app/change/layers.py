@@ -46,7 +46,7 @@ def write_layers(found: FoundChange, folder: Path) -> int:
     stops = [
         Stop(name, i / (len(layers) - 1), "layer")
         if ends is None
-        else Stop(name, i / (len(layers) - 1), "thermal", "turbo", ends, unit)
+        else Stop(name, i / (len(layers) - 1), kind_of(name), "turbo", ends, unit)
         for i, (name, unit, _, ends) in enumerate(layers)
     ]
     origin = np.asarray(found.before.document.origin)
@@ -54,10 +54,15 @@ def write_layers(found: FoundChange, folder: Path) -> int:
     return write_layer_list(list(zip(stops, splats, strict=True)), folder)
 
 
+def kind_of(name: str) -> str:
+    """Of a stop of change: other values than heat have digits of their own."""
+    return "values" if name == "Change of values" else "thermal"
+
+
 def baked(visit: Visit, a_from_b: Similarity) -> PlainSplats:
     """A visit's splats at the stop of its shape, in A's own metres, without other columns."""
     model = visit.document.models[0]
-    stop = visit.photo or (visit.thermal.stop if visit.thermal else model.stops[0])
+    stop = visit.photo or (visit.measured.stop if visit.measured else model.stops[0])
     eye = default_view(model, (640, 360)).world_from_eye.position
     splats = bake(model, stop.x, eye, DEGREE)
     splats = replace(splats, origin=(0.0, 0.0, 0.0), extra={}, labels=None)
@@ -87,9 +92,9 @@ def measures(found: FoundChange, means: np.ndarray) -> list[tuple[str, str, np.n
     settings, unit = found.change.settings, found.change.unit
     rows = [("Change of shape", "mm", 1000 * shape_change(before, found),
              1000 * shape_change(after, found), 1000 * settings.least_m)]  # fmt: skip
-    if "heat" in found.change.compared:
+    for word in {"heat", "values"} & set(found.change.compared):
         pair = before.value_change, -after.value_change
-        rows.append(("Change of heat", unit, *pair, settings.least_value))
+        rows.append((f"Change of {word}", unit, *pair, settings.least_value))
     if "colour" in found.change.compared:
         pair = color_distance(before.color_change), color_distance(after.color_change)
         rows.append(("Change of colour", "Lab", *pair, settings.least_color))

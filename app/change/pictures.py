@@ -10,7 +10,7 @@ from shapeshift.app.commands.compare_sheet import written
 from shapeshift.app.inspection.pictures import ColorScale, with_scale_bar
 from shapeshift.renderer.colors.palette import LUMINANCE, palette_values
 from shapeshift.scene.cameras.framing import view_from
-from shapeshift.scene.change.places import ChangedPlace
+from shapeshift.scene.change.places import HEAT_WORDS, VALUE_WORDS, ChangedPlace
 from shapeshift.scene.change.seen_pair import SeenPair, SeenSide
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import View
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 COLORS = {"moved": (1.0, 0.85, 0.1), "appeared": (0.2, 0.85, 0.3), "vanished": (1.0, 0.2, 0.5),
           "hotter": (1.0, 0.45, 0.05), "colder": (0.15, 0.5, 1.0),
+          "higher": (1.0, 0.45, 0.05), "lower": (0.15, 0.5, 1.0),
           "recoloured": (0.75, 0.4, 1.0)}  # fmt: skip
 FIELD = 3.0  # times the place's own size that a picture shows
 LEAST_FIELD = 0.35  # of the scene's radius
@@ -34,8 +35,11 @@ def words(place: ChangedPlace) -> str:
     said = f"{place.number} {place.kind}"
     if place.kind == "moved":
         return f"{said} by {100 * place.amount:.1f} cm"
-    if place.kind in ("hotter", "colder"):
+    if place.kind in HEAT_WORDS:
         return f"{said} by {abs(place.amount):.1f} {place.unit}, now {place.level:.1f}"
+    if place.kind in VALUE_WORDS:
+        amount = f"{abs(place.amount):.3g} {place.unit}".rstrip()
+        return f"{said} by {amount}, now {place.level:.3g}"
     if place.kind == "recoloured":
         return f"{said} by {place.amount:.0f} (Lab)"
     return said
@@ -46,14 +50,16 @@ def pictures_of(renderer: "Renderer", found: FoundChange, place: ChangedPlace) -
     view = best_view(found, place)
     from_b = found.change.registration.a_from_b
     pair = draw_pair(renderer, found.before, found.after, view, from_b)
-    heat = place.kind in ("hotter", "colder")
+    heat = place.kind in (*HEAT_WORDS, *VALUE_WORDS)
     sides = (pair.before, pair.after)
     pictures = [np.where(s.coverage[..., None] >= 0.5, s.color, NOTHING) for s in sides]
     scale = None
-    if heat and found.before.thermal is not None:
+    if heat and found.before.measured is not None:
         values = [side.value for side in sides if side.value is not None]
         low, high = np.nanpercentile(np.concatenate([v.ravel() for v in values]), (1, 99.5))
-        scale = ColorScale(float(low), float(max(high, low + 1)), found.before.thermal.stop.palette)
+        least = 1 if place.kind in HEAT_WORDS else found.change.settings.least_value
+        stop = found.before.measured.stop
+        scale = ColorScale(float(low), float(max(high, low + least)), stop.palette)
         pictures = [heat_colors(value, scale) for value in values]
     last = marked(pair, place, found.change.settings.cell_m)
     pictures = [written(pictures[0], "before"), written(pictures[1], "after")]

@@ -9,7 +9,7 @@ import numpy as np
 from shapeshift.app.change.draw_pairs import Progress, Visit, draw_side, rings_around
 from shapeshift.renderer.colors.palette import LUMINANCE
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.colmap_child import run_child
+from shapeshift.scene.captures.colmap.colmap_child import run_child
 from shapeshift.scene.change.seen_pair import SeenSide, edge_pixels
 from shapeshift.scene.change.similarity import Registration, Similarity, fit_surfaces
 from shapeshift.scene.inspection.value_picture import world_points

@@ -59,15 +59,24 @@ def run(options: Options) -> int:
 def write(options: Options, out: Path, cameras: "CameraList") -> None:
     """Writes the views in the wished form, beside what is there, never over the input."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.scene.cameras.write_cameras import paths_of, write_cameras
+    from shapeshift.scene.cameras.write_cameras import paths_of, stale_paths, write_cameras
 
     form = options.to or ("ours" if out.suffix else "colmap-bin")
-    for path in paths_of(out, form):
+    stale = stale_paths(out, form)
+    for path in (*paths_of(out, form), *stale):
         if path.exists() and is_part(path.resolve(), options.cameras.resolve()):
             raise UsageError(f"{path} belongs to what is read; choose another --out.")
+    for path in paths_of(out, form):
         if path.exists() and not options.overwrite:
             raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
+    if stale and not options.overwrite:
+        raise UsageError(
+            f"{stale[0]} is of another model and would contradict what is written; choose another "
+            "--out, or add --overwrite to remove it."
+        )
     written = write_cameras(cameras, out, form)
+    if stale:
+        say(f"Removed, as of an older model: {', '.join(path.name for path in stale)}.")
     count = len(cameras.views)
     if form == "vr" and count > 1:
         say(f"A floor has one view: the first of {count} is taken.")
@@ -78,8 +87,9 @@ def write(options: Options, out: Path, cameras: "CameraList") -> None:
 
 def is_part(path: Path, source: Path) -> bool:
     """Whether a file is what is read, lies in it, or is another table of the same COLMAP model."""
-    tables = ("cameras", "images", "points3D")
+    tables = ("cameras", "images", "points3D", "rigs", "frames")
     beside = path.parent == source.parent and path.suffix == source.suffix != ".json"
+    beside = beside and path.stem in tables
     return path == source or source in path.parents or (beside and source.stem in tables)
 
 

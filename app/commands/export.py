@@ -32,7 +32,7 @@ class Options(ReadingOptions):
     sh_degree: int = 3
     """Degree of the colours' spherical harmonics, at most; 0: one colour from all sides."""
     palette: bool = True
-    """Write thermal stops in their false colours, as they are shown; --no-palette: as the networks
+    """Write value stops in their false colours, as they are shown; --no-palette: as the networks
     give them."""
     select: Annotated[tuple[str, ...], REGIONS] = ()
     """Regions with an X of their own (a stop's name or a number), in each object's frame:
@@ -52,6 +52,11 @@ class Options(ReadingOptions):
     eye: Annotated[str, Opt(expert=True, metavar="X,Y,Z")] = ""
     """Metres: from where a scene is seen whose shape depends on that (Scaffold-GS).  Default: the
     first view."""
+    spz_axes: Literal["ply", "rub"] = "ply"
+    """Of an .spz; ply: right, down, forward, as a PLY has it and most programs read it today; rub:
+    right, up, back, as the format's text says (docs/formats.md has a table of who reads what)."""
+    spz_version: Annotated[Literal["2", "3", "4"], EXPERT] = "3"
+    """Of an .spz; 4 is newer, and known to fewer programs."""
     web: bool = False
     """Into a folder: a page for a server, which shows a coarse scene first; no package."""
     exact: Annotated[bool, EXPERT] = False
@@ -86,6 +91,7 @@ def run(options: Options) -> int:
         raise UsageError(
             "--for is of pages; name --out NAME.html or .zip, or --web, or leave it out."
         )
+    refuse_spz_options(options)
     if not package and not page:
         writer_of(options.out)  # before the scene is read
     check_output(options.out, options.scenes, options.overwrite)
@@ -109,7 +115,10 @@ def run(options: Options) -> int:
         for path, scene in zip(scenes, opened, strict=True)
         for part in parts_of(path, scene, scene.origin - origin, options)
     ]
-    look = ExportLook(options.sh_degree, options.palette, eye, tuple(origin))
+    look = ExportLook(
+        options.sh_degree, options.palette, eye, tuple(origin), options.spz_axes,
+        int(options.spz_version),
+    )  # fmt: skip
     with progress_after(PATIENCE_S) as progress:
         splats = export(parts, look, options.out, progress)
     for finding in splats.findings:
@@ -193,6 +202,17 @@ def parts_of(path: Path, subject, position, options: Options) -> list:
         selectors = (*placed.selectors, *part.obj.selectors)
         parts.append(replace(part, obj=replace(placed, selectors=selectors)))
     return parts
+
+
+def refuse_spz_options(options: Options) -> None:
+    """Raises UsageError where the options of an .spz are given for another format."""
+    from shapeshift.app.errors import UsageError
+
+    given = (options.spz_axes, options.spz_version) != ("ply", "3")
+    if given and options.out.suffix.lower() != ".spz":
+        raise UsageError(
+            "--spz-axes and --spz-version are of .spz; name --out NAME.spz, or leave them out."
+        )
 
 
 def parse_eye(text: str) -> tuple[float, float, float] | None:

@@ -50,10 +50,12 @@ class ExportLook:
     """How it is exported."""
 
     sh_degree: int = 3  # at most
-    palette: bool = True  # thermal stops in their false colours, as they are shown
+    palette: bool = True  # value stops in their false colours, as they are shown
     eye: tuple[float, float, float] | None = None  # world metres, None: the first view's
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # float64 metres: where the files have
     #                                       the world's zero; far ones are shown nearer to it
+    spz_axes: str = "ply"  # of an .spz: one of write_spz.AXES
+    spz_version: int = 3  # of an .spz: one of write_spz.VERSIONS
 
 
 def export(parts: Sequence[Part], look: ExportLook, path: Path, progress) -> PlainSplats:
@@ -72,8 +74,9 @@ def export(parts: Sequence[Part], look: ExportLook, path: Path, progress) -> Pla
     x, y, z = np.add(splats.origin, look.origin).tolist()
     splats = replace(splats, origin=(x, y, z))
     path.parent.mkdir(parents=True, exist_ok=True)
+    options = {"version": look.spz_version, "axes": look.spz_axes} if writer.name == "spz" else {}
     try:
-        writer.write(splats, path)
+        writer.write(splats, path, **options)
     except ValueError as error:  # the format cannot hold them
         raise UsageError(f"{writer.name}: {error}") from None
     lost = [replace(finding, file=path.name) for finding in describe_losses(splats, writer)]
@@ -109,7 +112,7 @@ def eye_of(obj: SceneObject, look: ExportLook) -> tuple[np.ndarray | None, tuple
 
 
 def shown_colors(obj: SceneObject, x: Controls) -> Recolor | None:
-    """Mixes colours and what thermal stops have in them, in their palettes, as much as x asks."""
+    """Mixes colours and what value stops have in them, in their palettes, as much as x asks."""
     model = obj.model
     shade = shade_of(model, x)
     if not shade.heats:

@@ -1,4 +1,4 @@
-"""launch.py info: what is in a scene."""
+"""launch.py info: what is in a scene, or in a capture."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +11,19 @@ from shapeshift.app.terminal import open_console, print_json
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    """Say what is in a scene."""
+    """Say what is in a scene, or what was found in a capture."""
 
     scene: Annotated[Path, POSITIONAL]
-    """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""
+    """A package, splats of any known format, a folder of layers, a scene file (docs/scene.md), or
+    posed photos (docs/capture.md)."""
     json: bool = False
     """JSON on standard output instead of a table."""
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.inspection.capture_facts import capture_facts, print_capture
     from shapeshift.app.scene_files import describe_scene, open_scene_file
+    from shapeshift.runtime_models.model import BadFile
     from shapeshift.runtime_models.read_scene import describe
     from shapeshift.scene.document.scene_file import is_scene_file
 
@@ -28,7 +31,13 @@ def run(options: Options) -> int:
         file, models, _ = open_scene_file(options.scene, options)
         facts = describe_scene(file, models, options.scene)
     else:
-        facts = describe(open_model(options.scene, options), options.scene)
+        try:
+            facts = describe(open_model(options.scene, options), options.scene)
+        except BadFile:
+            if (capture := capture_facts(options.scene)) is None:
+                raise
+            print_json(capture) if options.json else print_capture(capture)
+            return 0
     if options.json:
         print_json(facts)
     else:
@@ -45,7 +54,7 @@ def print_table(facts: dict) -> None:
         if value is None or (key == "anchors" and value == 0):  # made_of says what is there instead
             continue
         if key == "stops":
-            value = "\n".join(f"{s['x']:.3f}  {s['name']} ({s['kind']})" for s in value)
+            value = "\n".join(map(stop_line, value))
         elif key == "heads":
             value = "\n".join(
                 f"{name}: {' to '.join(map(str, head['layers']))}, {head['activation']}"
@@ -73,6 +82,15 @@ def print_table(facts: dict) -> None:
             value = f"{value:,}"
         table.add_row(key.replace("_", " "), Text(str(value)))  # names may hold brackets
     open_console(stderr=False).print(table)
+
+
+def stop_line(stop: dict) -> str:
+    """One stop."""
+    words = [stop["kind"]]
+    if ends := stop.get("value_range"):
+        words.append(f"{ends[0]:g} to {ends[1]:g} {stop['unit']}".rstrip())
+    words += [stop[key] for key in ("palette", "formula") if stop.get(key)]
+    return f"{stop['x']:.3f}  {stop['name']} ({', '.join(words)})"
 
 
 def level_line(level: dict) -> str:

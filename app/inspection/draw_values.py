@@ -1,4 +1,4 @@
-"""A scene's thermal stop as numbers: which one it is, its range, and a ValuePicture of a view."""
+"""A scene's stop of values as numbers: which one it is, its range, and a ValuePicture of a view."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -10,6 +10,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.renderer.colors.palette import LUMINANCE, PALETTES, STEPS, palette_colors
 from shapeshift.renderer.surface import SOLID
 from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stops.stop_formula import read_formula, sources_of
 from shapeshift.scene.appearance import NEUTRAL
 from shapeshift.scene.cameras.framing import default_background
 from shapeshift.scene.inspection.value_picture import ValuePicture
@@ -23,17 +24,19 @@ UNKNOWN = (-1.0, -1.0, -1.0)  # a background that no scene can have
 
 
 @dataclass(frozen=True)
-class ThermalScene:
+class MeasuredScene:
     """What is drawn to be measured."""
 
-    scene: Scene  # at the thermal stop, neither tinted nor graded
+    scene: Scene  # at the value stop, neither tinted nor graded
     stop: Stop  # with a value_range
     behind: float | None  # luminance of what the scene was trained before; None: not known
     colors: str = ""  # the palette that the scene's own colours are of; "": they are values
+    # Of a stop by formula: what is measured of the stops in it, by the formula's names.
+    parts: "tuple[tuple[str, MeasuredScene], ...]" = ()
 
 
 @dataclass(frozen=True)
-class ThermalChoice:
+class ValueChoice:
     """What a person says about the stop that is measured; empty: as the scene does."""
 
     stop: str = ""
@@ -42,7 +45,7 @@ class ThermalChoice:
     colors: str = ""  # a palette: the colours are its, values are looked up in it
 
 
-def thermal_scene(document: Document, choice: ThermalChoice = ThermalChoice()) -> ThermalScene:
+def measured_scene(document: Document, choice: ValueChoice = ValueChoice()) -> MeasuredScene:
     """The scene at the stop to be measured.  Raises UsageError, one sentence."""
     stop = _choose_stop(document, choice)
     value_range = choice.value_range or stop.value_range
@@ -58,7 +61,7 @@ def thermal_scene(document: Document, choice: ThermalChoice = ThermalChoice()) -
         )
     if choice.colors and choice.colors not in PALETTES:
         raise UsageError(f"there is no palette '{choice.colors}'; known are {', '.join(PALETTES)}.")
-    if not choice.colors and not (stop.kind == "thermal" and stop.palette):
+    if not choice.colors and not stop.has_false_colors:
         raise UsageError(
             f"the stop '{stop.name}' holds colours and no values; name the palette that they are "
             "of: --colors NAME (gray, where they are values)."
@@ -73,10 +76,17 @@ def thermal_scene(document: Document, choice: ThermalChoice = ThermalChoice()) -
         color = default_background(objects[0].model, UNKNOWN)
         behind = None if color == UNKNOWN else float(np.array(color) @ LUMINANCE)
     measured = replace(stop, value_range=(float(low), float(high)), unit=choice.unit or stop.unit)
-    return ThermalScene(Scene(objects), measured, behind, choice.colors)
+    parts: tuple[tuple[str, MeasuredScene], ...] = ()
+    if stop.formula and not choice.colors:
+        stops = next(model.stops for model in document.models if stop in model.stops)
+        parts = tuple(
+            (name, measured_scene(document, ValueChoice(source.name)))
+            for name, source in sources_of(read_formula(stop.formula), stops, stop.name).items()
+        )
+    return MeasuredScene(Scene(objects), measured, behind, choice.colors, parts)
 
 
-def _choose_stop(document: Document, choice: ThermalChoice) -> Stop:
+def _choose_stop(document: Document, choice: ValueChoice) -> Stop:
     stops = [stop for model in document.models for stop in model.stops]
     names = ", ".join(dict.fromkeys(stop.name for stop in stops))
     if choice.stop:
@@ -85,11 +95,15 @@ def _choose_stop(document: Document, choice: ThermalChoice) -> Stop:
                 return stop
         raise UsageError(f"there is no stop '{choice.stop}'; the scene has {names or 'none'}.")
     for stop in stops:
-        if stop.kind == "thermal":
+        if stop.is_heat:
+            return stop
+    for stop in stops:
+        if stop.is_measured:
             return stop
     raise UsageError(
-        f"the scene has no thermal stop (it has {names or 'none'}); where the colours of one are "
-        "of a palette, name both: --stop NAME --colors PALETTE --range LOW HIGH."
+        f"the scene has no thermal stop (it has {names or 'none'}) nor one of other values; where "
+        "the colours of one are of a palette, name both: --stop NAME --colors PALETTE --range LOW "
+        "HIGH."
     )
 
 
@@ -105,23 +119,26 @@ def _refuse_other_ranges(objects: tuple, stop: Stop) -> None:
                 )
 
 
-def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> ValuePicture:
+def draw_values(renderer: "Renderer", measured: MeasuredScene, view: View) -> ValuePicture:
     """Values and depths of a view, from the scene's values before the palette.
 
     The network gives values 0..1 (as luminance), which splats blend as they blend colours.  What a
     pixel lacks to full coverage showed, in training, what stood behind: that is put back where it
-    is known, else the value is divided by the coverage (docs/thermal.md has both errors).
+    is known, else the value is divided by the coverage (docs/thermal.md has both errors).  Of a
+    stop by formula it is the formula of the values of its stops, where all of them are known.
     """
+    if measured.parts:
+        return _by_formula(renderer, measured, view)
     with renderer.levels.all_whole():
-        renderer.update(thermal.scene)
+        renderer.update(measured.scene)
         renderer.draw([view])
         depth = renderer.surface(view).depth(SOLID).astype(np.float64)
-    behind, away = thermal.behind, None
-    if thermal.colors:
+    behind, away = measured.behind, None
+    if measured.colors:
         rgba = renderer.image(0).astype(np.float64)
         alpha = rgba[..., 3]
         colors = rgba[..., :3] / np.maximum(alpha, 1e-6)[..., None]
-        share, away = value_of_colors(colors, thermal.colors)
+        share, away = value_of_colors(colors, measured.colors)
     elif renderer.drawing.draws_heat:  # beside objects that have no such stop
         heat = renderer.drawing.heat(0).astype(np.float64)
         alpha = heat[..., 1]
@@ -130,18 +147,32 @@ def draw_values(renderer: "Renderer", thermal: ThermalScene, view: View) -> Valu
         rgba = renderer.image(0).astype(np.float64)
         alpha, share = rgba[..., 3], rgba[..., :3] @ LUMINANCE
         share = share / np.maximum(alpha, 1e-6) if behind is None else share + (1 - alpha) * behind
-    assert thermal.stop.value_range is not None  # thermal_scene has seen to it
-    low, high = thermal.stop.value_range
+    assert measured.stop.value_range is not None  # measured_scene has seen to it
+    low, high = measured.stop.value_range
     values = low + (high - low) * np.clip(share, 0, 1)
     known = (alpha >= SOLID) & np.isfinite(depth)
     return ValuePicture(
         view,
         np.where(known, values, np.nan),
         np.where(known, depth, np.nan),
-        thermal.stop.unit,
+        measured.stop.unit,
         (low, high),
         float(np.percentile(away[known], 95)) if away is not None and known.any() else None,
+        is_heat=measured.stop.kind != "values",
+        digits=measured.stop.digits,
     )
+
+
+def _by_formula(renderer: "Renderer", measured: MeasuredScene, view: View) -> ValuePicture:
+    """Pixel by pixel of what the stops in it show; depths are of the first, whose shapes it has."""
+    seen = {name: draw_values(renderer, part, view) for name, part in measured.parts}
+    values = read_formula(measured.stop.formula).value({n: s.values for n, s in seen.items()})
+    depth = next(iter(seen.values())).depth_m
+    assert measured.stop.value_range is not None  # measured_scene has seen to it
+    return ValuePicture(
+        view, values, np.where(np.isfinite(values), depth, np.nan), measured.stop.unit,
+        measured.stop.value_range, is_heat=False, digits=measured.stop.digits, may_exceed=True,
+    )  # fmt: skip
 
 
 def depth_picture(renderer: "Renderer", scene: Scene, view: View) -> ValuePicture:

@@ -6,7 +6,7 @@ import numpy as np
 
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.inspection.draw_values import ThermalScene, draw_values, value_of_colors
+from shapeshift.app.inspection.draw_values import MeasuredScene, draw_values, value_of_colors
 from shapeshift.app.progress import tracked
 from shapeshift.app.training.evaluate import trained_downscale
 from shapeshift.renderer.colors.palette import LUMINANCE
@@ -22,7 +22,7 @@ HALF = 128  # alpha of a photo's pixel that shows the scene, as of a value that 
 
 
 def held_out_error(
-    renderer: "Renderer", thermal: ThermalScene, document: Document, capture: Capture
+    renderer: "Renderer", measured: MeasuredScene, document: Document, capture: Capture
 ) -> HeldOutError:
     """Over all pixels of the held-out photos where both know a value.
 
@@ -35,22 +35,24 @@ def held_out_error(
         raise UsageError("--capture is of one model; a scene file has none of its own.")
     provenance = document.models[0].provenance
     capture = with_extrinsics(capture, rig_of(provenance))
-    photos = capture.of(thermal.stop.name, "test")
+    photos = capture.of(measured.stop.name, "test")
     if not photos:
         raise BadFile(
-            f"{capture.folder}: no photo of '{thermal.stop.name}' is held out for testing; mark "
+            f"{capture.folder}: no photo of '{measured.stop.name}' is held out for testing; mark "
             "some with split 'test'."
         )
     factor = trained_downscale(provenance) or choose_downscale(capture.photos)
-    assert thermal.stop.value_range is not None  # thermal_scene has seen to it
-    low, high = thermal.stop.value_range
+    assert measured.stop.value_range is not None  # measured_scene has seen to it
+    low, high = measured.stop.value_range
     errors = []
     for photo in tracked(photos, "comparing with held-out photos"):
         loaded = read(photo, factor, "auto")
         (view,) = moved([loaded.view], (np.array(capture.origin) - document.origin).tolist())
-        values = draw_values(renderer, thermal, view)
+        values = draw_values(renderer, measured, view)
         colors = loaded.rgba[..., :3] / 255.0
-        share = value_of_colors(colors, thermal.colors)[0] if thermal.colors else colors @ LUMINANCE
+        share = (
+            value_of_colors(colors, measured.colors)[0] if measured.colors else colors @ LUMINANCE
+        )
         counts = values.known & (loaded.rgba[..., 3] >= HALF)
         if loaded.weight is not None:
             counts &= loaded.weight >= 0.5

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.app.document import Document
-from shapeshift.app.inspection.draw_values import ThermalScene, draw_values
+from shapeshift.app.inspection.draw_values import MeasuredScene, draw_values
 from shapeshift.scene.inspection.emissivity import Emission
 from shapeshift.scene.inspection.length_marks import LengthMark
 from shapeshift.scene.inspection.marks import Isotherm, Mark, MarkReading, read_mark
 from shapeshift.scene.inspection.marks_file import MarksFile
-from shapeshift.scene.inspection.value_picture import ValuePicture, value_text
+from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer
 
+TABLE_DIGITS = 3  # of a value in a table for programs, more than for people
 COLUMNS = ("mark", "kind", "min", "mean", "max", "samples", "depth", "place")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would compute what begins so
 
@@ -46,12 +47,13 @@ class InspectedView:
     differences: tuple[tuple[str, str, float], ...]  # first, second, mean less mean
     isotherms: tuple[IsothermReading, ...]
     lengths: tuple[tuple[LengthMark, str], ...] = ()  # and what they come to, in words
+    stop_name: str = "Thermal"  # of its values
 
 
 def inspect_view(
     renderer: "Renderer",
     document: Document,
-    thermal: ThermalScene,
+    measured: MeasuredScene,
     photo_stop: str,
     view: View,
     emission: Emission | None = None,
@@ -59,7 +61,7 @@ def inspect_view(
     """The values of a view, and its photo where photo_stop names a stop; nothing is marked yet.
     emission: what corrects values, which are temperatures then.
     """
-    values = draw_values(renderer, thermal, view)
+    values = draw_values(renderer, measured, view)
     if emission is not None:
         values = values.corrected(emission)
     photo = None
@@ -67,13 +69,13 @@ def inspect_view(
         renderer.update(document.placed(photo_stop, "the photo's stop").scene)
         renderer.draw([view])
         photo = renderer.resolved(0).copy()
-    return InspectedView(values, photo, photo_stop, (), (), ())
+    return InspectedView(values, photo, photo_stop, (), (), (), stop_name=measured.stop.name)
 
 
-def first_photo(document: Document, thermal: ThermalScene) -> str:
-    """The stop that is shown beside the heat: the first that is not thermal; "": there is none."""
+def first_photo(document: Document, measured: MeasuredScene) -> str:
+    """The stop that is shown beside the heat: the first that shows no values; "": there is none."""
     stops = (stop for model in document.models for stop in model.stops)
-    others = (s.name for s in stops if s.kind != "thermal" and s.name != thermal.stop.name)
+    others = (s.name for s in stops if not s.is_measured and s.name != measured.stop.name)
     return next(others, "")
 
 
@@ -87,7 +89,7 @@ def with_readings(inspected: InspectedView, file: MarksFile, unit: str = "m") ->
     isotherms = tuple(_isotherm(each, values) for each in file.isotherms)
     return InspectedView(
         values, inspected.photo, inspected.photo_name, tuple(readings.values()), differences,
-        isotherms, length_words(file, unit),
+        isotherms, length_words(file, unit), inspected.stop_name,
     )  # fmt: skip
 
 
@@ -113,10 +115,7 @@ def place_text(mark: Mark, origin: np.ndarray) -> str:
 
 def reading_row(reading: MarkReading, values: ValuePicture, origin: np.ndarray) -> tuple[str, ...]:
     """The cells of COLUMNS."""
-    texts = [
-        value_text(value, values.unit, values.value_range)
-        for value in (reading.least, reading.mean, reading.most)
-    ]
+    texts = list(map(values.text, (reading.least, reading.mean, reading.most)))
     depth = f"{reading.depth_m:.3f} m" if np.isfinite(reading.depth_m) else "--"
     mark = reading.mark
     return (mark.name, mark.kind, *texts, str(reading.samples), depth, place_text(mark, origin))
@@ -145,13 +144,14 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
         for reading in each.readings:
             mark = reading.mark
             figures = (reading.least, reading.mean, reading.most)
+            digits = TABLE_DIGITS + each.values.digits
             rows.writerow(
                 (
                     number,
                     cell(mark.name),
                     mark.kind,
                     cell(each.values.unit),
-                    *map(number_cell, figures),
+                    *(number_cell(figure, digits) for figure in figures),
                     reading.samples,
                     number_cell(reading.depth_m),
                     *map(number_cell, mark.place + origin),
@@ -169,7 +169,7 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
                     "difference",
                     cell(each.values.unit),
                     "",
-                    number_cell(value),
+                    number_cell(value, TABLE_DIGITS + each.values.digits),
                     *gone,
                     "",
                     "",
@@ -185,16 +185,18 @@ def used_emissivity(mark: Mark, values: ValuePicture) -> float:
     return math.nan if values.emission is None else values.emission.surface.emissivity
 
 
-def profile_csv(reading: MarkReading, unit: str) -> str:
+def profile_csv(reading: MarkReading, unit: str, digits: int = 1) -> str:
     """The profile of a line: metres along it, and the value."""
     lines = [f"metres,{cell(unit) or 'value'}"]
-    lines += [f"{way:.5f},{number_cell(value)}" for way, value in reading.profile]
+    lines += [
+        f"{way:.5f},{number_cell(value, TABLE_DIGITS + digits)}" for way, value in reading.profile
+    ]
     return "\n".join(lines) + "\n"
 
 
-def number_cell(value: float) -> str:
+def number_cell(value: float, digits: int = 4) -> str:
     """A figure of a table; empty where it is not known."""
-    return f"{value + 0.0:.4f}" if np.isfinite(value) else ""
+    return f"{value + 0.0:.{digits}f}" if np.isfinite(value) else ""
 
 
 def cell(text: str) -> str:

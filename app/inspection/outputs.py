@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.app.inspection.draw_values import ThermalScene
+from shapeshift.app.inspection.draw_values import MeasuredScene
 from shapeshift.app.inspection.inspect_view import (
     COLUMNS,
     InspectedView,
@@ -26,20 +26,20 @@ from shapeshift.app.terminal import open_console, say
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.inspection.emissivity import Emission
 from shapeshift.scene.inspection.marks_file import MarksFile
-from shapeshift.scene.inspection.value_picture import ValuePicture, value_text
+from shapeshift.scene.inspection.value_picture import ValuePicture
 
 BETWEEN_PX = 8  # of pictures side by side
 
 
 def print_readings(
-    shown: Sequence[InspectedView], file: MarksFile, thermal: ThermalScene, origin: np.ndarray
+    shown: Sequence[InspectedView], file: MarksFile, measured: MeasuredScene, origin: np.ndarray
 ) -> None:
     """Tables on standard output."""
     from rich.table import Table
     from rich.text import Text
 
     console = open_console(stderr=False)
-    unit = thermal.stop.unit
+    unit = measured.stop.unit
     for number, each in enumerate(shown):
         table = Table(*COLUMNS[:-1])
         table.add_column(COLUMNS[-1], overflow="fold")  # to be typed again
@@ -53,7 +53,9 @@ def print_readings(
         for line in summary_lines(each):
             console.print(Text(line), soft_wrap=True)
     if file.held_out is not None:
-        console.print(Text(f"error: {file.held_out.words(unit)}"), soft_wrap=True)
+        console.print(
+            Text(f"error: {file.held_out.words(unit, measured.stop.digits)}"), soft_wrap=True
+        )
     else:
         say("The error of these values is not known; --capture CAPTURE measures it.")
 
@@ -71,17 +73,19 @@ def correction_line(values: ValuePicture, emission: Emission) -> str:
 def summary_lines(inspected: InspectedView) -> list[str]:
     """Differences, isotherms and the hottest place of a view."""
     values = inspected.values
-    lines = [
-        f"{a} less {b}: {value_text(value, values.unit)}" for a, b, value in inspected.differences
-    ]
+    lines = [f"{a} less {b}: {values.text(value, False)}" for a, b, value in inspected.differences]
     for each in inspected.isotherms:
-        ends = f", {each.least:.1f} to {each.most:.1f} {values.unit}".rstrip() if each.share else ""
+        least = f"{each.least:.{values.digits}f}"
+        ends = f", {least} to {values.text(each.most, False)}" if each.share else ""
         words = each.isotherm.words(values.unit)
         lines.append(f"{words}: {100 * each.share:.2f} % of what is seen{ends}")
     if values.known.any():
         (column, row), value = values.hottest()
-        text = value_text(value, values.unit, values.value_range)
-        lines.append(f"hottest: {text} at pixel {column:g},{row:g}")
+        word = "hottest" if values.is_heat else "highest"
+        lines.append(f"{word}: {values.text(value)} at pixel {column:g},{row:g}")
+        if not values.is_heat:
+            (column, row), value = values.lowest()
+            lines.append(f"lowest: {values.text(value)} at pixel {column:g},{row:g}")
     else:
         lines.append("nothing is covered by a half in this view")
     if values.emission is not None:
@@ -100,7 +104,8 @@ def three_pictures(inspected: InspectedView, scale: ColorScale) -> list[tuple[st
     heat = heat_picture(values, scale)
     marked = with_marks(heat, values, inspected.readings)
     unit = values.unit
-    title = f"Thermal, level {scale.level:.4g}, span {scale.span:.4g} {unit}".rstrip()
+    name = "Thermal" if values.is_heat else inspected.stop_name
+    title = f"{name}, level {scale.level:.4g}, span {scale.span:.4g} {unit}".rstrip()
     pictures = [(title, with_scale_bar(marked, scale, unit))]
     if inspected.photo is not None:
         photo = with_lengths(np.clip(inspected.photo, 0, 1), values.view, inspected.lengths)
@@ -137,7 +142,7 @@ def write_tables(path: Path, shown: Sequence[InspectedView], origin: np.ndarray)
     for reading in shown[0].readings:
         if reading.mark.kind == "line":
             name = f"{path.stem}.{file_name(reading.mark.name)}.csv"
-            text = profile_csv(reading, shown[0].values.unit)
+            text = profile_csv(reading, shown[0].values.unit, shown[0].values.digits)
             write_whole(path.with_name(name), text.encode())
     say(f"written to {full(path)}")
 

@@ -16,7 +16,6 @@ ALARM_SHARE = 0.7  # of an alarm's colour over the photo
 DIMMED = 0.45  # of the photo beside it, where there is an alarm
 LINE, BEHIND = (255, 255, 255), (16, 16, 16)
 AUTO = (1.0, 99.0)  # percentiles between which --auto shows
-LEAST_SPAN = 0.1  # in the stop's unit
 BAR_PART, BAR_LEAST = 28, 14  # the scale bar is a part of the width, or so many pixels
 
 
@@ -39,13 +38,15 @@ class ColorScale:
         return self.high - self.low
 
 
-def auto_ends(values: np.ndarray) -> tuple[float, float]:
-    """The ends that show nearly all values that are known; ValueError: there are none."""
+def auto_ends(values: np.ndarray, digits: int = 1) -> tuple[float, float]:
+    """The ends that show nearly all values that are known, apart by the last of their digits at
+    least; ValueError: there are none.
+    """
     known = values[np.isfinite(values)]
     if not len(known):
         raise ValueError("nothing is covered by a half in this view; choose another --camera.")
     low, high = np.percentile(known, AUTO)
-    middle, half = (low + high) / 2, max(high - low, LEAST_SPAN) / 2
+    middle, half = (low + high) / 2, max(high - low, 10.0**-digits) / 2
     return float(middle - half), float(middle + half)
 
 
@@ -92,7 +93,7 @@ def with_marks(
             for line in outline:
                 draw.line([tuple(p) for p in line], fill=color, width=width)
         value = reading.most if reading.mark.kind != "spot" else reading.mean
-        text = drawable(f"{reading.mark.name} {value:.1f}", height)
+        text = drawable(f"{reading.mark.name} {value:.{picture.digits}f}", height)
         wide = draw.textlength(text, font) + 4
         corner = np.concatenate(outline).max(axis=0) + 2
         left = min(max(corner[0], 0), drawn.width - wide)

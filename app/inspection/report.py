@@ -31,8 +31,10 @@ from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.pose import View
 
 CAMERAS_ENDING = ".camera.json"
+THERMAL_TITLE = "Thermal inspection"
 AS_PHOTOGRAPHED = "Values are apparent temperatures as the photos gave them"
 CORRECTED = "Values are temperatures of surfaces, corrected as the settings say"
+AS_IN_PHOTOS = "Values are as the photos gave them"
 VALUES_WORDS = (
     ", read before the palette; -- where less than half of a pixel is covered; < and > at the ends "
     "of the range."
@@ -151,8 +153,9 @@ def report_of(
     corrected = any(each.values.emission is not None for each in shown)
     if file.held_out is not None:
         of = "photographed values" if corrected else "values"
-        error = f"Error of the {of} {file.held_out.words(unit)}."
-    error += f" {CORRECTED if corrected else AS_PHOTOGRAPHED}{VALUES_WORDS}"
+        error = f"Error of the {of} {file.held_out.words(unit, stop.digits)}."
+    photographed = AS_IN_PHOTOS if stop.kind == "values" else AS_PHOTOGRAPHED
+    error += f" {CORRECTED if corrected else photographed}{VALUES_WORDS}"
     names = tuple(view.title for view in views)
     cameras = cameras_text([each.values.view for each in shown], names, origin)
     settings = settings_rows(stop, scale, shown, origin)
@@ -162,6 +165,11 @@ def report_of(
     return InspectionReport(
         head, views, settings, error, scene.name, stop.name, cameras, length_rows(measured)
     )
+
+
+def usual_title(stop: Stop) -> str:
+    """What a report of a stop is called where nobody says."""
+    return f"{stop.name} inspection" if stop.kind == "values" else THERMAL_TITLE
 
 
 def mark_photos(marks: Sequence[Mark]) -> list[tuple[str, np.ndarray]]:
@@ -178,14 +186,15 @@ def settings_rows(
     stop: Stop, scale: ColorScale, shown: Sequence[InspectedView], origin: np.ndarray
 ) -> list[tuple[str, str]]:
     """(what, value) of everything that the figures depend on."""
-    assert stop.value_range is not None  # thermal_scene has seen to it
+    assert stop.value_range is not None  # measured_scene has seen to it
     low, high = stop.value_range
     unit = stop.unit
+    level, span = (round(value, stop.digits) for value in (scale.level, scale.span))
     rows = [
         ("stop", stop.name),
         ("range of the photos", f"{low:g} to {high:g} {unit}".rstrip()),
         ("palette", scale.palette),
-        ("level, span", f"{round(scale.level, 1):g}, {round(scale.span, 1):g} {unit}".rstrip()),
+        ("level, span", f"{level:g}, {span:g} {unit}".rstrip()),
     ]
     emission = shown[0].values.emission
     if emission is not None:

@@ -1,4 +1,4 @@
-"""launch.py thermal: degrees of a scene at marks, alarms over its photo, tables and reports."""
+"""launch.py thermal: values of a scene at marks, alarms over its photo, tables and reports."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from shapeshift.app.document import Document
-    from shapeshift.app.inspection.draw_values import ThermalScene
+    from shapeshift.app.inspection.draw_values import MeasuredScene
     from shapeshift.app.inspection.inspect_view import InspectedView
     from shapeshift.app.inspection.pictures import ColorScale
     from shapeshift.scene.inspection.marks import Isotherm
@@ -26,8 +26,9 @@ MOST_VIEWS = 50
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    """Measure a thermal scene: spots, boxes, circles and lines in the world, isotherms, a picture,
-    a table, a report.  Values are those before the palette; -- says that nothing is known.
+    """Measure a scene of heat or other values: spots, boxes, circles and lines in the world,
+    isotherms, a picture, a table, a report.  Values are those before the palette; -- says that
+    nothing is known.
 
     A mark is [NAME=]numbers, by pixels of the view or by metres in the world.  Marks are kept in
     NAME.marks.json beside the scene where --save says so, and are read from there."""
@@ -47,9 +48,9 @@ class Options(ReadingOptions):
     difference: Annotated[tuple[str, ...], Opt(metavar="A,B")] = ()
     """Names of two marks: the mean of A less that of B.  Default: none."""
     above: float | None = None
-    """An isotherm: all that is hotter is an alarm.  Default: none."""
+    """An isotherm: all that is hotter, or higher, is an alarm.  Default: none."""
     below: float | None = None
-    """An isotherm: all that is colder.  Default: none."""
+    """An isotherm: all that is colder, or lower.  Default: none."""
     between: tuple[float, float] | None = None
     """An isotherm: all from one value to another.  Default: none."""
     emissivity: Annotated[tuple[str, ...], Opt(metavar="[MARK=]NUMBER")] = ()
@@ -107,8 +108,8 @@ class Options(ReadingOptions):
     capture: Path | None = None
     """The photos that the scene was trained on: the held-out ones give the stated error.
     Default: the error that the file of marks has, else none is stated."""
-    title: str = "Thermal inspection"
-    """What the report is called."""
+    title: str = ""
+    """What the report is called.  Default: Thermal inspection, or by the stop of other values."""
     client: str = ""
     """For whom the report is.  Default: nobody is named."""
     inspector: str = ""
@@ -118,7 +119,8 @@ class Options(ReadingOptions):
     date: str = ""
     """The day that the report names.  Default: today, as 2026-11-23."""
     stop: str = ""
-    """The stop that is measured.  Default: the first thermal one."""
+    """The stop that is measured.  Default: the first thermal one, else the first of other
+    values."""
     range: tuple[float, float] | None = None
     """The values that black and white of the stop stand for.  Default: what the scene says."""
     unit: str = ""
@@ -127,7 +129,7 @@ class Options(ReadingOptions):
     """For a stop whose colours are already those of this palette: values are looked up in it, and
     the error that this makes is said.  Default: the stop holds values."""
     photo: str = ""
-    """The stop that is shown as the photo, or none.  Default: the first that is not thermal."""
+    """The stop that is shown as the photo, or none.  Default: the first that shows no values."""
     overwrite: bool = False
     """Replace files of the same names."""
     fov_y: Annotated[float, EXPERT] = 0.0
@@ -143,7 +145,7 @@ def run(options: Options) -> int:
     from shapeshift.app.camera_files import named_cameras
     from shapeshift.app.document import open_document
     from shapeshift.app.drawing import open_renderer, parse_size
-    from shapeshift.app.inspection.draw_values import ThermalChoice, thermal_scene
+    from shapeshift.app.inspection.draw_values import ValueChoice, measured_scene
     from shapeshift.app.inspection.emission_options import choose_emission, with_emissivities
     from shapeshift.app.inspection.held_out import held_out_error
     from shapeshift.app.inspection.inspect_view import inspect_view, with_readings
@@ -159,33 +161,33 @@ def run(options: Options) -> int:
         cameras = named_cameras(options.camera, options.scene, options, size)
     path, file = open_marks(options)
     document = open_document(options.scene, options)
-    choice = ThermalChoice(options.stop, options.range, options.unit, options.colors)
-    thermal = thermal_scene(document, choice)
-    emission, own = choose_emission(options, file, thermal.stop.unit)
+    choice = ValueChoice(options.stop, options.range, options.unit, options.colors)
+    measured = measured_scene(document, choice)
+    emission, own = choose_emission(options, file, measured.stop.temperature_unit)
     file = replace(file, emission=emission)
     capture = open_capture(options.capture, options.memory or None) if options.capture else None
     views = choose_views(options, document, cameras, size)
-    photo = photo_stop(options, document, thermal)
+    photo = photo_stop(options, document, measured)
     with open_renderer(options.context, options.drawing) as (renderer, _):
         renderer.settings = replace(renderer.settings, background=document.background)
         shown = [
-            inspect_view(renderer, document, thermal, photo, view, emission)
+            inspect_view(renderer, document, measured, photo, view, emission)
             for view in tracked(views, "measuring")
         ]
         file = with_emissivities(with_new_marks(options, file, shown[0], document), own)
         file = with_remarks(file, options.remark, options.mark_photo)
         if capture is not None:
-            error = held_out_error(renderer, thermal, document, capture)
+            error = held_out_error(renderer, measured, document, capture)
             file = replace(file, held_out=error)
     shown = [with_readings(each, file) for each in shown]
-    scale = choose_scale(options, thermal, shown)
-    print_readings(shown, file, thermal, document.origin)
+    scale = choose_scale(options, measured, shown)
+    print_readings(shown, file, measured, document.origin)
     if options.out is not None:
         write_picture(options.out, shown, scale)
     if options.csv is not None:
         write_tables(options.csv, shown, document.origin)
     if options.report:
-        write_reports(options, thermal, shown, file, scale, document.origin)
+        write_reports(options, measured, shown, file, scale, document.origin)
     if options.save:
         keep_marks(path, file, document.origin)
     return 0
@@ -258,7 +260,7 @@ def choose_views(options: Options, document: "Document", cameras, size) -> "list
     return [views[number] for number in options.view]
 
 
-def photo_stop(options: Options, document: "Document", thermal: "ThermalScene") -> str:
+def photo_stop(options: Options, document: "Document", measured: "MeasuredScene") -> str:
     """The name of the stop that is shown as the photo; "": none.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
     from shapeshift.app.inspection.inspect_view import first_photo
@@ -272,7 +274,7 @@ def photo_stop(options: Options, document: "Document", thermal: "ThermalScene") 
             names = ", ".join(dict.fromkeys(stop.name for stop in stops))
             raise UsageError(f"--photo is '{options.photo}'; the scene has {names}.")
         return named[0]
-    return first_photo(document, thermal)
+    return first_photo(document, measured)
 
 
 def with_new_marks(
@@ -331,7 +333,7 @@ def choose_isotherms(options: Options) -> "list[Isotherm]":
 
 
 def choose_scale(
-    options: Options, thermal: "ThermalScene", shown: "list[InspectedView]"
+    options: Options, measured: "MeasuredScene", shown: "list[InspectedView]"
 ) -> "ColorScale":
     """Which values the palette shows.  Raises UsageError."""
     import numpy as np
@@ -339,12 +341,13 @@ def choose_scale(
     from shapeshift.app.errors import UsageError
     from shapeshift.app.inspection.pictures import ColorScale, auto_ends
 
-    palette = options.palette or thermal.colors or thermal.stop.palette
+    palette = options.palette or measured.colors or measured.stop.palette
     refuse_unknown_palette(palette)
     low, high = shown[0].values.value_range
     if options.auto:
         try:
-            low, high = auto_ends(np.concatenate([each.values.values.ravel() for each in shown]))
+            every = np.concatenate([each.values.values.ravel() for each in shown])
+            low, high = auto_ends(every, measured.stop.digits)
         except ValueError as error:
             raise UsageError(str(error)) from None
     level = (low + high) / 2 if options.level is None else options.level
@@ -365,7 +368,7 @@ def refuse_unknown_palette(name: str) -> None:
 
 def write_reports(
     options: Options,
-    thermal: "ThermalScene",
+    measured: "MeasuredScene",
     shown: "list[InspectedView]",
     file: "MarksFile",
     scale: "ColorScale",
@@ -373,11 +376,12 @@ def write_reports(
 ) -> None:
     """--report, each with the cameras of its views."""
     from shapeshift.app.drawing import make_folder
-    from shapeshift.app.inspection.report import ReportHead, report_of
+    from shapeshift.app.inspection.report import ReportHead, report_of, usual_title
     from shapeshift.app.inspection.report_pdf import write_report
 
-    head = ReportHead(options.title, options.date, options.client, options.inspector, options.note)
-    report = report_of(head, options.scene, thermal.stop, shown, file, scale, origin)
+    title = options.title or usual_title(measured.stop)
+    head = ReportHead(title, options.date, options.client, options.inspector, options.note)
+    report = report_of(head, options.scene, measured.stop, shown, file, scale, origin)
     for path in options.report:
         make_folder(path.parent)
         write_report(report, path)

@@ -134,7 +134,7 @@ def sample(model: Model, every: int) -> Model:
 
 def palettes_of(out: Container, models: list[Model]) -> dict:
     """All of them, where a stop has one: a page can choose."""
-    if not any(stop.kind == "thermal" and stop.palette for m in models for stop in m.stops):
+    if not any(stop.has_false_colors for m in models for stop in m.stops):
         return {}
     for model in models:
         for stop in model.stops:

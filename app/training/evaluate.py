@@ -9,6 +9,8 @@ from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
 from shapeshift.app.opening import ReadingOptions, open_capture, open_model
 from shapeshift.app.terminal import open_console, print_json, say
 
+NAMED = 3  # photos that a sentence names
+
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture
 
@@ -76,6 +78,8 @@ def run(options: Options) -> int:
     if distance is not None:
         result["vgg_file"] = distance.name
     print_table(result)
+    for line in said_of_unknown(result["modalities"]):
+        say(line)
     if options.downscale is None and (downscale or 1) > 1:
         say(
             f"Photos made {downscale} times smaller, as in the training; --downscale 1 takes them "
@@ -87,6 +91,20 @@ def run(options: Options) -> int:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")
     return 0
+
+
+def said_of_unknown(modalities: dict[str, dict]) -> list[str]:
+    """A sentence for each modality with pixels that have no value.  modalities: of `report`."""
+    said = []
+    for name, row in modalities.items():
+        if row.get("unknown"):
+            said.append(f"{name}: {row['unknown']:.2%} of the pixels have no value; not counted.")
+        if blank := row.get("photos_without_value"):
+            said.append(
+                f"{name}: no pixel of {', '.join(blank[:NAMED])} has a value; "
+                f"{len(blank)} held-out photos are in no figure."
+            )
+    return said
 
 
 def trained_downscale(provenance: dict) -> int | None:

@@ -81,6 +81,7 @@ def run(options: Options) -> int:
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.runtime_models.stops.formula_stop import with_placed_formulas
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.fit.fit import Fit
 
@@ -111,7 +112,8 @@ def run(options: Options) -> int:
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]
     report = {**model.provenance, "need": without_times(result)}
-    noted = with_pace(replace(model, provenance=report))
+    noted = with_placed_formulas(replace(model, provenance=report), capture.formulas)
+    noted = with_pace(noted)
     size = write_package(noted, options.out, need.fitted.storage)
     print_report(need)
     say(f"{full(options.out)}: {size:,} bytes, {WRITTEN}")

@@ -31,6 +31,8 @@ def run(options: Options) -> int:
     refuse_foreign(options.out)
     model = refuse_plain(open_model(options.scene, options))
     try:
+        if options.formula:
+            return add_formula(options, model)
         return remove(options, model) if options.remove else add(options, model)
     except KeyboardInterrupt:
         say("Interrupted; nothing was written.  A style takes minutes at most and starts anew.")
@@ -43,13 +45,19 @@ def check_options(options: Options) -> None:
 
     asked = {
         "--shape": options.shape, "--network": options.network, "--pictures": options.pictures,
-        "--image": options.image, "--text": options.text,
+        "--image": options.image, "--text": options.text, "--formula": options.formula,
     }  # fmt: skip
     given = [name for name, value in asked.items() if value]
     if options.remove and (given or options.name):
         raise UsageError(f"--remove takes a stop out; leave out {given[0] if given else '--name'}.")
     if options.remove:
         return
+    if options.formula:
+        check_formula_options(options, given)
+        return
+    for name in ("range", "unit", "palette"):
+        if getattr(options, name):
+            raise UsageError(f"--{name} is of values by --formula; add it, or leave --{name} out.")
     if not given:
         raise UsageError(f"a new stop needs one of {', '.join(asked)}; --help says what they do.")
     if options.network and options.pictures:
@@ -64,6 +72,28 @@ def check_options(options: Options) -> None:
         raise UsageError(
             f"--views is {views} and --size {size}; 1 to 500 and 32 to 640 are wanted."
         )
+
+
+def check_formula_options(options: Options, given: list[str]) -> None:
+    """Raises UsageError for what does not go with --formula, and for a formula that is none."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.stop import refuse_palette, refuse_unit
+    from shapeshift.runtime_models.stops.stop_formula import read_formula
+
+    others = {"--from": options.from_, "--region": options.region, "--keep": options.keep}
+    beside = [name for name in given if name != "--formula"]
+    beside += [name for name, value in others.items() if value]
+    if beside:
+        raise UsageError(f"--formula gives the values of the whole stop; leave {beside[0]} out.")
+    low, high = options.range or (0.0, 1.0)
+    if not (abs(low) < float("inf") and abs(high) < float("inf") and low < high):
+        raise UsageError(f"--range is {low:g} {high:g}; two numbers are wanted, the lower first.")
+    try:
+        read_formula(options.formula)
+        refuse_palette(options.palette)
+        refuse_unit(options.unit)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def remove(options: Options, model: "AnchorModel") -> int:
@@ -102,6 +132,36 @@ def add(options: Options, model: "AnchorModel") -> int:
         made = add_style(device, model, style, pictures, views, inside, progress, recolor)
     finish(options, model, made, style, inside)
     return 0
+
+
+def add_formula(options: Options, model: "AnchorModel") -> int:
+    """Puts a stop by formula of others into the scene."""
+    made, style = with_formula(options, model)
+    finish(options, model, made, style)
+    return 0
+
+
+def with_formula(options: Options, model: "AnchorModel") -> "tuple[AnchorModel, NewStyle]":
+    """The model with the stop, and what it is called.  Raises BadFile, UsageError."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.model import Stop
+    from shapeshift.runtime_models.stops.formula_stop import with_formula_stop
+    from shapeshift.runtime_models.stops.stop_formula import read_formula, sources_of
+    from shapeshift.training.styles.add_style import NewStyle
+
+    names = {stop.name.casefold(): stop.name for stop in model.stops}
+    if options.after and options.after.casefold() not in names:
+        raise UsageError(
+            f"--after is '{options.after}'; the stops are {', '.join(names.values())}."
+        )
+    after = names[options.after.casefold()] if options.after else None
+    name = options.name or "Index"
+    stop = Stop(
+        name, 0.0, "values", options.palette, options.range, options.unit, "", options.formula
+    )
+    made = with_formula_stop(model, stop, after)
+    sources = sources_of(read_formula(stop.formula), model.stops, name)
+    return made, NewStyle(name, next(iter(sources.values())).name, after)
 
 
 def style_of(options: Options, model: "AnchorModel") -> "NewStyle":

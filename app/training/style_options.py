@@ -12,7 +12,8 @@ Shape = Literal["", "fur", "blocks", "bubbles", "points", "melt", "explode", "st
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    """Put a new stop into a finished scene: a shape by rule, a style of pictures, or both.
+    """Put a new stop into a finished scene: a shape by rule, a style of pictures, or both; or
+    values by formula of other stops.
 
     Every other stop stays as it was.  It takes seconds to two minutes and needs no photos.
     """
@@ -50,6 +51,16 @@ class Options(ReadingOptions):
     pictures: Path | None = None
     """A folder of pictures of the scene that any other program has painted, one for each of
     --cameras, named as these or in their order.  Default: none."""
+    formula: str = ""
+    """Values by formula of stops of values, such as "(nir - red) / (nir + red)": numbers, names of
+    stops (between quotes, where they have other signs than letters) and + - * / ( ).
+    Default: none."""
+    range: tuple[float, float] | None = None
+    """Of --formula: the values at the palette's ends.  Default: what the scene has."""
+    unit: str = ""
+    """Of --formula: its unit.  Default: none."""
+    palette: str = ""
+    """Of --formula: its palette, as of `thermal`.  Default: viridis."""
     cameras: Path | None = None
     """A file of cameras from which the scene is looked at.  Default: a dome of --views about it."""
     from_: Annotated[str, Opt(metavar="STOP")] = ""

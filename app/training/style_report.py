@@ -28,6 +28,7 @@ def report(
             what = f"as it was, {drift[stop.name]:.0f} dB in the worst of 8 views{moved}"
         else:
             what = f"new, from {style.source}" if style is not None else "new"
+            what = f"new, {stop.formula}" if stop.formula else what
         lines.append(f"x = {stop.x:.3f}  {stop.name}: {what}")
     if inside is not None:
         lines.append(f"It changes {int(inside.sum()):,} of {len(inside):,} anchors.")

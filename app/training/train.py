@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.cluster.open_cluster import NONE, check_gpus
 from shapeshift.app.cluster.task import is_task
+from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
@@ -69,6 +70,7 @@ def run_whole(options: Options) -> int:
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options.asked, resume[1]["settings"] if resume else None)
     capture = open_capture(options.capture, options.memory)
+    print_files(capture.files)
     if resume is None:
         settings = suited(settings, options.asked, capture)
     device = open_device(options.device)
@@ -86,7 +88,7 @@ def run_whole(options: Options) -> int:
     step_s = seconds_a_step(trainer, before, time.monotonic() - began)
     save(trainer, options.out, checkpoint)
     if not interrupted:
-        pace_package(options.out)
+        pace_package(options.out, capture.formulas)
     more = [*refined(trainer, options.out), *trainer.exposures.warnings()]
     say(summary(trainer, options.out, interrupted), *more)
     lines, ended = what_next(options, trainer.iteration, step_s, interrupted), False

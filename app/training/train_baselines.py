@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from shapeshift.app.errors import UsageError, as_typed
+from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.progress import working
@@ -77,6 +78,7 @@ def run_baseline(options: Options, room: "PhotoRoom") -> int:
     plain = plain_settings(options) if options.model == "splats" else None
     settings = settings_of(options.asked) if plain is None else None
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
+    print_files(capture.files)
     if settings is not None:
         settings = suited(settings, options.asked, capture)
     say(f"{device.name}, {device.platform}")

@@ -106,7 +106,7 @@ def nodes_of(model: Model, eye: np.ndarray) -> Nodes:
         there |= shown
         # What is not there at this stop does not differ from its neighbours by it.
         color = np.where(shown[:, None], np.clip(color, 0, 1), np.clip(first, 0, 1))
-        columns.append(color.mean(1, keepdims=True) if stop.kind == "thermal" else color)
+        columns.append(color.mean(1, keepdims=True) if stop.is_measured else color)
     rows = np.flatnonzero(there & np.isfinite(means).all(1))
     return Nodes(count, rows, means[rows], np.concatenate(columns, axis=1)[rows])
 

@@ -4,6 +4,7 @@ Structure from motion by pycolmap (Schoenberger and Frahm 2016; "all photos at o
 et al. 2024), then the frame: upright, and in metres where a length is known.
 """
 
+import io
 import json
 import os
 from dataclasses import dataclass
@@ -11,16 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.decomposition.poses.photo_list import PhotoFile, PhotoList
+from shapeshift.decomposition.poses.photo_list import PhotoList
 from shapeshift.decomposition.poses.pose_report import PoseReport
 from shapeshift.decomposition.poses.upright import COLMAP_UP, find_up, length_between, similarity
 from shapeshift.decomposition.poses.write_posed import write_posed
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.colmap_child import Progress, run_child
+from shapeshift.scene.capture_files import photo_key
+from shapeshift.scene.captures.colmap.colmap_child import Progress, run_child
 from shapeshift.scene.captures.photo import open_image
-from shapeshift.scene.captures.read_colmap import find_mask
+from shapeshift.scene.mask_files import masks_in
 
 WORK = "poses.work"  # below the folder that is written, as long as the search is not done
 MOST_FOR_ALL_PAIRS = 120  # photos; beyond that neighbours by name are matched alone
@@ -166,9 +168,13 @@ def copy_masks(photos: PhotoList, masks: Path, work: Path) -> Path:
     """Masks under the names that COLMAP looks for, NAME.jpg.png.  Raises BadFile."""
     if not masks.is_dir():
         raise BadFile(f"{masks}: no folder of masks; name one with a PNG for each photo.")
-    found = 0
+    of, _ = masks_in(masks, [photo.name for photo in photos.photos])
+    if not of:
+        raise BadFile(
+            f"{masks}: no mask has a photo's name; a mask of a.jpg is called a.jpg.png or a.png."
+        )
     for photo in photos.photos:
-        source = mask_of(masks, photo)
+        source = of.get(photo_key(photo.name))
         if source is None:
             continue
         with open_image(source) as image:
@@ -177,23 +183,17 @@ def copy_masks(photos: PhotoList, masks: Path, work: Path) -> Path:
                     f"{path_end(source)} has {image.size[0]}x{image.size[1]} pixels, its photo "
                     f"{photo.size[0]}x{photo.size[1]}; a mask is as large as its photo."
                 )
-            seen = image.convert("L").getextrema()[1]
+            grey = image.convert("L")
+            seen, data = grey.getextrema()[1], source.read_bytes()
+            if image.format != "PNG":
+                file = io.BytesIO()
+                grey.save(file, "PNG")
+                data = file.getvalue()
         if not seen:
             raise BadFile(f"{path_end(source)} is all black; white marks what counts.")
         target = make_folders(work, Path("masks") / Path(photo.name).parent)
-        write_whole(target / f"{Path(photo.name).name}.png", source.read_bytes())
-        found += 1
-    if not found:
-        raise BadFile(
-            f"{masks}: no mask has a photo's name; a mask of a.jpg is called a.jpg.png or a.png."
-        )
+        write_whole(target / f"{Path(photo.name).name}.png", data)
     return work / "masks"
-
-
-def mask_of(masks: Path, photo: PhotoFile) -> Path | None:
-    return find_mask(masks.parent, photo.name) if masks.name == "masks" else next(
-        (p for p in (masks / f"{photo.name}.png", (masks / photo.name).with_suffix(".png"))
-         if p.is_file()), None)  # fmt: skip
 
 
 def frame_of(

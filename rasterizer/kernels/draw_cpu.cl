@@ -27,7 +27,7 @@
 #define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
                          2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
 
-// A kernel's arguments and those of its calls, with and without the heat of thermal stops.
+// A kernel's arguments and those of its calls, with and without the heat of value stops.
 #ifdef HEAT
 #define AND_HEAT , __global const float4* heat, __global float2* heat_image
 #define AND_HEAT_OF(view) , __global const float4* heat_##view, __global float2* heat_image_##view

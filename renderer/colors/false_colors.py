@@ -1,12 +1,12 @@
-"""Where false colours belong: what of each object's colours is a thermal stop's, and what is not.
+"""Where false colours belong: what of each object's colours is a value stop's, and what is not.
 
-A thermal stop gives values, a palette makes colours of them.  At a pure thermal stop the palette is
+A value stop gives values, a palette makes colours of them.  At a pure value stop the palette is
 laid over the whole picture, as a thermal camera does it: values are blended before they become
-colours.  Between such a stop and another one both stops' colours are decoded.  What is thermal, the
-heat, is then drawn in addition, splat by splat by its weight, and the palette is laid over the
-heat alone: a white tool is not hot because it is white; so it is where an object is tinted, whose
-tint is no value.  Where several palettes show at once there is no one picture of values; each
-splat's heat is coloured before it is drawn.
+colours.  Between such a stop and another one both stops' colours are decoded.  What is of values,
+heat or whatever was measured, is then drawn in addition, splat by splat by its weight, and the
+palette is laid over that alone: a white tool is not hot because it is white; so it is where an
+object is tinted, whose tint is no value.  Where several palettes show at once there is no one
+picture of values; each splat's heat is coloured before it is drawn.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ NO_HEAT, PICTURE, BESIDE, SPLATS = "no heat", "picture", "beside", "splats"  # w
 
 @dataclass(frozen=True, eq=False)
 class Heat:
-    """What one thermal stop has in the colours of an object."""
+    """What one value stop has in the colours of an object."""
 
     control: Controls  # where its values are decoded
     palette: str
@@ -46,7 +46,7 @@ class Shade:
 
     @property
     def pure(self) -> str:
-        """The palette of an object that shows a thermal stop and nothing else; "" for others."""
+        """The palette of an object that shows a value stop and nothing else; "" for others."""
         whole = len(self.heats) == 1 and (self.heats[0].weights == 1).all()
         return self.heats[0].palette if whole else ""
 
@@ -104,36 +104,34 @@ def false_colors(scene: Scene, controls: list[Controls], as_picture: bool = True
 
 def has_heat(model: Model) -> bool:
     """Whether a frame of the model between two stops can hold heat that palettes colour."""
-    return any(stop.kind == "thermal" and stop.palette for stop in model.blend.stops)
+    return any(stop.has_false_colors for stop in model.blend.stops)
 
 
 def shade_of(model: Model, control: Controls) -> Shade:
     """The colours that a model shows at a control, or at one an anchor."""
     control_of_colors = control if colors_follow_control(model) else 0.0
     rows = np.atleast_2d(model.blend.weights(control))  # (1, S) or (A, S)
-    thermal = [
-        s
-        for s, stop in enumerate(model.blend.stops)
-        if stop.kind == "thermal" and stop.palette and rows[:, s].any()
+    measured = [
+        s for s, stop in enumerate(model.blend.stops) if stop.has_false_colors and rows[:, s].any()
     ]
-    if not thermal:
+    if not measured:
         return Shade(control_of_colors)
     if isinstance(model, SplatLayers) and model.mode == "exclusive":
-        return _shade_of_layers(model, rows, thermal)
-    stops, others = model.blend.stops, np.delete(rows, thermal, axis=1)
-    if not others.any() and len(thermal) == 1:  # what lies beyond its stop is that stop's, too
+        return _shade_of_layers(model, rows, measured)
+    stops, others = model.blend.stops, np.delete(rows, measured, axis=1)
+    if not others.any() and len(measured) == 1:  # what lies beyond its stop is that stop's, too
         whole = np.ones(1, np.float32)
-        return Shade(None, (Heat(control_of_colors, stops[thermal[0]].palette, whole),))
+        return Shade(None, (Heat(control_of_colors, stops[measured[0]].palette, whole),))
     heats = [
-        Heat(stops[s].x, stops[s].palette, np.asarray(rows[:, s], np.float32)) for s in thermal
+        Heat(stops[s].x, stops[s].palette, np.asarray(rows[:, s], np.float32)) for s in measured
     ]
-    return Shade(_without(model, rows, thermal) if others.any() else None, tuple(heats))
+    return Shade(_without(model, rows, measured) if others.any() else None, tuple(heats))
 
 
-def _without(model: Model, rows: np.ndarray, thermal: list[int]) -> Controls:
+def _without(model: Model, rows: np.ndarray, measured: list[int]) -> Controls:
     """The blend of the other stops alone, in the same proportion."""
     kept = rows.copy()
-    kept[:, thermal] = 0
+    kept[:, measured] = 0
     total = kept.sum(axis=1, keepdims=True)
     kept = np.where(total > 0, kept / np.where(total > 0, total, 1), rows)  # else: does not matter
     if len(rows) > 1:
@@ -142,11 +140,11 @@ def _without(model: Model, rows: np.ndarray, thermal: list[int]) -> Controls:
     return StopWeights(tuple((names[s], float(kept[0, s])) for s in np.flatnonzero(kept[0])))
 
 
-def _shade_of_layers(model: SplatLayers, rows: np.ndarray, thermal: list[int]) -> Shade:
+def _shade_of_layers(model: SplatLayers, rows: np.ndarray, measured: list[int]) -> Shade:
     """Each splat is of one layer: heat or not, as its stop is; how much shows is its opacity."""
-    pure = not np.delete(rows, thermal, axis=1).any() and len(thermal) == 1
+    pure = not np.delete(rows, measured, axis=1).any() and len(measured) == 1
     heats = []
-    for s in thermal:
+    for s in measured:
         of_stop = np.ones(1) if pure else model.layer == s
         heats.append(Heat(0.0, model.stops[s].palette, np.asarray(of_stop, np.float32)))
     return Shade(None if pure else 0.0, tuple(heats))

@@ -1,4 +1,4 @@
-"""heat: what thermal stops have in the colours of splats, apart from what the other stops have."""
+"""heat: what value stops have in the colours of splats, apart from what the other stops have."""
 
 import moderngl
 import numpy as np
@@ -25,7 +25,7 @@ class Heater:
         palette: np.ndarray | None = None,
         first: bool = True,
     ) -> None:
-        """Heat of object i from its colours, just decoded at a thermal stop.
+        """Heat of object i from its colours, just decoded at a value stop.
 
         weights (n,) 0..1, one for as many splats side by side each; palette (256, 3): colours
         instead of values; first: what is there is of no use, else it is added to.
@@ -37,7 +37,7 @@ class Heater:
         if self._weights is None or self._weights.size < weights.nbytes:
             if self._weights is not None:
                 self._weights.release()
-            self._weights = self._gpu.reserve(weights.nbytes, "weights of a thermal stop")
+            self._weights = self._gpu.reserve(weights.nbytes, "weights of a value stop")
         overwrite(self._weights, weights)
         if palette is not None:
             overwrite(self._palette, np.pad(np.float32(palette), ((0, 0), (0, 1))))

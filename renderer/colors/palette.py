@@ -1,4 +1,4 @@
-"""Palettes of thermal stops, and how much of a palette the control value asks for."""
+"""Palettes of value stops, and how much of a palette the control value asks for."""
 
 from functools import cache, lru_cache
 
@@ -105,7 +105,7 @@ def palette_colors(name: str) -> np.ndarray:
     """(256, 3) float32 display sRGB of a palette, read only; BadFile for an unknown name."""
     if name not in PALETTES:
         known = ", ".join(PALETTES)
-        raise BadFile(f"there is no palette {name!r}; a thermal stop may name one of: {known}.")
+        raise BadFile(f"there is no palette {name!r}; a stop of values may name one of: {known}.")
     colors = PALETTES[name]().astype(np.float32)
     colors.flags.writeable = False
     return colors
@@ -125,36 +125,36 @@ def palette_between(name: str, ends: tuple[float, float]) -> np.ndarray:
     return colors
 
 
-def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
-    """(palette name, weight 0..1, stop) of the visible object that is nearest to a thermal stop, or
+def value_blend(scene: Scene) -> tuple[str, float, Stop | None]:
+    """(palette name, weight 0..1, stop) of the visible object that is nearest to a value stop, or
     has a part that is: what a legend tells.
 
-    The weight is 1 at a thermal stop and falls to 0 at the next stop that is not thermal.
+    The weight is 1 at a value stop and falls to 0 at the next stop that shows no values.
     Name "" (the stop's colours are final) and weight 0: nothing to do.
     """
     best: tuple[str, float, Stop | None] = ("", 0.0, None)
     for obj in scene.objects:
         for x in controls_within(obj) if obj.seen else ():
-            weights, stop = thermal_weights(obj.model.blend, x)
+            weights, stop = value_weights(obj.model.blend, x)
             if stop is not None and weights[0] > best[1]:
                 best = (stop.palette, float(weights[0]), stop)
     return best
 
 
-def thermal_weights(blend: StopBlend, controls: Controls) -> tuple[np.ndarray, Stop | None]:
-    """(n,) 0..1: how much of a palette each of n controls asks for; and the thermal stop that is
-    nearest to most of them, None where no stop is thermal.
+def value_weights(blend: StopBlend, controls: Controls) -> tuple[np.ndarray, Stop | None]:
+    """(n,) 0..1: how much of a palette each of n controls asks for; and the value stop that is
+    nearest to most of them, None where no stop shows values.
     """
     rows = np.atleast_2d(blend.weights(controls))  # (n, S)
-    thermal = [s for s, stop in enumerate(blend.stops) if stop.kind == "thermal"]
-    if not thermal or not len(rows):
+    measured = [s for s, stop in enumerate(blend.stops) if stop.is_measured]
+    if not measured or not len(rows):
         return np.zeros(len(rows)), None
-    nearest = thermal[int(np.argmax(rows[:, thermal].sum(axis=0)))]
-    return np.minimum(rows[:, thermal].sum(axis=1), 1.0), blend.stops[nearest]
+    nearest = measured[int(np.argmax(rows[:, measured].sum(axis=0)))]
+    return np.minimum(rows[:, measured].sum(axis=1), 1.0), blend.stops[nearest]
 
 
 def legend_opacity(weight: float) -> float:
-    """How much of a thermal stop's legend is seen at its weight: all from one half on."""
+    """How much of a value stop's legend is seen at its weight: all from one half on."""
     return min(2 * weight, 1.0)
 
 

@@ -117,7 +117,7 @@ class Arena:
             before.release()
 
     def heat_of(self, which: int) -> moderngl.Buffer:
-        """What thermal stops have in a set of colours; made, all zero, when first asked for."""
+        """What value stops have in a set of colours; made, all zero, when first asked for."""
         if which not in self._heats:
             self._heats[which] = self.gpu.reserve(16 * self.count, "heat")
         return self._heats[which]
@@ -244,7 +244,7 @@ class Arena:
                 overwrite(buffer, data, offset=4 * width * start)
 
     def write_heat(self, i: int, heat: np.ndarray) -> None:
-        """Uploads what thermal stops have in the colours of object i, (n, 4), to the set in use."""
+        """Uploads what value stops have in the colours of object i, (n, 4), to the set in use."""
         start, end = self._rows(i, heat, "heats")
         if end > start:
             overwrite(self.heat, np.ascontiguousarray(heat, np.float32), offset=16 * start)

@@ -32,7 +32,7 @@ class Decoder:
         if mlps not in MLPS:
             raise ValueError(f"there are no networks by {mlps!r}; choose {' or '.join(MLPS)}.")
         self._gpu, self._arena = gpu, arena
-        # Its programs compile now, not in the first frame between a thermal stop and another.
+        # Its programs compile now, not in the first frame between a value stop and another.
         self._heater = Heater(gpu) if any(map(has_heat, models)) else None
         made: dict[int, Layers | GlNetworks | GlBlocks | Evaluator] = {}
         for model in models:

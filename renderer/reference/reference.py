@@ -56,7 +56,7 @@ def reference_image(
     middle: np.ndarray | None = None,
 ) -> np.ndarray:
     """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top; at a pure
-    thermal stop values.
+    value stop values.
 
     eye: (3,) world metres, where colours are looked at from, if not the view's own eye (shared
     colours of two eyes: the middle of both).  middle: where distances in the order "distance" are

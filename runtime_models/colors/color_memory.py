@@ -26,7 +26,7 @@ class DecodesColors(Protocol):
 class ColorMemory:
     """The last colours of each part that a picture is mixed of.
 
-    Between a photo and a thermal stop the colours of both are decoded.  They stay while x moves
+    Between a photo and a value stop the colours of both are decoded.  They stay while x moves
     between the two and the eye stands still, so that a slider then costs the shapes alone.
     """
 

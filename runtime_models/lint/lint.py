@@ -56,6 +56,7 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
         extra=raw.extra,
         findings=tuple(findings),
         format=raw.format,
+        axes=raw.axes,
         motion=motion_of(raw.extra, ours),
         memory=memory,
     )

@@ -23,6 +23,7 @@ from shapeshift.runtime_models.package.package_files import (
 )
 from shapeshift.runtime_models.stop_dates import check_dates
 from shapeshift.runtime_models.stop_weights import Pace
+from shapeshift.runtime_models.stops.stop_formula import check_formulas
 
 LARGEST_COUNT = 4096  # splats an anchor, features, Gaussians of the encoding
 LONGEST_PACE = 257  # weights of one pair of stops
@@ -133,6 +134,7 @@ def read_stops(entry: Fields) -> tuple[Stop, ...]:
         raise BadFile(f"{entry.where}: two stops have one name in {shown(names)}.")
     try:
         check_dates(stops)
+        check_formulas(stops)
     except ValueError as error:
         raise BadFile(f"{entry.where}: {error}") from None
     return stops
@@ -142,10 +144,14 @@ def read_stop(entry: Fields) -> Stop:
     name, x = entry.text("name"), entry.number("x", wanted="0 to 1", low=0, high=1)
     kind, palette = entry.line("kind", known=STOP_KINDS), entry.text("palette", "")
     date = entry.line("date") if entry.has("date") else ""
-    if not entry.has("value_range"):
-        return Stop(name, x, kind, palette, date=date)
-    value_range = entry.pair("value_range", most=LARGEST_NUMBER)
-    return Stop(name, x, kind, palette, value_range, entry.text("unit", ""), date)
+    ends, unit = None, ""
+    if entry.has("value_range"):
+        ends, unit = entry.pair("value_range", most=LARGEST_NUMBER), entry.text("unit", "")
+    formula = entry.text("formula", "") if kind == "values" else ""
+    try:
+        return Stop(name, x, kind, palette, ends, unit, date, formula)
+    except ValueError as error:
+        raise BadFile(f"{entry.where}: {error}") from None
 
 
 def read_pace(top: Fields, stops: set[str]) -> tuple[Pace, ...]:

@@ -133,6 +133,8 @@ def describe_stop(stop: Stop) -> dict:
         row["palette"] = stop.palette
     if stop.value_range is not None:
         row |= {"value_range": list(stop.value_range), "unit": stop.unit}
+    if stop.formula:
+        row["formula"] = stop.formula
     if stop.date:
         row["date"] = stop.date
     return row

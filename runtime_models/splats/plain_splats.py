@@ -83,6 +83,7 @@ class RawSplats:
     logits: bool = True
     up: str = COLMAP_UP  # the axis that points up by the format's convention
     front: bool = False  # +Z is the front, as glTF has it: half a turn about +Y from ours
+    axes: str = ""  # which they are, and why, where the format alone does not tell
     antialiased: bool = False
     labels: np.ndarray | None = None  # (N,) int32
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) other columns, as filed
@@ -133,6 +134,7 @@ class PlainSplats:
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) each
     findings: tuple[Finding, ...] = ()
     format: str = "3DGS PLY"
+    axes: str = ""  # as of RawSplats
     motion: SplatMotion | None = None  # None: they do not move
     memory: Account = field(default_factory=unlimited, compare=False)  # as of RawSplats
 

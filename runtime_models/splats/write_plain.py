@@ -3,6 +3,7 @@
 import importlib
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,10 +30,10 @@ class Writer:
     far: bool = True  # keeps places far from zero, or refuses them
     also: tuple[str, ...] = ()  # further endings
 
-    def write(self, splats: PlainSplats, path: Path) -> None:
-        """Atomic; what the format cannot hold is lost."""
+    def write(self, splats: PlainSplats, path: Path, **options: Any) -> None:
+        """Atomic; what the format cannot hold is lost.  options: of the function itself."""
         module = importlib.import_module(f"{__package__}.{self.function}")
-        getattr(module, self.function.rpartition(".")[2])(splats, path)
+        getattr(module, self.function.rpartition(".")[2])(splats, path, **options)
 
 
 WRITERS = (  # of two endings that fit a name, the longer one stands first

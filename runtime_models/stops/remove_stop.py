@@ -8,6 +8,7 @@ from shapeshift.runtime_models.colors.light_harmonics import most_light
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Mlp
 from shapeshift.runtime_models.package.refit_encoding import place_stops, split_columns
 from shapeshift.runtime_models.stops.insert_stop import even_places
+from shapeshift.runtime_models.stops.stop_formula import read_formula, sources_of
 
 
 def remove_stop(model: AnchorModel, name: str) -> AnchorModel:
@@ -19,6 +20,13 @@ def remove_stop(model: AnchorModel, name: str) -> AnchorModel:
     names = [stop.name for stop in model.stops]
     if name not in names:
         raise BadFile(f"the scene has no stop '{name}'; it has {', '.join(names)}.")
+    for stop in model.stops:
+        if stop.formula and stop.name != name:
+            sources = sources_of(read_formula(stop.formula), model.stops, stop.name)
+            if name in (source.name for source in sources.values()):
+                raise BadFile(
+                    f"'{stop.name}' is by formula of '{name}'; remove '{stop.name}' first."
+                )
     if len(names) == 1:
         raise BadFile(f"'{name}' is the only stop of the scene; one has to stay.")
     places = even_places([each for each in names if each != name])

@@ -61,7 +61,7 @@ def describe_stops(model: AnchorModel | SplatLayers) -> dict:
     names = model.blend.names
     stops = [
         {"name": stop.name, "x": stop.x, "kind": stop.kind, "palette": stop.palette,
-         "valueRange": stop.value_range, "unit": stop.unit}
+         "valueRange": stop.value_range, "unit": stop.unit, "digits": stop.digits}
         for stop in model.stops
     ]  # fmt: skip
     pace = [

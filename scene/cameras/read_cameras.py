@@ -19,11 +19,14 @@ from shapeshift.scene.cameras.read_transforms_cameras import MARK as TRANSFORMS_
 from shapeshift.scene.cameras.read_transforms_cameras import read_transforms_cameras
 from shapeshift.scene.captures.colmap_tables import TABLES as COLMAP_TABLES
 from shapeshift.scene.captures.colmap_tables import find_model
+from shapeshift.scene.captures.foreign.foreign_cameras import read_foreign_cameras
+from shapeshift.scene.captures.foreign.read_foreign import is_table_of_lenses
 from shapeshift.scene.pose import View
 
 KNOWN = (
     "a list of cameras (JSON of our own, 3DGS's cameras.json, transforms.json, nerfstudio's "
-    "camera_path.json, splatapult's _vr.json) or a COLMAP model"
+    "camera_path.json, splatapult's _vr.json), a COLMAP model, or a file of another program "
+    "(docs/capture.md)"
 )
 IN_FOLDERS = ("transforms.json", "transforms_multimodal.json", "cameras.json")
 SPLITS = ("train", "val", "test")
@@ -43,6 +46,8 @@ def read_camera_list(path: str | Path, reading: CameraReading | None = None) -> 
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if path.is_dir():
         return read_folder(path, reading)
+    if (found := read_foreign_cameras(path, reading)) is not None:
+        return found
     if path.stem in COLMAP_TABLES and path.suffix in (".bin", ".txt"):
         return read_colmap_cameras(path.parent, path.suffix, reading)
     if path.is_file():  # a pipe would wait; read_json refuses it
@@ -68,12 +73,14 @@ def read_camera_list(path: str | Path, reading: CameraReading | None = None) -> 
 
 def read_folder(folder: Path, reading: CameraReading) -> CameraList:
     for name in IN_FOLDERS:
-        if (folder / name).is_file():
+        if (folder / name).is_file() and not is_table_of_lenses(folder / name):
             return read_camera_list(folder / name, reading)
     splits = [folder / f"transforms_{s}.json" for s in SPLITS]
     if splits[0].is_file():
         return read_transforms_cameras([s for s in splits if s.is_file()], reading)
     found = find_model(folder)
+    if found is None and (foreign := read_foreign_cameras(folder, reading)) is not None:
+        return foreign
     if found is None:
         raise BadFile(f"{folder} holds no cameras; wanted is {KNOWN}.")
     return read_colmap_cameras(*found, reading)

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from shapeshift.scene.cameras.camera_list import (
 from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.capture_photos import image_size
 from shapeshift.scene.captures.capture_rules import COLMAP_UP, CaptureWorld
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.read_transforms import POSES, gather, opencv_axes
 from shapeshift.scene.pose import View
 
@@ -51,7 +52,14 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
     the capture would be (docs/capture.md).  Raises BadFile.
     """
     data, entries = gather(tuple(files))
-    where, notes = files[0].name, Notes()
+    return cameras_of(data, entries, files[0], reading)
+
+
+def cameras_of(
+    data: dict, entries: Sequence[Mapping], file: Path, reading: CameraReading
+) -> CameraList:
+    """The views of frames, and of what their file says for all; photos lie beside it."""
+    where, notes = file.name, Notes()
     frames = [f"{where}, frame {i}" for i in range(len(entries))]
     # A left-handed world is turned round as that of the capture; --up is of a PLY in it.
     cameras = [pose_of(e, at, not reading.up) for e, at in zip(entries, frames, strict=True)]
@@ -63,7 +71,7 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
         turn = flipped(reading) @ world.ours_from_file
     views, names = [], []
     for entry, camera, at in zip(entries, cameras, frames, strict=True):
-        views.append(view_of(entry, turn @ camera, files[0].parent, reading, notes, at))
+        views.append(view_of(entry, turn @ camera, file.parent, reading, notes, at))
         names.append(read_name(entry.get("file_path") or entry.get("file")))
     kept = first_of_each(views)
     return CameraList(
@@ -100,6 +108,7 @@ def view_of(
         fy = height / 2 / math.tan(fov_y / 2)
     centre = (entry.get("cx", width / 2), entry.get("cy", height / 2))
     bent = any(is_number(entry.get(k)) and entry[k] != 0 for k in LENS)
+    bent |= isinstance(lens := entry.get("lens"), ColmapCamera) and lens.bends
     notes.bent |= bent or "FISHEYE" in str(entry.get("camera_model", ""))
     view = pinhole_view(camera, (fx or fy, fy or fx), centre, size, where)
     return view.resized(reading.size) if reading.size else view

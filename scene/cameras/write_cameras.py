@@ -8,7 +8,7 @@ from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_camera_path import camera_path
-from shapeshift.scene.cameras.write_colmap_cameras import write_colmap_cameras
+from shapeshift.scene.cameras.write_colmap_cameras import stale_tables, write_colmap_cameras
 from shapeshift.scene.cameras.write_floor import floor
 from shapeshift.scene.cameras.write_inria_cameras import inria_rows
 from shapeshift.scene.cameras.write_own_cameras import own_rows
@@ -32,6 +32,11 @@ def paths_of(path: Path, form: str) -> list[Path]:
     if form in COLMAP_FORMS:
         return [path / SPARSE / (table + COLMAP_FORMS[form]) for table in TABLES]
     return [path]
+
+
+def stale_paths(path: Path, form: str) -> list[Path]:
+    """Files there that writing in `form` to `path` removes, as they would contradict it."""
+    return stale_tables(path / SPARSE, COLMAP_FORMS[form]) if form in COLMAP_FORMS else []
 
 
 def write_cameras(cameras: CameraList, path: Path, form: str) -> list[Path]:

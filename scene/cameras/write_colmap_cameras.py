@@ -1,5 +1,6 @@
 """A COLMAP model, text or binary, of PINHOLE cameras and posed images without points."""
 
+import os
 import struct
 from pathlib import Path
 
@@ -7,11 +8,13 @@ import numpy as np
 
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.cameras.camera_list import CameraList, data_from_ours
+from shapeshift.scene.captures.colmap.rig_frames import TABLES as RIG_TABLES
 from shapeshift.scene.captures.colmap_tables import (
     CAMERA,
     COUNT,
     IMAGE,
     LENS_NUMBERS,
+    TABLES,
     ColmapCamera,
     Posed,
 )
@@ -26,8 +29,21 @@ HEADS = {
 }
 
 
+def stale_tables(folder: Path, ending: str) -> list[Path]:
+    """What lies in `folder` of another model and would contradict one that is written there.
+
+    COLMAP takes the poses of rigs and frames, not those of images; of text and binary it takes,
+    as we do, what is binary.
+    """
+    other = {".bin": ".txt", ".txt": ".bin"}[ending]
+    names = [f"{table}{other}" for table in TABLES]
+    names += [f"{table}{each}" for table in RIG_TABLES for each in (ending, other)]
+    return [path for name in names if os.path.lexists(path := folder / name)]
+
+
 def write_colmap_cameras(cameras: CameraList, folder: Path, ending: str) -> list[Path]:
-    """Writes cameras, images and points3D (.bin or .txt) into `folder`, which is there."""
+    """Writes cameras, images and points3D (.bin or .txt) into `folder`, which is there, and removes
+    what of an older model contradicts them."""
     lenses, posed = tables_of(cameras)
     make = {".bin": (camera_bytes, image_bytes), ".txt": (camera_text, image_text)}[ending]
     tables = {"cameras": make[0](lenses), "images": make[1](posed)}
@@ -36,6 +52,8 @@ def write_colmap_cameras(cameras: CameraList, folder: Path, ending: str) -> list
     for name, data in tables.items():
         paths.append(folder / (name + ending))
         write_whole(paths[-1], data)
+    for path in stale_tables(folder, ending):
+        path.unlink()
     return paths
 
 

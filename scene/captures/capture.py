@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
+from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
 from shapeshift.scene.pose import View
 
 LEFT_HANDED = "left_handed"  # in the notes: the file's world is, and its x was turned round
@@ -29,6 +30,12 @@ class Photo:
     lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
     mask_means: str = "object"  # one of MASKS; "" while a reader has not settled it
     float_depth_unit: float = 1.0  # metres of 1, where the depth photo holds floats
+    band: int = 0  # which of several that its file holds, counted from 1; 0: it holds one
+    mode: str = ""  # what its pixels are, as PIL names it ("RGB", "L", "I;16"); "": not looked at
+    no_value: NoValue = SAID_NOTHING  # which of its numbers are none, beside what its file says
+    may_lack_values: bool = (
+        False  # whether a pixel may have none: its header or its capture says so
+    )
 
     @property
     def file_size(self) -> tuple[int, int]:
@@ -37,11 +44,24 @@ class Photo:
 
     @property
     def name(self) -> str:
-        """Its file; of a panorama's faces also where they look, since they share one."""
+        """Its file; of bands also which, of a panorama's faces where they look: they share one."""
+        path = f"{self.path} (band {self.band})" if self.band else str(self.path)
         if self.lens is None or self.lens.model != PANORAMA:
-            return str(self.path)
+            return path
         right, up = self.lens.params[4:6]
-        return f"{self.path} ({right:g} degrees right, {up:g} up)"
+        return f"{path} ({right:g} degrees right, {up:g} up)"
+
+
+@dataclass(frozen=True)
+class FoundFiles:
+    """One row of what a capture found: files of one kind that met one fate."""
+
+    kind: str  # photos, masks, models ...
+    found: int  # that are there
+    used: int  # all of them, or none
+    left_out: int  # all that are there, or that should be
+    why: str = ""
+    example: str = ""  # the first that is left out
 
 
 @dataclass(frozen=True)
@@ -54,6 +74,8 @@ class Capture:
     background: tuple[float, float, float] | None = None  # what lies behind; None = black
     notes: dict = field(default_factory=dict)
     doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
+    formulas: tuple[Stop, ...] = ()  # stops of values by formula of its stops', without photos
+    files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]

@@ -2,16 +2,18 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, rows_of, shown
+from shapeshift.runtime_models.files.json_fields import Fields, is_number, rows_of, shown
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.shapes import three
+from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.runtime_models.stop_names import guess_kind
+from shapeshift.runtime_models.stops.stop_formula import check_formulas, read_formula
 from shapeshift.scene.cameras.photo_view import subject_distance
 from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
 from shapeshift.scene.captures.dated_stops import (
@@ -21,6 +23,9 @@ from shapeshift.scene.captures.dated_stops import (
     placed_by_date,
 )
 from shapeshift.scene.captures.photo import decoded, over_black
+from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
+from shapeshift.scene.captures.radiometric.number_photos import JPEGS
+from shapeshift.scene.captures.radiometric.stated_bands import with_bands
 from shapeshift.scene.captures.value_ranges import with_own_ranges
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
@@ -80,7 +85,13 @@ class CaptureWorld:
         doubts: tuple[str, ...] = (),
     ) -> Capture:
         """The finished capture; `guessed` = nobody said what the modalities are."""
+        formulas = tuple(stop for stop in stops if stop.formula)
+        stops = tuple(stop for stop in stops if not stop.formula)
         stops, photos, more = with_own_ranges(stops, photos)
+        try:
+            check_formulas((*stops, *formulas))
+        except ValueError as error:
+            raise BadFile(f"{folder}: {error}") from None
         notes = {"up_in_file": self.up} | (notes or {})
         if self.left_handed:
             notes[LEFT_HANDED] = True
@@ -110,6 +121,7 @@ class CaptureWorld:
             background,
             notes,
             doubts + more,
+            formulas,
         )
 
 
@@ -224,30 +236,29 @@ def upright_rotation(up: object, where: str) -> np.ndarray:
     return out
 
 
-def spread_stops(names: Iterable[str]) -> tuple[Stop, ...]:
-    """Stops evenly from 0 to 1 in the order of the names, the kind read from the name; names that
-    are dates are stops of visible light as far apart as these.
+def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop, ...]:
+    """Stops evenly from 0 to 1 in the order of the names, the kind read from the name unless it is
+    given; names that are dates are stops of visible light as far apart as these.
     """
     names = list(names)
+    kinds = kinds or [guess_kind(name, len(names)) for name in names]
     if dated := named_by_date(names):
         return dated
     xs = np.linspace(0, 1, len(names)) if len(names) > 1 else [0.0]
-    return tuple(
-        Stop(name, float(x), guess_kind(name, len(names)))
-        for name, x in zip(names, xs, strict=True)
-    )
+    return tuple(Stop(name, float(x), kind) for name, x, kind in zip(names, xs, kinds, strict=True))
 
 
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:
-    """Thermal stops of grey photos get a palette; false-colour photos keep their own colours."""
+    """Stops of values get a palette where their photos are grey; false colours stay as they are."""
 
     def grey(name: str) -> bool:
         photo = next(p for p in photos if p.modality == name)
-        image, _ = decoded(photo.path, photo.counts)
+        image = decoded(photo.path, photo.counts, band=photo.band).image
         return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
     return tuple(
-        replace(s, palette="ironbow") if s.kind == "thermal" and grey(s.name) else s for s in stops
+        replace(s, palette=USUAL_PALETTE[s.kind]) if s.is_measured and grey(s.name) else s
+        for s in stops
     )
 
 
@@ -265,17 +276,19 @@ def stop_from(entry: Fields, where: str) -> Stop:
     name = entry.text("name")
     entry.where = f"{where}: modality {shown(name)}"
     date = date_in_entry(entry)
-    return Stop(
-        name,
-        entry.number("x", wanted="0 to 1", low=0, high=1)
-        if entry.has("x") or not date
-        else NO_PLACE,
-        entry.line("kind", "rgb", known=STOP_KINDS) if entry.has("kind") else "rgb",
-        entry.text("palette", ""),
-        entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None,
-        entry.text("unit", ""),
-        date,
-    )
+    x, kind = NO_PLACE, "rgb"
+    if entry.has("x") or not date:
+        x = entry.number("x", wanted="0 to 1", low=0, high=1)
+    if entry.has("kind"):
+        kind = entry.line("kind", "rgb", known=STOP_KINDS)
+    ends = entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None
+    palette, unit, formula = (entry.text(key, "") for key in ("palette", "unit", "formula"))
+    try:
+        if formula:  # of which stops is looked at when their photos are there
+            read_formula(formula)
+        return Stop(name, x, kind, palette, ends, unit, date, formula)
+    except ValueError as error:
+        raise BadFile(f"{entry.where}: {error}") from None
 
 
 def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
@@ -288,8 +301,41 @@ def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
     return out
 
 
-def with_counts(photos: list[Photo], counts: dict[str, tuple[float, float]]) -> list[Photo]:
-    return [replace(photo, counts=counts.get(photo.modality)) for photo in photos]
+def with_counts(photos: list[Photo], listed: object, where: str) -> list[Photo]:
+    """The photos with what the list of modalities says of the numbers in them."""
+    counts, no_value = counts_from(listed, where), no_value_from(listed, where)
+    out = []
+    for photo in with_bands(photos, listed, where):
+        ends, said = counts.get(photo.modality), no_value.get(photo.modality, SAID_NOTHING)
+        # A camera's own numbers lie in JPEG files, whose header is that of a picture.
+        numbers = ends is not None and photo.path.suffix.lower() in JPEGS and not photo.band
+        gaps = photo.may_lack_values or numbers or said != SAID_NOTHING
+        out.append(replace(photo, counts=ends, no_value=said, may_lack_values=gaps))
+    return out
+
+
+def no_value_from(listed: object, where: str) -> dict[str, NoValue]:
+    """Of the modalities that have 'no_data' or 'valid_range': what is no value in their photos."""
+    out: dict[str, NoValue] = {}
+    for entry in listed if isinstance(listed, list) else ():
+        if not isinstance(entry, dict):
+            continue
+        fields, numbers = Fields(entry, f"{where}: modality {shown(entry.get('name'))}"), ()
+        if fields.has("no_data"):
+            said = entry["no_data"]
+            numbers = tuple(said) if isinstance(said, list) else (said,)
+            numbers = tuple(n for n in numbers if not is_nan(n))  # is none in any case
+            if not all(is_number(n) for n in numbers):
+                raise fields.error("no_data", "a number, or a list of numbers, that hold no value")
+        valid = fields.pair("valid_range") if fields.has("valid_range") else None
+        if fields.has("no_data") or valid is not None:
+            out[fields.text("name")] = NoValue(tuple(map(float, numbers)), valid)
+    return out
+
+
+def is_nan(value: object) -> bool:
+    """As JSON may have it, or a text."""
+    return str(value).strip().lower() == "nan"
 
 
 def background_from(entry: Mapping, where: str) -> tuple[float, float, float] | None:
@@ -319,11 +365,16 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     """
     found = []
     for photo in photos[:: max(1, len(photos) // 8)][:8]:
-        image, _ = decoded(photo.path, photo.counts)
+        image, _, known = decoded(
+            photo.path, photo.counts, no_value=photo.no_value, band=photo.band
+        )
         if photo.mask is not None or image.mode == "RGBA":
             return None
-        rgb = np.asarray(image.convert("RGB"))
-        border = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
+        border = border_of(np.asarray(image.convert("RGB")))
+        if known is not None:  # what has no value is no colour
+            border = border[border_of(np.asarray(known)) > 0]
+        if not len(border):
+            continue
         colors, counts = np.unique(border, axis=0, return_counts=True)
         if counts.max() >= PLAIN_BORDER * len(border):
             color = colors[counts.argmax()].astype(np.float32) / 255
@@ -331,3 +382,8 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     if not found or Counter(found).most_common(1)[0][1] < min(4, len(photos)):
         return None
     return Counter(found).most_common(1)[0][0]
+
+
+def border_of(pixels: np.ndarray) -> np.ndarray:
+    """(P, ...) the outermost pixels of a picture (H, W, ...)."""
+    return np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])

@@ -2,26 +2,30 @@
 
 import math
 import mmap
+import os
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.capture_files import in_code_page
+from shapeshift.scene.captures.colmap.text_lines import (
+    AGAIN,
+    LONGEST_NAME,
+    image_rows,
+    numbers_of,
+    rows_of_table,
+)
+from shapeshift.scene.pose import Pose
 
-MODELS = (
-    "sparse/0",
-    "sparse",
-    "colmap/sparse/0",
-    "dense/sparse",
-    ".",
-)  # where a folder may hold its model
+# Where a folder may hold its model; *: one of several that the mapper could not join.
+MODELS = ("sparse/*", "sparse", "colmap/sparse/*", "dense/sparse", ".")
+MOST_MODELS = 1000  # in one folder that are looked at
 TABLES = ("cameras", "images", "points3D")
-LONGEST_NAME = 4096  # bytes of an image's name
 # name, how many focal lengths, how many parameters; COLMAP's src/colmap/sensor/models.h
 LENSES = {
     0: ("SIMPLE_PINHOLE", 1, 3), 1: ("PINHOLE", 2, 4), 2: ("SIMPLE_RADIAL", 1, 4),
@@ -35,12 +39,12 @@ LENSES = {
 # Not COLMAP's, with two focal lengths and a principal point first: captures/lenses.  COLMAP's own
 # EQUIRECTANGULAR, whose parameters are its width and height, becomes such a PANORAMA.
 PANORAMA, BROWN, BROWN_FISHEYE = "EQUIRECTANGULAR", "BROWN_CONRADY", "BROWN_CONRADY_FISHEYE"
+BROWN_EQUISOLID, RADIAL_BACKWARDS = "BROWN_CONRADY_EQUISOLID_FISHEYE", "RADIAL_BACKWARDS"
 SPHERE = 17, 2  # COLMAP's number for it, and how many parameters it has
 LENS_NUMBERS = {name: number for number, (name, _, _) in LENSES.items()}
 CAMERA, IMAGE = struct.Struct("<IiQQ"), struct.Struct("<I7dI")
 COUNT = struct.Struct("<Q")
 POINT_IN_IMAGE = 24  # bytes
-AGAIN = "copy or export it again"
 
 
 @dataclass(frozen=True)
@@ -93,18 +97,72 @@ class Posed:
     place: tuple[float, ...]  # (3,) of that transform
     lens: int  # of a ColmapCamera
 
+    @property
+    def length(self) -> float:
+        """Of its quaternion: any but 0 is a turn; tables are rounded, or were never divided."""
+        return math.hypot(*self.wxyz)
+
+    def camera_from_world(self) -> np.ndarray:
+        """(4, 4) of its quaternion divided by its length, which is neither 0 nor infinite."""
+        wxyz = np.array(self.wxyz) / max(map(abs, self.wxyz))  # 1e-320 has no square
+        return Pose(np.array(self.place), wxyz / np.linalg.norm(wxyz)).matrix()
+
 
 def find_model(folder: Path, tables: tuple[str, ...] = ("images",)) -> tuple[Path, str] | None:
-    """The folder and ending (.bin or .txt) of a COLMAP model in or under `folder`, or None."""
-    for name in MODELS:
-        for ending in (".bin", ".txt"):
-            if all((folder / name / (table + ending)).is_file() for table in tables):
-                return folder / name, ending
+    """The folder and ending (.bin or .txt) of a COLMAP model in or under `folder`, or None.
+
+    Of several that the mapper could not join it is the one with most images, the first of these.
+    """
+    for place in MODELS:
+        if place.endswith("/*"):
+            found = models_in(folder / place[:-2], tables)
+            numbered = [model for model in found if model[0].name.isdecimal()] or found
+            if len(numbered) > 1:
+                return max(numbered, key=lambda model: images_in(*model))
+            if numbered:
+                return numbered[0]
+        elif (ending := ending_of(folder / place, tables)) is not None:
+            return folder / place, ending
     return None
 
 
-def read_tables(folder: Path, ending: str) -> tuple[dict[int, ColmapCamera], list[Posed]]:
-    """Lenses by their number, and the images by theirs.  Raises BadFile."""
+def models_in(folder: Path, tables: tuple[str, ...] = ("images",)) -> list[tuple[Path, str]]:
+    """The models in the folders of one, in the order of their numbers."""
+    if not folder.is_dir():
+        return []
+    names = sorted(os.listdir(folder))[:MOST_MODELS]
+    names.sort(key=lambda name: int(name) if name.isdecimal() and len(name) < 9 else math.inf)
+    endings = [(folder / name, ending_of(folder / name, tables)) for name in names]
+    return [(model, ending) for model, ending in endings if ending is not None]
+
+
+def ending_of(folder: Path, tables: tuple[str, ...]) -> str | None:
+    """Of the tables of a model; as COLMAP does, binary ones before those of text."""
+    for ending in (".bin", ".txt"):
+        if all((folder / f"{table}{ending}").is_file() for table in tables):
+            return ending
+    return None
+
+
+def images_in(folder: Path, ending: str) -> int:
+    """How many images a model has; -1 where its table cannot be read."""
+    path = folder / f"images{ending}"
+    try:
+        if ending == ".txt":
+            return sum(1 for _ in image_rows(path))
+        with mapped(path) as data:
+            return count_of(data, IMAGE.size + 1 + COUNT.size, path)
+    except BadFile:
+        return -1
+
+
+def read_tables(
+    folder: Path, ending: str, photos: Path | None = None
+) -> tuple[dict[int, ColmapCamera], list[Posed]]:
+    """Lenses by their number, and the images by theirs.  Raises BadFile.
+
+    photos: where they lie; names that are no UTF-8 are read in the code page in which they do.
+    """
     cameras, images = folder / f"cameras{ending}", folder / f"images{ending}"
     for path in (cameras, images):
         if not path.is_file():
@@ -120,6 +178,11 @@ def read_tables(folder: Path, ending: str) -> tuple[dict[int, ColmapCamera], lis
     for image in posed:
         if image.lens not in lenses:
             raise BadFile(f"{images}: image {image.name} has camera {image.lens}, which is absent.")
+    names = in_code_page([image.name for image in posed], photos)
+    posed = [
+        image if image.name == name else replace(image, name=name)
+        for image, name in zip(posed, names, strict=True)
+    ]
     return lenses, sorted(posed, key=lambda image: image.number)
 
 
@@ -169,7 +232,7 @@ def images_of_bytes(data: bytes | mmap.mmap, path: Path) -> list[Posed]:
         end = data.find(b"\0", at, at + LONGEST_NAME)
         if end < 0 or end + 1 + COUNT.size > len(data):
             raise short_of(path, count, "images")
-        name = data[at:end].decode("utf-8", "replace")
+        name = name_from(data[at:end])
         points = COUNT.unpack_from(data, end + 1)[0]
         at = end + 1 + COUNT.size
         if points > (len(data) - at) // POINT_IN_IMAGE:
@@ -191,54 +254,29 @@ def count_of(data: bytes | mmap.mmap, least: int, path: Path) -> int:
 
 def cameras_of_text(path: Path) -> dict[int, ColmapCamera]:
     lenses = {}
-    for line, words in enumerate(map(str.split, text_lines(path)), 1):
-        if not words or words[0].startswith("#"):
-            continue
-        values = numbers_of(words[:1] + words[2:], f"{path}, line {line}")
-        model = words[1] if len(words) > 1 else ""
+    for where, words in rows_of_table(path):
+        values = numbers_of(words[:1] + words[2:], where)
+        model = words[1].decode("utf-8", "replace").upper() if len(words) > 1 else ""
         if model not in LENS_NUMBERS and model != PANORAMA:
-            raise BadFile(f"{path}, line {line}: {model[:40]!r} is no camera model known here.")
+            raise BadFile(f"{where}: {model[:40]!r} is no camera model known here.")
         params = SPHERE[1] if model == PANORAMA else LENSES[LENS_NUMBERS[model]][2]
         if len(values) != 3 + params:
-            raise BadFile(f"{path}, line {line}: {model} has {params} numbers after its size.")
+            raise BadFile(f"{where}: {model} has {params} numbers after its size.")
         size = (int(values[1]), int(values[2]))
         lenses[int(values[0])] = lens_from(model, size, tuple(values[3:]))
     return lenses
 
 
 def images_of_text(path: Path) -> list[Posed]:
-    """Two lines an image; the second, of its points, may be empty and is not looked at."""
-    posed, points_next = [], False
-    for line, text in enumerate(text_lines(path), 1):
-        words = text.split(maxsplit=9)
-        if points_next:
-            points_next = False
-        elif words and not words[0].startswith("#"):
-            if len(words) < 10:
-                raise BadFile(f"{path}, line {line}: 9 numbers and a name wanted; {AGAIN}.")
-            values = numbers_of(words[:9], f"{path}, line {line}")
-            number, lens = int(values[0]), int(values[8])
-            posed.append(Posed(number, words[9], tuple(values[1:5]), tuple(values[5:8]), lens))
-            points_next = True
-    return posed
+    return [
+        Posed(int(v[0]), name_from(name), tuple(v[1:5]), tuple(v[5:8]), int(v[8]))
+        for v, name in image_rows(path)
+    ]
 
 
-def text_lines(path: Path) -> list[str]:
-    text = read_text_file(path)
-    try:
-        return text.decode("utf-8").split("\n")
-    except UnicodeDecodeError:
-        raise BadFile(f"{path} is not text, whatever its name says; {AGAIN}.") from None
-
-
-def numbers_of(words: list[str], where: str) -> list[float]:
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        values = [np.nan]
-    if not np.isfinite(values).all():
-        raise BadFile(f"{where}: what should be numbers is not; {AGAIN}.")
-    return values
+def name_from(raw: bytes) -> str:
+    """Of an image; what is no UTF-8 stays as it is until `in_code_page` knows better."""
+    return raw.decode("utf-8", "surrogateescape")
 
 
 def _focals(model: str) -> int:

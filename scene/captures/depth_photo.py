@@ -18,14 +18,13 @@ from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.photo import (
     BROKEN,
-    FLOATS,
-    GREY_16,
     MOST_PIXELS,
     charge_pixels,
     open_image,
     quiet,
     refuse_other_view,
 )
+from shapeshift.scene.captures.radiometric.no_value import FLOATS, GREY_16
 from shapeshift.scene.captures.undistort import pixels_of, straight_pixels
 
 NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's
@@ -58,8 +57,8 @@ def with_depth(photo: Photo, entry: Mapping, folder: Path, where: str) -> Photo:
 def named_beside(fields: Fields, names: Sequence[str], folder: Path) -> Path | None:
     """The file that a frame names, by the first of some names that it has, if it is there."""
     name = next((text for key in names if (text := fields.text(key, ""))), "")
-    path = find_file(folder, name, ("",)).path
-    return path if name and os.path.isfile(path) else None  # Path.is_file does not take any text
+    path = find_file(folder, name, ("",)).path if name else None
+    return path if path and os.path.isfile(path) else None  # Path.is_file does not take any text
 
 
 def depth_size(path: Path) -> tuple[int, int]:

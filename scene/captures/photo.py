@@ -4,6 +4,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,12 +19,23 @@ from shapeshift.scene.captures.lens_resampling import LARGEST, resampled
 from shapeshift.scene.captures.lenses.panorama import is_panorama
 from shapeshift.scene.captures.pictures.rare_photo import is_rare, rare_photo, refuse_scans
 from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
+from shapeshift.scene.captures.radiometric.no_value import (
+    FLOATS,
+    GREY_16,
+    SAID_NOTHING,
+    SHADES,
+    NoValue,
+    smaller_with_gaps,
+    stated_no_data,
+    without_value,
+)
 from shapeshift.scene.captures.radiometric.number_photos import (
     GRIDS,
     is_radiometric,
     open_grid,
     radiometric_celsius,
 )
+from shapeshift.scene.captures.radiometric.tiff_bands import band_header, open_band
 from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27
@@ -35,13 +47,18 @@ ASPECT = 0.02  # by how much what lies beside a photo may be wider or narrower t
 HEIC = {".heic", ".heif"}
 ROWS = 256  # that become floats at a time
 BROKEN = (OSError, SyntaxError, ValueError, EOFError, RuntimeError)  # of Pillow, in broken files
-FLOATS = "F"  # how PIL names floating-point greyscale
-GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
 
 
-def open_image(path: Path) -> Image.Image:
-    """The image file, its header read; BadFile when it is missing or no image."""
+def open_image(path: Path, band: int = 0) -> Image.Image:
+    """The image file, its header read; BadFile when it is missing or no image.
+
+    band: which of several, counted from 1; 0: the file holds one.  Of a TIFF that has several, and
+    colours of more than 8 bits, band 0 is its header alone, with "bands" in its info.
+    """
     try:
+        if band:
+            with quiet():
+                return open_band(path, band)
         if path.suffix.lower() in GRIDS:
             return open_grid(path)
         with quiet():
@@ -56,6 +73,8 @@ def open_image(path: Path) -> Image.Image:
     except BadFile:  # of a grid, in its own words
         raise
     except UnidentifiedImageError:  # perhaps one of the rarer formats
+        if not band and (header := band_header(path)) is not None:
+            return header
         if path.stat().st_size == 0:
             raise BadFile(f"{path}: the image file is empty; copy it again") from None
         if path.suffix.lower() in HEIC:
@@ -85,7 +104,15 @@ class Pixels(NamedTuple):
 
     rgb: np.ndarray  # (H, W, 3) uint8 display sRGB
     mask: np.ndarray | None  # (H, W) uint8: of the mask file, else the photo's alpha channel
-    lost: np.ndarray | None  # (H, W) bool: what an undistorted photo does not show
+    lost: np.ndarray | None  # (H, W) bool: what an undistorted photo does not show, or has no value
+
+
+class Decoded(NamedTuple):
+    """An image file as bytes."""
+
+    image: Image.Image  # of mode L, RGB or RGBA; 0 where there is no value
+    size: tuple[int, int]  # width and height of the file
+    known: Image.Image | None = None  # of mode L, 0 where there is no value, else 255; None: 255
 
 
 def load_photo(photo: Photo, factor: int = 1, one_of_many: bool = False) -> Pixels:
@@ -94,24 +121,29 @@ def load_photo(photo: Photo, factor: int = 1, one_of_many: bool = False) -> Pixe
     What is less than a whole pixel at the right and at the bottom is cut off, as View.divided cuts
     it.  Greyscale becomes three equal channels.  Where a mask file takes precedence over an alpha
     channel, the colours are laid over black with the latter.  Of a bent lens the pixels are those
-    of its straight camera, scene.undistort.
+    of its straight camera, scene.undistort.  Pixels without a value count in no mean.
     """
     if photo.lens is not None:  # what is made of it is in memory at the same time
         charge_pixels(photo.path, photo.view.size)
-    image, file_size = decoded(photo.path, photo.counts, factor)
+    image, file_size, known = decoded(
+        photo.path, photo.counts, factor, 0, photo.no_value, photo.band
+    )
     mask_image, has_alpha = None, image.mode == "RGBA"
     if photo.mask is not None:
         image = over_black(image)
         mask_image = load_mask(photo.mask, file_size, factor)
-    image = smaller(image, file_size, photo.lens, factor, one_of_many)
+    made = partial(
+        smaller, file_size=file_size, lens=photo.lens, factor=factor, one_of_many=one_of_many
+    )
+    image, gone = (made(image), None) if known is None else smaller_with_gaps(image, known, made)
     mask: np.ndarray | None = None
     if mask_image is not None:
-        mask = np.asarray(smaller(mask_image, file_size, photo.lens, factor, one_of_many))
+        mask = np.asarray(made(mask_image))
     elif has_alpha:
         mask = np.asarray(image.getchannel("A"))
-    gone = None
     if photo.lens is not None:
-        gone = lost(photo.lens, image.size, factor)
+        beyond = lost(photo.lens, image.size, factor)
+        gone = beyond if gone is None else beyond | gone
     return Pixels(np.asarray(image.convert("RGB")), mask, gone)
 
 
@@ -120,7 +152,7 @@ def load_mask(path: Path, file_size: tuple[int, int], factor: int = 1) -> Image.
 
     file_size: of the photo.  Masks of 0 and 1, as programs write truth values, are stretched.
     """
-    mask, own_size = decoded(path, None, factor, math.prod(file_size))
+    mask, own_size, _ = decoded(path, None, factor, math.prod(file_size))
     mask = over_black(mask).convert("L")
     if mask.getextrema()[1] == 1:
         mask = mask.point(lambda value: 255 * value)
@@ -141,7 +173,7 @@ def refuse_other_view(own: tuple[int, int], size: tuple[int, int], what: str) ->
 
 def has_alpha_channel(photo: Photo) -> bool:
     """Whether load_photo finds an alpha channel in the photo's file: its header says so."""
-    if photo.counts is not None:
+    if photo.counts is not None or photo.band:
         return False
     with open_image(photo.path) as image:
         return is_see_through(image)
@@ -194,33 +226,65 @@ def smaller(
 
 
 def decoded(
-    path: Path, counts: tuple[float, float] | None, factor: int = 1, most: int = 0
-) -> tuple[Image.Image, tuple[int, int]]:
-    """An image of mode L, RGB or RGBA, and the size of the file.
+    path: Path,
+    counts: tuple[float, float] | None,
+    factor: int = 1,
+    most: int = 0,
+    no_value: NoValue = SAID_NOTHING,
+    band: int = 0,
+) -> Decoded:
+    """An image file as bytes, and which of its pixels hold a value.
+
+    band: as of open_image.
 
     most: pixels that it may have however few its bytes, where a photo of as many goes with it.
+    no_value: what its capture says of them, beside what the file does.
     A JPEG comes smaller by a divisor of `factor`, at most half of it: it is decoded so, which
     costs less and is nearly the mean over the area.
     """
-    own = counts is not None and is_radiometric(path)  # its numbers, not the picture's colours
-    with loaded(path, 1 if own else factor, most) as (image, size):
-        if own:
-            grey = shares(radiometric_celsius(path, size), FLOATS, counts, path)
-            return Image.fromarray(np.rint(255 * grey).astype(np.uint8)), size
-        if counts is not None or image.mode in (*GREY_16, FLOATS):
-            grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
-            return Image.fromarray(np.rint(255 * grey).astype(np.uint8)), size
+    own = (
+        not band and counts is not None and is_radiometric(path)
+    )  # its numbers, not the picture's colours
+    with loaded(path, 1 if own else factor, most, band) as (image, size):
+        if own or counts is not None or image.mode in (*GREY_16, FLOATS):
+            numbers = radiometric_celsius(path, size) if own else np.asarray(image, np.float32)
+            grey = shares(numbers, FLOATS if own else image.mode, counts, path)
+            gone = without_value(image, numbers, no_value)
+            if gone is not None:
+                grey = np.where(gone, np.float32(0), grey)
+            shown = Image.fromarray(np.rint(255 * grey).astype(np.uint8))
+            return Decoded(shown, size, None if gone is None else known_mask(gone))
+        gone = None
+        if (no_value.numbers or stated_no_data(image)) and image.mode in SHADES:
+            gone = without_value(image, np.asarray(image), no_value)
         if is_see_through(image):
-            return image.convert("RGBA"), size
-        return image.convert("L" if image.mode in ("L", "1") else "RGB"), size
+            shown = image.convert("RGBA")
+        else:
+            shown = image.convert("L" if image.mode in ("L", "1") else "RGB")
+        if gone is None:
+            return Decoded(shown, size)
+        known = known_mask(gone)
+        pixels = np.array(shown)
+        pixels[gone] = (0, 0, 0, 255)[: pixels.shape[2]] if pixels.ndim == 3 else 0
+        return Decoded(Image.fromarray(pixels), size, known)
+
+
+def known_mask(gone: np.ndarray) -> Image.Image:
+    """Of mode L, 0 where (H, W) bool is set, else 255."""
+    return Image.fromarray(np.where(gone, np.uint8(0), np.uint8(255)))
 
 
 @contextmanager
 def loaded(
-    path: Path, factor: int = 1, most: int = 0
+    path: Path, factor: int = 1, most: int = 0, band: int = 0
 ) -> Iterator[tuple[Image.Image, tuple[int, int]]]:
     """The image with its pixels read, see `decoded`, and the size of its file.  Raises BadFile."""
-    with open_image(path) as image:
+    with open_image(path, band) as image:
+        if bands := image.info.get("bands"):
+            raise BadFile(
+                f"{path}: a TIFF of {bands} bands; say with its modality's 'band', 1 to {bands}, "
+                "which of them counts"
+            )
         charge_pixels(path, image.size, most)
         width, height = image.size
         divisor = next((d for d in (8, 4, 2) if factor % d == 0 and factor >= 2 * d), 1)
@@ -261,10 +325,11 @@ def read_pixels(
 
 def numbers_of(photo: Photo) -> np.ndarray:
     """(H, W) float32 of a grey photo's own numbers, as they are in its file; NaN: none."""
-    with loaded(photo.path) as (image, size):
-        if is_radiometric(photo.path):
-            return radiometric_celsius(photo.path, size)
-        return np.asarray(image, np.float32)
+    with loaded(photo.path, band=photo.band) as (image, size):
+        own = not photo.band and is_radiometric(photo.path)
+        numbers = radiometric_celsius(photo.path, size) if own else np.asarray(image, np.float32)
+        gone = without_value(image, numbers, photo.no_value)
+        return numbers if gone is None else np.where(gone, np.float32(np.nan), numbers)
 
 
 def charge_pixels(path: Path, size: tuple[int, int], most: int = 0) -> None:
@@ -300,7 +365,7 @@ def floats(image: Image.Image, mode: str) -> np.ndarray:
 def shares(
     grey: np.ndarray, mode: str, counts: tuple[float, float] | None, path: Path
 ) -> np.ndarray:
-    """(H, W) float32 0..1 of a grey photo's numbers; what is none of them counts as 0."""
+    """(H, W) float32 0..1 of a grey photo's numbers; where there is none, anything of it."""
     if counts is None:
         if mode == FLOATS:
             raise BadFile(

@@ -7,9 +7,15 @@ from shapeshift.runtime_models.files.json_fields import read_json
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.colmap_tables import find_model
+from shapeshift.scene.captures.foreign.read_foreign import (
+    is_table_of_lenses,
+    known_beside,
+    read_foreign,
+    refuse_known,
+)
 from shapeshift.scene.captures.read_colmap import read_colmap
 from shapeshift.scene.captures.read_transforms import read_transforms
-from shapeshift.scene.captures.scans.read_scan import is_scan, read_scan
+from shapeshift.scene.captures.scans.read_scan import capture_from, is_scan, read_scan
 from shapeshift.scene.captures.scans.read_sitcoms3d import TABLE as SITCOMS3D
 from shapeshift.scene.captures.scans.read_sitcoms3d import find_sitcoms3d
 
@@ -30,10 +36,13 @@ def read_capture(path: Path) -> Capture:
     path = Path(path)
     if path.name == SITCOMS3D and find_sitcoms3d(path.parent) is not None:
         path = path.parent
+    if path.is_file() and (posed := read_foreign(path)) is not None:
+        return capture_from(posed)
     if path.is_file() and path.suffix.lower() == ".json":
         return read_transforms(path)
     if path.name in MINIMAL:
         raise minimal_form(path)
+    refuse_known(path)
     if not path.exists() and (scan := read_scan(path)) is not None:
         return scan  # a scene of nuScenes, by name
     if not path.is_dir():
@@ -41,7 +50,7 @@ def read_capture(path: Path) -> Capture:
         raise BadFile(f"{path}: {found}; give a folder of posed photos or its transforms.json")
     for name in TABLES:
         another = name == SITCOMS3D and find_sitcoms3d(path) is not None
-        if (path / name).is_file() and not another:
+        if (path / name).is_file() and not another and not is_table_of_lenses(path / name):
             return read_transforms(path / name)
     splits = [path / f"transforms_{s}.json" for s in SPLITS]
     if splits[0].is_file():
@@ -52,6 +61,8 @@ def read_capture(path: Path) -> Capture:
         return scan
     if (path / MINIMAL[0]).is_file():
         raise minimal_form(path)
+    if (posed := read_foreign(path)) is not None:
+        return capture_from(posed)
     if any(p.suffix.lower() in PICTURES for p in path.rglob("*")):
         raise BadFile(f"{path}: photos without poses; {how_to_pose(path)}.")
     raise BadFile(f"{path}: neither photos nor poses in this folder; see docs/capture.md")
@@ -101,5 +112,7 @@ def how_to_pose(photos: Path) -> str:
         return f"the poses lie in the folder above, name that: {above}"
     if (below := poses_below(photos)) is not None:
         return f"the poses lie below, name that: {below}"
+    if known := known_beside(photos):
+        return known
     command = shlex.join(["python3", "launch.py", "poses", str(photos), "--out", "CAPTURE"])
     return f"find them first, `{command}`, and name that folder then"

@@ -7,32 +7,43 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, shown
-from shapeshift.runtime_models.files.memory import read_text_file
-from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.files.json_fields import Fields
 from shapeshift.runtime_models.model import BadFile, Stop
-from shapeshift.runtime_models.stop_names import guess_kind
-from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
-from shapeshift.scene.capture_files import SMALLER, find_file
+from shapeshift.scene.cameras.read_colmap_cameras import camera_pose, other_lengths
+from shapeshift.scene.capture_files import find_file
+from shapeshift.scene.capture_found import FileTable
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
-from shapeshift.scene.capture_photos import doubts_of, fits, posed_photos, refuse_all_missing
+from shapeshift.scene.capture_photos import (
+    doubts_of,
+    fits,
+    image_size,
+    posed_photos,
+    refuse_all_missing,
+)
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    counts_from,
-    split_every_8th,
-    spread_stops,
     stops_from,
     with_counts,
 )
-from shapeshift.scene.captures.colmap_points import read_colmap_points
-from shapeshift.scene.captures.colmap_tables import find_model, read_tables
-from shapeshift.scene.captures.read_transforms import read_capture_json
-
-# nerfstudio's, beside the model
-LISTS = {"train_list.txt": "train", "validation_list.txt": "test", "test_list.txt": "test"}
+from shapeshift.scene.captures.colmap.colmap_files import (
+    base_of,
+    left_beside,
+    listed_split,
+    masks_of,
+    photos_folder,
+    points_of,
+)
+from shapeshift.scene.captures.colmap.rig_frames import refused_poses
+from shapeshift.scene.captures.colmap_tables import Posed, find_model, read_tables
+from shapeshift.scene.captures.modalities.frame_modalities import said_beside
+from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
+from shapeshift.scene.captures.modalities.said_modalities import said_modality_of
+from shapeshift.scene.captures.modalities.twin_photos import with_twins
+from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
+from shapeshift.scene.captures.radiometric.stated_bands import of_each_band, sharing_folders
 
 
 def read_colmap(folder: Path) -> Capture:
@@ -40,106 +51,72 @@ def read_colmap(folder: Path) -> Capture:
     if (found := find_model(folder)) is None:
         raise BadFile(f"{folder} holds no COLMAP model; images.bin or images.txt is wanted.")
     model, ending = found
-    lenses, images = read_tables(model, ending)
-    posed = sorted(images, key=lambda image: image.name)
-    base = folder / "dense" if model == folder / "dense" / "sparse" else folder
+    base = base_of(folder, model)
+    folder = base if model == folder else folder
     root = photos_folder(base)
-    said = read_capture_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
-    stops, modality_of = modalities(said, [i.name for i in posed], folder)
+    lenses, images = read_tables(model, ending, root)
+    posed, unpaired = with_twins(sorted(images, key=lambda image: image.name), root)
+    names = [image.name for image in posed]
+    paths = [find_file(root, name, ("",)).path for name in names]
+    said = said_beside(folder)
+    stops, modality_of = modalities(said, posed, paths, folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
     world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
-    paths = [find_file(root, image.name, ("",)).path for image in posed]
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
+    table = FileTable(folder)
+    masks = masks_of(base, root, list(compress(paths, there)), table)
     means = stated_meaning(Fields(said, f"{folder}/capture.json"))
     photos: list[Photo] = []
     rescaled: list[str] = []
     turned: list[str] = []
-    for image, path, world_from_camera in compress(zip(posed, paths, cameras, strict=True), there):
+    rows = zip(posed, paths, cameras, modality_of, splits_of(names), strict=True)
+    for image, path, world_from_camera, modality, split in compress(rows, there):
         lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
-        made = posed_photos(path, modality_of[image.name], matrix, lens, where)
-        mask = find_mask(base, image.name)
+        made = posed_photos(path, modality, matrix, lens, where)
+        mask = masks.get(path)
         if mask is not None:
             refuse_other_mask(mask, made[0].file_size)
-        photos += [replace(photo, mask=mask, mask_means=means) for photo in made]
+        photos += [replace(p, mask=mask, mask_means=means, split=split or p.split) for p in made]
         if made[0].file_size != lens.size:
             (rescaled if fits(lens.size, made[0].file_size) else turned).append(str(path))
-    points, colors, more = points_of(model / f"points3D{ending}")
-    counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
-    photos = with_counts(listed_split(photos, folder, root), counts)
+    points, colors, more = points_of(model, ending)
+    table.used("points", 0 if points is None else len(points))
+    if guessed := not said.get("modalities"):
+        numbers = {path: str(image.lens) for path, image in zip(paths, posed, strict=True)}
+        refuse_two_sorts(opened_photos(photos, root, numbers), stops, folder)
+    photos = listed_split(photos, folder, root, table, by_folder=any(splits_of(names)))
+    photos = of_each_band(photos, sharing_folders(said.get("modalities") or (), str(folder)))
+    photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
-    guessed = not said.get("modalities")
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
-    return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
-
-
-def photos_folder(base: Path) -> Path:
-    """images/, else the first of those with smaller photos, else the folder itself."""
-    names = ("images", *(f"images_{factor}" for factor in SMALLER))
-    return next((base / name for name in names if (base / name).is_dir()), base)
-
-
-def points_of(path: Path) -> tuple[np.ndarray | None, np.ndarray | None, tuple[str, ...]]:
-    """Points and colours 0..1 of a model, and what is doubtful: a model may come without."""
-    if not path.is_file():
-        return None, None, (f"The points {path_end(path)} are not there.",)
-    xyz, rgb = read_colmap_points(path)
-    return (xyz, rgb.astype(np.float32) / 255, ()) if len(xyz) else (None, None, ())
-
-
-def listed_split(photos: list[Photo], folder: Path, root: Path) -> list[Photo]:
-    """By nerfstudio's lists beside the model, a name a line; without them every 8th is held out.
-
-    Photos in none of the lists are not used.
-    """
-    splits: dict[str, str] = {}
-    for name, split in LISTS.items():
-        if (folder / name).is_file():
-            lines = read_text_file(folder / name).decode("utf-8", "replace").split("\n")
-            splits |= {line.strip(): split for line in lines if line.strip()}
-    if not splits:
-        return split_every_8th(photos)
-    named = [(photo, splits.get(photo.path.relative_to(root).as_posix())) for photo in photos]
-    used = [replace(photo, split=split) for photo, split in named if split]
-    if not used:
-        raise BadFile(f"{folder}: its lists of training and test photos name none of its photos")
-    return used
+    doubts += unpaired + other_lengths(images) + refused_poses(model, ending, images)
+    table.photos(photos, missing)
+    table.partners("masks", photos)
+    left_beside(base, model, ending, table)
+    doubts += tuple(table.sentences)
+    capture = world.capture(
+        folder, stops, photos, points, colors, background, guessed, doubts=doubts
+    )
+    return replace(capture, files=table.sorted_rows())
 
 
 def modalities(
-    said: dict, names: list[str], folder: Path
-) -> tuple[tuple[Stop, ...], dict[str, str]]:
-    """Stops, and image name -> stop name, from capture.json or else from the sub-folders."""
+    said: dict, posed: list[Posed], paths: list[Path], folder: Path
+) -> tuple[tuple[Stop, ...], list[str]]:
+    """Stops, and of each image the name of its stop: from capture.json, or else from the names."""
+    names = [image.name for image in posed]
     if not said.get("modalities"):
-        first = {n: n.split("/")[0] if "/" in n else "RGB" for n in names}
-        # Visible light first, then heat, then the rest by name.
-        order = {"rgb": 0, "thermal": 1, "layer": 2}
-        found = sorted(set(first.values()), key=lambda n: (order[guess_kind(n, 2)], n))
-        return spread_stops(found), first
+        return modalities_of(names, folder)
     where, entries = f"{folder}/capture.json", said["modalities"]
     stops = stops_from(entries, where)
-    of: dict = {}
-    for stop, entry in zip(stops, entries, strict=True):
-        prefix = Fields(entry, where).text("folder", stop.name).rstrip("/") + "/"
-        mine = [n for n in names if n.startswith(prefix)]
-        if not mine:
-            raise BadFile(
-                f"{where}: modality {shown(stop.name)} has no images under "
-                f"images/{path_end(prefix)}; add them to the COLMAP model or drop the modality"
-            )
-        of |= dict.fromkeys(mine, stop.name)
-    left = sorted(set(names) - set(of))
-    if left:
-        raise BadFile(f"{where}: image {left[0]} belongs to no listed modality")
+
+    def cameras_of(row: int) -> set[str]:
+        size = image_size(paths[row], None) if os.path.isfile(paths[row]) else (0, 0)
+        return {str(posed[row].lens), "{}x{}".format(*size)}
+
+    of = said_modality_of(entries, stops, names, where, cameras_of)
     return tuple(sorted(stops, key=lambda s: s.x)), of
-
-
-def find_mask(folder: Path, name: str) -> Path | None:
-    """COLMAP's masks/NAME.jpg.png, or masks/NAME.png."""
-    for path in (folder / "masks" / f"{name}.png", (folder / "masks" / name).with_suffix(".png")):
-        if path.is_file():
-            return path
-    return None

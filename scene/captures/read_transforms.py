@@ -2,16 +2,18 @@
 
 import os
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
+from itertools import compress
+from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
+from shapeshift.runtime_models.files.json_fields import Fields, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
-from shapeshift.scene.capture_files import find_file
+from shapeshift.scene.capture_files import files_below, find_file, photo_key
+from shapeshift.scene.capture_found import FileTable
 from shapeshift.scene.capture_masks import meant_by_masks, refuse_other_mask, stated_meaning
 from shapeshift.scene.capture_photos import (
     doubts_of,
@@ -24,22 +26,30 @@ from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
-    counts_from,
     rigid,
     split_every_8th,
-    spread_stops,
-    stops_from,
     with_counts,
 )
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
-from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import in_millimetres, refuse_other_units, with_depth
 from shapeshift.scene.captures.lenses.frame_lens import lens_of
 from shapeshift.scene.captures.lenses.panorama import is_panorama, stereo_sentences
+from shapeshift.scene.captures.modalities.frame_modalities import (
+    read_capture_json,
+    stops_of_frames,
+)
+from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
+from shapeshift.scene.captures.radiometric.stated_bands import (
+    of_each_band,
+    only_bands,
+    sharing_folders,
+    stated_bands,
+)
 from shapeshift.scene.captures.read_points import read_points
+from shapeshift.scene.mask_files import find_masks
 from shapeshift.scene.pose import OPENCV_FROM_EYE
 
 POSES = ("transform_matrix", "c2w_opencv", "c2w")
@@ -72,52 +82,52 @@ class Shot:
 
 def read_transforms(*files: Path) -> Capture:
     """A capture from one JSON file, or from the train/val/test files of a Blender data set."""
-    return capture_of(files[0].parent, str(files[0]), *gather(files))
+    table = FileTable(files[0].parent)
+    return capture_of(files[0].parent, str(files[0]), *gather(files, table), table)
 
 
-def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping]) -> Capture:
+def capture_of(
+    folder: Path,
+    where: str,
+    data: dict,
+    entries: Sequence[Mapping],
+    table: FileTable | None = None,
+    alone: bool = True,
+) -> Capture:
     """A capture out of what a file says for all frames, and of every frame with that filled in.
 
-    where: of the file, for messages.  Raises BadFile.
+    where: of the file, for messages; table: what was left out so far; alone: files beside those
+    that frames name are worth a word.  Raises BadFile.
     """
-    stops = stops_of(data, entries, where)
-    named = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
-    shots = [shot for shot in named if os.path.isfile(shot.path)]
-    missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
+    table = table or FileTable(folder)
+    stops, usual, told = stops_of_frames(folder, data, entries, where)
+    listed = data.get("modalities") or told
+    rows, bands = enumerate(zip(entries, usual, strict=True)), stated_bands(listed, where)
+    sharing = sharing_folders(told, where)
+    named = [s for i, (e, of) in rows for s in shots_of(e, i, of, stops, folder, where, bands)]
+    there = [os.path.isfile(shot.path) for shot in named]
+    shots = list(compress(named, there))
+    missing = [str(shot.path) for shot, found in zip(named, there, strict=True) if not found]
     refuse_all_missing(missing, len(named), where)
-    for stop in stops:
-        if not any(s.modality == stop.name for s in shots):
-            raise BadFile(
-                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
-            )
+    refuse_without_images(stops, shots, only_bands(sharing), where)
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
         (0, 0, 1),
         data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
-    lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
-    photos, no_depth, no_normals = [], [], []
-    rescaled: list[str] = []
-    turned: list[str] = []
-    for shot, lens in zip(shots, lenses, strict=True):
-        photos += (made := photos_of(shot, lens, world, folder))
-        if made[0].file_size != lens.size:
-            other = rescaled if fits(lens.size, made[0].file_size) else turned
-            other.append(str(shot.path))
-        if not is_panorama(lens):
-            no_depth += [str(shot.path)] if made[0].depth is None and shot.names_depth else []
-            no_normals += [str(shot.path)] if made[0].normals is None and shot.names_normals else []
-    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth, no_normals, turned)
-    doubts += stereo_sentences(lenses)
-    doubts += doubts_of_entries(shots, entries)
+    photos, doubts = photos_and_doubts(shots, entries, world, folder, missing, table)
     photos, unsure = meant_by_masks(photos)
-    doubts += unsure
-    photos = with_counts(photos, counts_from(data.get("modalities"), where))
+    photos = with_counts(of_each_band(photos, sharing), listed, where)
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors, more = points_of(folder, data, where)
-    described = any(isinstance(m, dict) for m in data.get("modalities") or ())
+    table.used("points", 0 if points is None else len(points))
+    if alone:
+        unnamed_files(folder, photos, table)
+    described = any(isinstance(m, dict) for m in listed)
+    if not (told or data.get("modalities") or any("modality" in e for e in entries)):
+        refuse_two_sorts(opened_photos(photos, folder), stops, folder)
     background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
     capture = world.capture(
         folder,
@@ -128,12 +138,71 @@ def capture_of(folder: Path, where: str, data: dict, entries: Sequence[Mapping])
         background,
         not described,
         dict(notes.data) if notes else None,
-        doubts + more,
+        doubts + unsure + more + tuple(table.sentences),
     )
-    capture = in_millimetres(capture, entries)
+    capture = in_millimetres(replace(capture, files=table.sorted_rows()), entries)
     refuse_other_units(capture, where)
     refuse_other_axes(capture, where)
     return capture
+
+
+def photos_and_doubts(
+    shots: Sequence[Shot],
+    entries: Sequence[Mapping],
+    world: CaptureWorld,
+    folder: Path,
+    missing: list[str],
+    table: FileTable,
+) -> tuple[list[Photo], tuple[str, ...]]:
+    """missing: photos that are named and not there.  Raises BadFile."""
+    lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
+    photos: list[Photo] = []
+    no_depth, no_normals, rescaled, turned, round_depth = ([] for _ in range(5))
+    for shot, lens in zip(shots, lenses, strict=True):
+        photos += (made := photos_of(shot, lens, world, folder))
+        path = str(shot.path)
+        if made[0].file_size != lens.size:
+            (rescaled if fits(lens.size, made[0].file_size) else turned).append(path)
+        if is_panorama(lens):
+            round_depth += [path] if shot.names_depth or shot.names_normals else []
+        else:
+            no_depth += [path] if made[0].depth is None and shot.names_depth else []
+            no_normals += [path] if made[0].normals is None and shot.names_normals else []
+    table.photos(photos, missing)
+    table.partners("masks", photos)
+    table.partners("depth photos", photos, no_depth)
+    table.partners("normal maps", photos, no_normals)
+    table.left_out("depth photos and normal maps", round_depth, "their photos are panoramas")
+    named = len(shots) + len(missing)
+    doubts = doubts_of(named, missing, photos, rescaled, no_depth, no_normals, turned)
+    return photos, doubts + stereo_sentences(lenses) + doubts_of_entries(shots, entries)
+
+
+def unnamed_files(folder: Path, photos: Sequence[Photo], table: FileTable) -> None:
+    """Says what lies beside the files that frames name, and which masks none names."""
+    paths = {photo.path for photo in photos}
+    others = {path for p in photos for path in (p.mask, p.depth, p.normals) if path is not None}
+    named = {photo_key(str(path)) for path in paths | others} | table.accounted
+    places = {path.parent for path in paths}
+    masks = {photo.mask.parent for photo in photos if photo.mask is not None} - places
+    if not any(photo.mask for photo in photos):
+        root = Path(os.path.commonpath([path.parent for path in paths]))
+        names = [path.relative_to(root).as_posix() for path in paths]
+        listed = [
+            (place / name).relative_to(root).as_posix()
+            for place in sorted(places)
+            for name in files_below(place, deep=False)
+        ]
+        base = folder if root != folder and root.is_relative_to(folder) else root.parent
+        found = find_masks(base, root, names, listed)
+        lying = [*found.of.values()]
+        table.left_out("masks", lying, "no frame names one ('mask_path')")
+        named |= {photo_key(str(path)) for path in lying}
+    table.unnamed("photos", places, named)
+    table.unnamed("masks", masks, named)
+    for kind, key in (("depth photos", "depth"), ("normal maps", "normals")):
+        lies = {path.parent for p in photos if (path := getattr(p, key)) is not None}
+        table.unnamed(kind, lies - places - masks, named)
 
 
 def points_of(
@@ -170,8 +239,12 @@ def doubts_of_entries(shots: Sequence[Shot], entries: Sequence[Mapping]) -> tupl
     return tuple(said)
 
 
-def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
-    """What the files say for all frames, and every frame with that filled in."""
+def gather(files: tuple[Path, ...], table: FileTable | None = None) -> tuple[dict, list[Mapping]]:
+    """What the files say for all frames, and every frame with that filled in.
+
+    table: gets what their lists leave out.
+    """
+    table = table or FileTable(files[0].parent)
     everything: dict = {}
     entries: list[Mapping] = []
     for file in files:
@@ -184,7 +257,7 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
             raise BadFile(f"{file}: 'frames' is empty; a capture needs at least one photo")
         split = {"split": file.stem.rpartition("_")[2]} if len(files) > 1 else {}
         # One after the other, not one of them: each frame would hold all that is said for all.
-        entries += [ChainMap(frame, split, data) for frame in listed(frames, data, str(file))]
+        entries += [ChainMap(frame, split, data) for frame in listed(frames, data, file, table)]
         everything |= data
     return everything, entries
 
@@ -198,66 +271,52 @@ def with_test_frames(frames: object, tests: object) -> object:
     return [f | {"split": "train"} for f in frames] + [f | {"split": "test"} for f in tests]
 
 
-def listed(frames: list[dict], data: dict, where: str) -> list[dict]:
+def listed(frames: list[dict], data: dict, file: Path, table: FileTable) -> list[dict]:
     """The frames with the splits of nerfstudio's lists of them; all as they are without such."""
-    splits: dict[str, str] = {}
+    splits: dict[str, tuple[str, str]] = {}  # by photo_key: the name as it is listed, split
     for key, split in LISTS.items():
         if data.get(key):
-            splits |= dict.fromkeys(Fields(data, where).texts(key), split)
+            names = Fields(data, str(file)).texts(key)
+            splits |= {photo_key(name): (name, split) for name in names}
     if not splits:
         return frames
-    splits = {plain_name(name): split for name, split in splits.items()}
-    used = [frame for frame in frames if plain_name(frame.get("file_path")) in splits]
+    names = [name if isinstance(name := f.get("file_path"), str) else "" for f in frames]
+    keys = [photo_key(name) for name in names]
+    used = [f | {"split": splits[k][1]} for f, k in zip(frames, keys, strict=True) if k in splits]
     if not used:
-        raise BadFile(f"{where}: its lists of training and test photos name none of its frames")
-    return [frame | {"split": splits[plain_name(frame["file_path"])]} for frame in used]
+        raise BadFile(f"{file}: its lists of training and test photos name none of its frames")
+    left = [name for name, key in zip(names, keys, strict=True) if key not in splits]
+    table.left_out("photos", left, f"they are in none of its lists ({', '.join(LISTS)})")
+    table.accounted |= {photo_key(str(find_file(file.parent, name).path)) for name in left}
+    lost = [name for key, (name, _) in splits.items() if key not in set(keys)]
+    table.left_out("names in its lists", lost, "no frame has them", there=False)
+    return used
 
 
-def plain_name(name: object) -> str:
-    """A file's name without ./ and with forward slashes, to be compared."""
-    return PurePosixPath(name.replace("\\", "/")).as_posix() if isinstance(name, str) else ""
-
-
-def read_capture_json(file: Path) -> dict:
-    """The object of a file; a version of our own form that is not known is refused."""
-    data = read_json(file, most_bytes=MOST_BYTES)
-    if not isinstance(data, dict):
-        raise BadFile(f"{file} holds {shown(data)}; an object with 'frames' is wanted")
-    if data.get("format", "shapeshift-capture") == "shapeshift-capture":
-        version = data.get("version", 1)
-        if version != 1:
+def refuse_without_images(
+    stops: tuple[Stop, ...], shots: Sequence[Shot], bands: Container[str], where: str
+) -> None:
+    """Raises BadFile for a modality without one.  bands: those whose photos are of another."""
+    there = {shot.modality for shot in shots}
+    for stop in stops:
+        if not (stop.formula or stop.name in bands or stop.name in there):
             raise BadFile(
-                f"{file}: version {shown(version)} of the capture form; this program reads 1"
+                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
             )
-    return data
-
-
-def stops_of(data: dict, entries: Sequence[Mapping], where: str) -> tuple[Stop, ...]:
-    listed = data.get("modalities")
-    if not listed:
-        names = [
-            Fields(entry, f"{where}: frame {i}").text("modality", usual_modality(entry, where, i))
-            for i, entry in enumerate(entries)
-        ]
-        if "" in names:
-            raise BadFile(f"{where}: frame {names.index('')}: 'modality' is empty; give it a name")
-        return spread_stops(dict.fromkeys(names))
-    if isinstance(listed, list) and all(isinstance(name, str) and name for name in listed):
-        if len(set(listed)) < len(listed):
-            raise BadFile(f"{where}: two modalities have the same name; rename one")
-        return spread_stops(listed)
-    return tuple(sorted(stops_from(listed, where), key=lambda stop: stop.x))
-
-
-def usual_modality(entry: Mapping, where: str, number: int) -> str:
-    """Of a frame that names none."""
-    return day_of_frame(entry, f"{where}: frame {number}") or "RGB"
 
 
 def shots_of(
-    entry: Mapping, number: int, data: dict, stops: tuple[Stop, ...], folder: Path, where: str
+    entry: Mapping,
+    number: int,
+    usual: str,
+    stops: tuple[Stop, ...],
+    folder: Path,
+    where: str,
+    bands: Container[str] = (),
 ) -> list[Shot]:
-    """The photos of one frame: one, or one a modality where the frame names none of several."""
+    """The photos of one frame: one, or one a modality where neither the frame names one of several
+    nor `usual`, what is known of it otherwise.  bands: modalities that are bands of its own file.
+    """
     where = f"{where}: frame {number}"
     fields = Fields(entry, where)
     file = fields.text("file_path", "") or fields.text("file", "")
@@ -270,10 +329,9 @@ def shots_of(
     matrix = rigid(entry[key], where, may_mirror=True)
     if not opencv_axes(entry):
         matrix = matrix @ OPENCV_FROM_EYE
-    names = [s.name for s in stops]
-    day = "" if "modality" in entry else day_of_frame(entry, where)
-    if "modality" in entry or day or len(names) == 1:
-        modality = fields.text("modality", day or names[0])
+    names = [s.name for s in stops if not s.formula]
+    if "modality" in entry or usual or len(names) == 1:
+        modality = fields.text("modality", usual or names[0])
         if modality not in names:
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
@@ -282,8 +340,9 @@ def shots_of(
         return [Shot(entry, modality, path, matrix, where, folder, elsewhere)]
     shots = []
     for name in names:
-        path, elsewhere = find_file(folder / name, file)
-        shots.append(Shot(entry, name, path, matrix, where, folder / name, elsewhere))
+        place = folder if name in bands else folder / name
+        path, elsewhere = find_file(place, file)
+        shots.append(Shot(entry, name, path, matrix, where, place, elsewhere))
     return shots
 
 
@@ -305,7 +364,7 @@ def photos_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path)
     photos = posed_photos(shot.path, shot.modality, pose, lens, where)
     mask, name = None, fields.text("mask_path", "") or fields.text("mask", "")
     if name:
-        mask = find_file(folder, name, ("",)).path
+        mask = find_file(folder, name).path
         if not os.path.isfile(mask):
             raise BadFile(f"{where}: the mask {path_end(mask)} is missing; put it there")
         refuse_other_mask(mask, photos[0].file_size)

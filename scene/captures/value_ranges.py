@@ -1,4 +1,4 @@
-"""The range of thermal photos that are numbers, where the capture states none: from themselves."""
+"""The range of photos that are numbers, where the capture states none: from themselves."""
 
 import math
 from collections.abc import Sequence
@@ -6,9 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import shown
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.photo import FLOATS, GREY_16, numbers_of, open_image
+from shapeshift.scene.captures.photo import decoded, numbers_of, open_image
+from shapeshift.scene.captures.radiometric.no_value import FLOATS, GREY_16
 from shapeshift.scene.captures.radiometric.number_photos import (
     cannot_read_radiometric,
     is_radiometric,
@@ -16,6 +20,8 @@ from shapeshift.scene.captures.radiometric.number_photos import (
 
 LOOKED_AT = 24  # photos of a modality
 PERCENTILES = (0.1, 99.9)  # between which the range begins; a dead pixel is beyond
+GREY_STEPS = 2  # of 255: JPEG makes of a grey saved in three channels no more
+BYTES = (0.0, 255.0)  # of photos of 8 bits, whose counts are all that is known
 LARGEST = 1e9  # of a value that anybody measures
 MARGIN = 0.05  # of what lies between, added at each end: the hottest spot is not cut off
 
@@ -25,13 +31,21 @@ def with_own_ranges(
 ) -> tuple[tuple[Stop, ...], list[Photo], tuple[str, ...]]:
     """Stops with ranges, photos with counts, and what a person should know.
 
-    Of thermal modalities without 'counts'.  Photos of floating-point numbers and radiometric ones
-    are values: a stated range is in their unit.  16 bits with a range are read over all of it.
+    Of modalities of values, heat or others, without 'counts'.  Photos of floating-point numbers
+    and radiometric ones are values: a stated range is in their unit.  16 bits with a range are read
+    over all of it.
     """
     out, doubts = [], []
     for stop in stops:
         mine = [photo for photo in photos if photo.modality == stop.name]
-        kind = _kind(mine) if stop.kind == "thermal" else ""
+        kind = _kind(mine) if stop.is_measured else ""
+        if stop.kind == "values" and mine:
+            if kind == "bytes":
+                refuse_colors(mine[0])
+            usual = BYTES if kind == "bytes" else mine[0].counts
+            palette = stop.palette or USUAL_PALETTE["values"]
+            stop = replace(stop, palette=palette, value_range=stop.value_range or usual)
+        kind = "" if kind == "bytes" else kind
         missing = cannot_read_radiometric(mine[0].path) if kind == "radiometric" else ""
         if missing:
             doubts.append(
@@ -43,38 +57,67 @@ def with_own_ranges(
             out.append(stop)
             continue
         ends = stop.value_range or _own_range(mine)
-        photos = [replace(p, counts=ends) if p.modality == stop.name else p for p in photos]
+        gaps = {"may_lack_values": True} if kind == "radiometric" else {}
+        photos = [replace(p, counts=ends, **gaps) if p.modality == stop.name else p for p in photos]
         unit = stop.unit or ("°C" if kind == "radiometric" else "")
-        palette = stop.palette or "ironbow"  # without one values are no scale
+        palette = stop.palette or USUAL_PALETTE[stop.kind]  # without one values are no scale
         out.append(replace(stop, value_range=ends, unit=unit, palette=palette))
     return tuple(out), photos, tuple(doubts)
 
 
 def _kind(photos: list[Photo]) -> str:
-    """radiometric, values (floating-point numbers) or counts (16 bits), by the first; "": none."""
+    """radiometric, values (floating-point numbers), counts (16 bits) or bytes, by the first photo;
+    "": its range is stated by its counts.
+    """
     if not photos or any(photo.counts is not None for photo in photos):
         return ""
     path = photos[0].path
-    if is_radiometric(path):
+    if not photos[0].band and is_radiometric(path):
         return "radiometric"
-    with open_image(path) as image:
-        return "values" if image.mode == FLOATS else "counts" if image.mode in GREY_16 else ""
+    with open_image(path, photos[0].band) as image:
+        return "values" if image.mode == FLOATS else "counts" if image.mode in GREY_16 else "bytes"
+
+
+def refuse_colors(photo: Photo) -> None:
+    """BadFile where a photo holds colours: a value is one number a pixel."""
+    image = decoded(photo.path, photo.counts, band=photo.band).image
+    pixels = np.asarray(image.convert("RGB"))
+    if np.ptp(pixels, axis=2).max(initial=0) > GREY_STEPS:
+        raise BadFile(
+            f"{path_end(photo.path)}: a photo of colours in {shown(photo.modality)}, which is of "
+            "kind values; photos of one number a pixel are wanted, or say with 'band' which of "
+            "its channels counts"
+        )
 
 
 def _own_range(photos: list[Photo]) -> tuple[float, float]:
     """What some of the photos hold.  Raises BadFile."""
-    some = photos[:: -(-len(photos) // LOOKED_AT)]
-    known = [numbers[np.isfinite(numbers)] for numbers in map(numbers_of, some)]
-    every = np.concatenate([numbers[:: max(1, len(numbers) // 100_000)] for numbers in known])
+    step = -(-len(photos) // LOOKED_AT)
+    some, others = photos[::step], [p for i, p in enumerate(photos) if i % step]
+    every = np.concatenate([_sample(photo) for photo in some])
+    while not len(every) and others:  # of those, no pixel has a value
+        every = _sample(others.pop())
     if not len(every):
-        raise BadFile(f"{some[0].path}: no number in it nor in the others; copy them again")
+        raise BadFile(
+            f"{photos[0].path}: no pixel of it has a value, nor of the {len(photos)} photos of "
+            f"{photos[0].modality} (NaN, or what stands for no data); copy them again"
+        )
     low, high = np.percentile(every.astype(np.float64), PERCENTILES)
     if not max(abs(low), abs(high)) <= LARGEST:
+        end, way = (low, "down") if abs(low) > abs(high) else (high, "up")
         raise BadFile(
-            f"{some[0].path}: numbers up to {high:.3g}; say with 'value_range' what counts"
+            f"{photos[0].path}: numbers {way} to {end:.3g}; say with 'value_range' what counts, or "
+            f"with 'no_data' that {end:.3g} is no value"
         )
     more = MARGIN * (high - low) or 0.5
     digits = 2 - math.floor(math.log10(high - low + 2 * more))  # three of the range, outwards
     step = 10.0**-digits
     ends = (math.floor((low - more) / step) * step, math.ceil((high + more) / step) * step)
     return round(ends[0], digits), round(ends[1], digits)
+
+
+def _sample(photo: Photo) -> np.ndarray:
+    """(N,) some of the values in it."""
+    numbers = numbers_of(photo)
+    known = numbers[np.isfinite(numbers)]
+    return known[:: max(1, len(known) // 100_000)]

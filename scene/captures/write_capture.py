@@ -7,7 +7,9 @@ import numpy as np
 
 from shapeshift.runtime_models.files.npy import write_arrays
 from shapeshift.runtime_models.files.whole_file import whole_file, write_whole
+from shapeshift.runtime_models.package.write_package import describe_stop
 from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING
 
 FORMAT = "shapeshift-capture"
 VERSION = 1
@@ -37,9 +39,12 @@ def write_capture(capture: Capture) -> Path:
                 "unit": stop.unit,
                 "counts": counts_of(capture, stop.name),
             }
+            | no_value_of(capture, stop.name)
+            | band_of(capture, stop.name)
             | ({"date": stop.date} if stop.date else {})
             for stop in capture.stops
-        ],
+        ]
+        + [describe_stop(stop) for stop in capture.formulas],
         "frames": [frame(photo, folder) for photo in capture.photos],
     }
     if capture.points is not None:
@@ -53,6 +58,19 @@ def counts_of(capture: Capture, modality: str) -> list[float] | None:
     """Of a modality's photos, which share them."""
     counts = next((p.counts for p in capture.photos if p.modality == modality), None)
     return None if counts is None else list(counts)
+
+
+def band_of(capture: Capture, modality: str) -> dict:
+    """Which band of their files a modality's photos are."""
+    band = next((p.band for p in capture.photos if p.modality == modality), 0)
+    return {"band": band} if band else {}
+
+
+def no_value_of(capture: Capture, modality: str) -> dict:
+    """What a modality's photos, which share it, say of numbers that are no values."""
+    said = next((p.no_value for p in capture.photos if p.modality == modality), SAID_NOTHING)
+    out: dict = {"no_data": list(said.numbers)} if said.numbers else {}
+    return out | ({"valid_range": list(said.valid_range)} if said.valid_range else {})
 
 
 def frame(photo: Photo, folder: Path) -> dict:

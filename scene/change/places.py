@@ -12,7 +12,8 @@ from shapeshift.scene.change.similarity import (
     surface_normals,
 )
 
-KINDS = ("moved", "appeared", "vanished", "hotter", "colder", "recoloured")
+KINDS = ("moved", "appeared", "vanished", "hotter", "colder", "higher", "lower", "recoloured")
+HEAT_WORDS, VALUE_WORDS = KINDS[3:5], KINDS[5:7]  # more and less of heat, and of other values
 GEOMETRY = KINDS[:3]
 TOUCH = 1.8  # cells between the middles of two that hang together
 THROUGH = 0.5  # part of the views in which the other visit sees through
@@ -30,7 +31,7 @@ class ChangeSettings:
 
     cell_m: float  # metres, side of the cubes in which views are joined
     least_m: float  # metres that a surface is off
-    least_value: float = 5.0  # in the thermal stops' unit
+    least_value: float = 5.0  # in the value stops' unit
     least_color: float = 14.0  # Lab, lightness counted by SHADE
     least_cells: int = 12  # of a place
 
@@ -44,7 +45,7 @@ class ChangedPlace:
     area_m2: float  # of its surface that was seen
     amount: float  # metres moved; metres to the nearest surface; values; Lab
     unit: str
-    level: float = np.nan  # the values there now, of places that are hotter or colder
+    level: float = np.nan  # the values there now, of places that are hotter or colder, or so
     before: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (n, 3) of a moved one
     number: int = 0  # from 1 on, by size
 
@@ -74,9 +75,13 @@ class ChangedPlace:
 
 
 def find_places(
-    before: SurfaceCells, after: SurfaceCells, settings: ChangeSettings, unit: str = ""
+    before: SurfaceCells,
+    after: SurfaceCells,
+    settings: ChangeSettings,
+    unit: str = "",
+    words: tuple[str, str] = HEAT_WORDS,
 ) -> list[ChangedPlace]:
-    """All places, the largest surface first.  unit: of the values."""
+    """All places, the largest surface first.  unit: of the values; words: of more and of less."""
     gone, new = ((c.through >= THROUGH) & (c.away_m >= settings.least_m) for c in (before, after))
     vanished = [_Part(before, rows) for rows in parts(before.points, gone, settings)]
     appeared = [_Part(after, rows) for rows in parts(after.points, new, settings)]
@@ -89,10 +94,10 @@ def find_places(
     zone = inside_any(after.points, [p.points for p in (*vanished, *appeared)], settings)
     still = after.through < THROUGH
     with np.errstate(invalid="ignore"):
-        hotter = still & ~zone & (after.value_change <= -settings.least_value)
-        colder = still & ~zone & (after.value_change >= settings.least_value)
+        more = still & ~zone & (after.value_change <= -settings.least_value)
+        less = still & ~zone & (after.value_change >= settings.least_value)
         colored = still & (color_distance(after.color_change) >= settings.least_color)
-    for kind, mask in (("hotter", hotter), ("colder", colder), ("recoloured", colored)):
+    for kind, mask in ((words[0], more), (words[1], less), ("recoloured", colored)):
         for rows in parts(after.points, mask, settings):
             if zone[rows].any():
                 continue  # a shadow, or where a thing stood: of the change of geometry

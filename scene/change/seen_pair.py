@@ -20,7 +20,7 @@ class SeenSide:
     color: np.ndarray  # (H, W, 3) display sRGB, divided by the coverage
     coverage: np.ndarray  # (H, W) 0..1
     depth_m: np.ndarray  # (H, W) NaN where less than half is covered
-    value: np.ndarray | None = None  # (H, W) of the thermal stop, NaN: not known
+    value: np.ndarray | None = None  # (H, W) of the value stop, NaN: not known
 
 
 @dataclass(frozen=True, eq=False)

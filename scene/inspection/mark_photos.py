@@ -20,7 +20,7 @@ JPEG = b"\xff\xd8\xff"
 
 def shrunk_photo(path: Path) -> bytes:
     """An image file as a JPEG of at most LONGEST_PX a side, upright.  Raises BadFile."""
-    image, _ = decoded(path, None, 1)
+    image = decoded(path, None).image
     with quiet():
         image = ImageOps.exif_transpose(over_black(image).convert("RGB"))
     image.thumbnail((LONGEST_PX, LONGEST_PX))

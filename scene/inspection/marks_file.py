@@ -58,11 +58,13 @@ class HeldOutError:
     percentile_95: float
     photos: int
 
-    def words(self, unit: str) -> str:
-        """One sentence."""
+    def words(self, unit: str, digits: int = 1) -> str:
+        """One sentence; digits: of values for people, an error has one more."""
+        mean, most = (
+            f"{e:.{digits + 1}f} {unit}".rstrip() for e in (self.mean, self.percentile_95)
+        )
         return (
-            f"on {self.photos} held-out photos {self.mean:.2f} {unit} in the mean, 95 of 100 "
-            f"pixels within {self.percentile_95:.2f} {unit}"
+            f"on {self.photos} held-out photos {mean} in the mean, 95 of 100 pixels within {most}"
         )
 
 

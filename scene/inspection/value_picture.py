@@ -1,4 +1,4 @@
-"""What a thermal stop measures in a view: value and depth of each pixel, before any palette."""
+"""What a stop of values measures in a view: value and depth of each pixel, before any palette."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,11 +32,16 @@ class ValuePicture:
     emission: Emission | None = None  # by which values were corrected; None: as photographed
     photographed: np.ndarray | None = None  # (H, W) float64: values before that
     photographed_range: tuple[float, float] | None = None
+    is_heat: bool = True  # its words: hottest and coldest, of others highest and lowest
+    digits: int = 1  # of a value behind the decimal point, for people
+    may_exceed: bool = False  # whether values lie beyond the range, which then is the palette's
 
     @property
     def is_temperature(self) -> bool:
-        """Whether its unit is one of temperature, so that it can be corrected."""
-        return self.unit in KELVINS
+        """Whether its unit is one of temperature, so that it can be corrected; a formula's values
+        are none, whatever their unit.
+        """
+        return self.unit in KELVINS and not self.may_exceed
 
     @property
     def known(self) -> np.ndarray:
@@ -155,6 +160,16 @@ class ValuePicture:
             photographed_range=None,
         )  # fmt: skip
 
+    def text(self, value: float, beside_range: bool = True) -> str:
+        """A value of it for people; beside_range: with < or > at an end of what photos showed."""
+        ends = self.value_range if beside_range and not self.may_exceed else None
+        return value_text(value, self.unit, ends, self.digits)
+
+    def lowest(self) -> tuple[tuple[float, float], float]:
+        """The pixel (column, row) with the least value, and that; ValueError: none is known."""
+        row, column = np.unravel_index(int(np.nanargmin(self.values)), self.values.shape)
+        return (float(column) + 0.5, float(row) + 0.5), float(self.values[row, column])
+
     def hottest(self) -> tuple[tuple[float, float], float]:
         """The pixel (column, row) with the largest value, and that; ValueError: none is known."""
         row, column = np.unravel_index(int(np.nanargmax(self.values)), self.values.shape)
@@ -177,8 +192,10 @@ def world_points(view: View, pixels: np.ndarray, depth_m: np.ndarray) -> np.ndar
     return in_camera @ world_from_camera[:3, :3].T + world_from_camera[:3, 3]
 
 
-def value_text(value: float, unit: str, value_range: tuple[float, float] | None = None) -> str:
-    """A value for people: one decimal, `--` where it is not known, < or > at the range's ends."""
+def value_text(
+    value: float, unit: str, value_range: tuple[float, float] | None = None, digits: int = 1
+) -> str:
+    """A value for people, `--` where it is not known, < or > at the range's ends."""
     if not np.isfinite(value):
         return "--"
     sign = ""
@@ -186,4 +203,4 @@ def value_text(value: float, unit: str, value_range: tuple[float, float] | None 
         low, high = value_range
         near = SATURATED * (high - low)
         sign = ">" if value >= high - near else "<" if value <= low + near else ""
-    return f"{sign}{value:.1f} {unit}".rstrip()
+    return f"{sign}{value:.{digits}f} {unit}".rstrip()

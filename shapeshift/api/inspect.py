@@ -13,11 +13,11 @@ from shapeshift.api.views import choose_views
 from shapeshift.app.change.find_change import ChangeChoice, SceneChange
 from shapeshift.app.errors import UsageError
 from shapeshift.app.inspection.draw_values import (
-    ThermalChoice,
-    ThermalScene,
+    MeasuredScene,
+    ValueChoice,
     depth_picture,
     draw_values,
-    thermal_scene,
+    measured_scene,
 )
 from shapeshift.app.inspection.facing import value_facing
 from shapeshift.app.paths import plain
@@ -25,7 +25,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.lengths import Measurement, Point, Scale
-from shapeshift.scene.inspection.lengths import measure as measured
+from shapeshift.scene.inspection.lengths import measure as measured_length
 from shapeshift.scene.inspection.marks import Mark, MarkReading, read_mark
 from shapeshift.scene.inspection.marks_file import (
     kept_scale,
@@ -60,7 +60,7 @@ class InspectedScene(OpenedScene):
         reflected: float | None = None,
         air: AirNumbers | None = None,
     ) -> ValuePicture:
-        """A view of the thermal stop as numbers: `values` (H, W) in `unit` and `depth_m` (H, W),
+        """A view of the value stop as numbers: `values` (H, W) in `unit` and `depth_m` (H, W),
         NaN where less than half of a pixel is covered, and `points` (H, W, 3) metres in the world.
 
         stop: which one; "": the first thermal one.  value_range, unit: what its black and white
@@ -73,8 +73,8 @@ class InspectedScene(OpenedScene):
             seen = scene.values("front", (640, 480))
             (column, row), celsius = seen.hottest()
         """
-        thermal = thermal_scene(self.subject, ThermalChoice(stop, value_range, unit, colors))
-        picture = _drawn(thermal, choose_views(self, camera, 1, size)[0])
+        measured = measured_scene(self.subject, ValueChoice(stop, value_range, unit, colors))
+        picture = _drawn(measured, choose_views(self, camera, 1, size)[0])
         return _corrected(picture, emissivity, reflected, air)
 
     def temperature(
@@ -87,7 +87,7 @@ class InspectedScene(OpenedScene):
         air: AirNumbers | None = None,
         **choice: "str | tuple[float, float]",
     ) -> float:
-        """The value of the thermal stop, in its unit, at (x, y, z) metres in the world or at
+        """The value of the value stop, in its unit, at (x, y, z) metres in the world or at
         (column, row) of a view; NaN where nothing is seen.
 
         camera None: a place in the world is read in the view, of 32 around it, that its surface
@@ -97,16 +97,16 @@ class InspectedScene(OpenedScene):
             celsius = scene.temperature((0.31, 0.22, 0.05))
         """
         spot = _numbers(place)
-        chosen = ThermalChoice(**choice)  # type: ignore[arg-type]  # names and types of `values`
-        thermal = thermal_scene(self.subject, chosen)
+        chosen = ValueChoice(**choice)  # type: ignore[arg-type]  # names and types of `values`
+        measured = measured_scene(self.subject, chosen)
         if len(spot) == 3 and camera is None:
             radius = self.bounds[1]
 
             def seen(view: View) -> ValuePicture:
-                return _corrected(_drawn(thermal, view), emissivity, reflected, air)
+                return _corrected(_drawn(measured, view), emissivity, reflected, air)
 
             return value_facing(seen, spot, radius)
-        picture = _drawn(thermal, choose_views(self, camera or "front", 1, size)[0])
+        picture = _drawn(measured, choose_views(self, camera or "front", 1, size)[0])
         picture = _corrected(picture, emissivity, reflected, air)
         if len(spot) == 3:
             return float(picture.values_at(spot[None])[0])
@@ -173,7 +173,7 @@ class InspectedScene(OpenedScene):
             scale = kept_scale(self.path) if self.path is not None else Scale()
             if known is not None:
                 scale = Scale.of_known([_point(picture, p) for p in known[:2]], float(known[2]))
-            return measured(kind, [_point(picture, place) for place in places], scale)
+            return measured_length(kind, [_point(picture, place) for place in places], scale)
         except ValueError as error:
             raise UsageError(str(error)) from None
 
@@ -183,9 +183,9 @@ class InspectedScene(OpenedScene):
             return renderer.inspect(lambda frames: depth_picture(frames, self.drawn, view))
 
 
-def _drawn(thermal: ThermalScene, view: View) -> ValuePicture:
+def _drawn(measured: MeasuredScene, view: View) -> ValuePicture:
     with shared_renderer("auto", "auto", RenderSettings(), BLACK) as renderer:
-        return renderer.inspect(lambda frames: draw_values(frames, thermal, view))
+        return renderer.inspect(lambda frames: draw_values(frames, measured, view))
 
 
 def _corrected(
@@ -226,9 +226,10 @@ def change(
     before: PathText | OpenedScene,
     after: PathText | OpenedScene,
     *,
-    degrees: float = 5.0,
+    degrees: float | None = None,
     millimetres: float = 0.0,
     stop: str = "",
+    values: str = "",
     value_range: tuple[float, float] | None = None,
     cameras: Camera | None = None,
     size: Size = (320, 240),
@@ -242,9 +243,11 @@ def change(
     with its kind (moved, appeared, vanished, hotter, colder, recoloured), centre and box in metres
     of `before`, area_m2, amount and unit; and `registration`, how their worlds fit together.
 
-    degrees, millimetres: from where on heat and shapes count; 0 mm is a thirty-second of the
-    scene's radius.  stop: whose colours and shapes are compared; "": the first that is not thermal.
-    value_range: of thermal stops that do not say it.  cameras: views of `before`; None is all
+    degrees, millimetres: from where on values and shapes count; None is 5 of heat, of others a
+    twentieth of their range; 0 mm is a thirty-second of the
+    scene's radius.  stop: whose colours and shapes are compared; "": the first that shows no
+    values.  values: the stop whose values are; "": the first thermal one, else the first of others.
+    value_range: of such stops that do not say it.  cameras: views of `before`; None is all
     around.  out: a folder, as the command writes it.  Raises UsageError, BadFile where the scenes
     do not fit together.
 
@@ -264,8 +267,8 @@ def change(
     scenes = opened(before), opened(after)
     names = (scenes[0].path or plain("before")).name, (scenes[1].path or plain("after")).name
     visits = (
-        visit_of(scenes[0].subject, names[0], stop, value_range),
-        visit_of(scenes[1].subject, names[1], stop, value_range),
+        visit_of(scenes[0].subject, names[0], stop, value_range, values),
+        visit_of(scenes[1].subject, names[1], stop, value_range, values),
     )
     views = None if cameras is None else choose_views(scenes[0], cameras, 1, size)
 

@@ -213,16 +213,18 @@ def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
     from shapeshift.app.training.saving import save
     from shapeshift.renderer.pace import measure_pace
     from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.runtime_models.stops.formula_stop import with_placed_formulas
     from shapeshift.training.checkpoint import checkpoint_path
 
     trainer.restore_last_good()
     if path is not None:
         save(trainer, path, checkpoint_path(path))  # before anything else can go wrong
-    model = trainer.model()
-    if pace and len(model.stops) > 1:
+    model = with_placed_formulas(trainer.model(), trainer.capture.formulas)
+    paced = pace and len(model.stops) > 1
+    if paced:
         model = replace(model, pace=measure_pace(model))
-        if path is not None:
-            write_package(model, path)
+    if path is not None and (paced or trainer.capture.formulas):
+        write_package(model, path)
     psnr_db = trainer.held_out_psnr(most=len(trainer.held_out))
     outcome = TrainOutcome(
         trainer.iteration, trainer.seconds, trainer.start_s, trainer.anchors_count,

@@ -119,7 +119,7 @@ class Renderer:
         """(H, W, 4) float32 red, green, blue times alpha, and alpha, before any background.
 
         Tiles on a CPU hand over the memory that they drew into: read-only, not copied, and yours as
-        long as you hold it.  At a thermal stop it holds values, which a palette has not coloured.
+        long as you hold it.  At a value stop it holds values, which a palette has not coloured.
 
             rgba = renderer.premultiplied(scene, view)
         """

@@ -56,7 +56,7 @@ class Scene(InspectedScene):
         scales (N, 3) metres of one sigma, wxyz (N, 4) unit, opacity (N,) 0..1, sh (N, M, 3)
         spherical harmonics (colour = 0.5 + sum, display sRGB).
 
-        Objects stand where the scene has them.  palette: thermal stops in their false colours.
+        Objects stand where the scene has them.  palette: value stops in their false colours.
         eye (3,) metres: for scenes whose shape depends on it (Scaffold-GS).  Raises BadFile,
         UsageError.
 
@@ -321,6 +321,31 @@ class Scene(InspectedScene):
             steps=steps, views=views, size=size, seed=seed, device=device,
         )  # fmt: skip
         return Scene.from_model(add_style(self, options, weights, paint, pace, progress))
+
+    def add_formula(
+        self,
+        name: str,
+        formula: str,
+        *,
+        value_range: tuple[float, float] | None = None,
+        unit: str = "",
+        palette: str = "",
+        after: str = "",
+        pace: bool = True,
+    ) -> "Scene":
+        """The scene with one stop more, whose values are a formula of other stops' values, such as
+        "a / (b + 1)" (docs/thermal.md).  value_range: at the palette's ends; None: what the scene
+        has.  after: the stop that it comes after.  Raises BadFile, UsageError.
+
+            ndvi = scene.add_formula("NDVI", "(nir - red) / (nir + red)")
+        """
+        from shapeshift.api.style import add_formula
+        from shapeshift.app.training.style_options import Options
+
+        where = self.path or Path("scene")
+        asked = {"range": value_range, "unit": unit, "palette": palette, "after": after}
+        options = Options(scene=where, out=Path(), name=name, formula=formula, pace=pace, **asked)
+        return Scene.from_model(add_formula(self, options))
 
     def without_stop(self, name: str) -> "Scene":
         """The scene without one of its stops, and without what that one alone had.

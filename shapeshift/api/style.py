@@ -42,6 +42,18 @@ class PaintFunction:
         return made
 
 
+def add_formula(scene: OpenedScene, options: Options) -> AnchorModel:
+    """What Scene.add_formula gives: the model with one stop more."""
+    from shapeshift.app.training.style import check_options, with_formula
+    from shapeshift.renderer.pace import measure_pace
+    from shapeshift.training.styles.add_style import refuse_plain
+
+    model = refuse_plain(scene.model)
+    check_options(options)
+    made, _ = with_formula(options, model)
+    return replace(made, pace=measure_pace(made)) if options.pace else made
+
+
 def add_style(
     scene: OpenedScene, options: Options, weights: Mapping[int, float] | None,
     paint: Paint | None, pace: bool, progress: Progress | None,

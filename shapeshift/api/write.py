@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -48,6 +48,7 @@ def export(
     object: str | None = None,
     label: int | str | None = None,
     eye: Sequence[float] | None = None,
+    spz_axes: Literal["ply", "rub"] = "ply",
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> Exported:
@@ -55,10 +56,11 @@ def export(
 
     out: its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, .usdz; .shift or a
     folder is our own package, which holds every x.  x: as of `Scene.at`.  sh_degree: 0 to 3, of the
-    colours' spherical harmonics.  palette: thermal stops in their false colours.  only: what lies
+    colours' spherical harmonics.  palette: value stops in their false colours.  only: what lies
     in one of these regions (their x means nothing here).  object: that object of a scene file
     alone.  label: what a labelled scene shows of that object alone, by its number or name; in a
-    package, its anchors.  eye: (3,) metres, for scenes whose shape depends on it.  overwrite:
+    package, its anchors.  eye: (3,) metres, for scenes whose shape depends on it.  spz_axes: of
+    an .spz, "ply", as most programs read it, or "rub", as the format's text says.  overwrite:
     replace an earlier file, never what is read.  progress: called with (what, part 0..1).
 
     Raises UsageError, BadFile; OSError where it cannot be written.
@@ -86,7 +88,10 @@ def export(
     ]
     if not parts:
         raise UsageError("all objects are hidden; name one of them: object=.")
+    if spz_axes not in ("ply", "rub"):
+        raise UsageError(f"spz_axes is {spz_axes!r}, expected 'ply' or 'rub'.")
     look = look_of(sh_degree, palette, eye, tuple(map(float, scene.origin)))
+    look = replace(look, spz_axes=spz_axes)
     splats = export_parts(parts, look, out, progress or (lambda what, part: None))
     return Exported(out, out.stat().st_size, len(splats.means), splats.findings)
 

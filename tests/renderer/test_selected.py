@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.colors.palette import thermal_blend, thermal_weights
+from shapeshift.renderer.colors.palette import value_blend, value_weights
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.stop_weights import StopBlend
@@ -78,9 +78,9 @@ def test_decoded_when_something_changed_and_only_then(renderer):
 def test_a_legend_tells_of_a_selector_too():
     model = thermal(random_model(20))
     ball = replace(BALL, x=0.4)
-    name, weight, stop = thermal_blend(scene_of(model, selectors=(ball,)))
+    name, weight, stop = value_blend(scene_of(model, selectors=(ball,)))
     assert (name, stop.name) == ("ironbow", "Hot") and weight == pytest.approx(0.8)
-    assert thermal_weights(StopBlend(()), np.zeros(3))[1] is None
+    assert value_weights(StopBlend(()), np.zeros(3))[1] is None
 
 
 def test_skipping_the_unseen_never_shares_heat_twice(renderer):

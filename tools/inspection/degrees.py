@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 
 from shapeshift.app.document import Document  # noqa: E402
 from shapeshift.app.drawing import open_renderer  # noqa: E402
-from shapeshift.app.inspection.draw_values import draw_values, thermal_scene  # noqa: E402
+from shapeshift.app.inspection.draw_values import draw_values, measured_scene  # noqa: E402
 from shapeshift.app.paths import DEMO  # noqa: E402
 from shapeshift.renderer.colors.palette import LUMINANCE  # noqa: E402
 from shapeshift.renderer.settings import RenderSettings  # noqa: E402
@@ -47,9 +47,9 @@ class Seen:
     finer: np.ndarray  # (H, W, 4) of twice the pixels a side, averaged
 
 
-def looked(renderer, thermal, view) -> Seen:
+def looked(renderer, measured, view) -> Seen:
     color, share = photograph(view, radiance("Thermal"))
-    values = draw_values(renderer, thermal, view)
+    values = draw_values(renderer, measured, view)
     drawn = np.array(renderer.image(0), np.float64)
     renderer.draw([replace(view, size=(2 * SIZE[0], 2 * SIZE[1]))])
     finer = np.array(renderer.image(0), np.float64)
@@ -93,12 +93,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
     out = parser.parse_args().out
-    thermal = thermal_scene(Document.of(read_package(DEMO)))
+    measured = measured_scene(Document.of(read_package(DEMO)))
     rows = []
     with open_renderer("none", "tiles") as (renderer, _):
         for name, views in VIEWS.items():
-            seen = [looked(renderer, thermal, view) for view in views]
-            made = [readings(each, thermal.behind or 0.0) for each in seen]
+            seen = [looked(renderer, measured, view) for view in views]
+            made = [readings(each, measured.behind or 0.0) for each in seen]
             for read in made[0]:
                 errors = [
                     np.abs(m[read] - s.truth)[s.counts] for m, s in zip(made, seen, strict=True)

@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from shapeshift.app.document import Document  # noqa: E402
 from shapeshift.app.drawing import open_renderer  # noqa: E402
-from shapeshift.app.inspection.draw_values import draw_values, thermal_scene  # noqa: E402
+from shapeshift.app.inspection.draw_values import draw_values, measured_scene  # noqa: E402
 from shapeshift.app.paths import DEMO  # noqa: E402
 from shapeshift.renderer.settings import RenderSettings  # noqa: E402
 from shapeshift.runtime_models.package.read_package import read_package  # noqa: E402
@@ -42,7 +42,7 @@ def main() -> None:
     say = sys.stdout.write
     say("# python3 tools/inspection/hottest.py > docs/bench/hottest.csv\n")
     say("size,view,truth_c,pixels,filtered_c,model_c,model_to_truth_c,model_to_filtered_c\n")
-    thermal = thermal_scene(Document.of(read_package(DEMO)))
+    measured = measured_scene(Document.of(read_package(DEMO)))
     sigma = RenderSettings().low_pass ** 0.5
     with open_renderer("none", "tiles") as (renderer, _):
         for size in SIZES:
@@ -52,7 +52,7 @@ def main() -> None:
                 counts = share >= 0.5
                 celsius, pixels = hottest(truth, counts)
                 filtered, _ = hottest(ndimage.gaussian_filter(truth, sigma, mode="nearest"), counts)
-                model = draw_values(renderer, thermal, view).hottest()[1]
+                model = draw_values(renderer, measured, view).hottest()[1]
                 say(
                     f"{size[0]}x{size[1]},{number},{celsius:.1f},{pixels},{filtered:.1f},"
                     f"{model:.1f},{model - celsius:.1f},{model - filtered:.1f}\n"

@@ -49,6 +49,8 @@ class ModalityScore:
     depth_error: float | None = None  # of photos with depth: ModelRenderer.depth_error
     whole_db: float | None = None  # PSNR of whole photos, before what stands still behind, if any
     fitted_db: float | None = None  # of right halves, colours fitted on left ones: fitted_psnr
+    unknown: float = 0.0  # share of the pixels that have no value, and count for nothing
+    blank: tuple[str, ...] = ()  # photos of which no pixel has one; they are in no mean
 
     @property
     def median_db(self) -> float:
@@ -160,7 +162,7 @@ def evaluate_model(
     if background == "auto" and known is None:
         for photo in tests[:: math.ceil(len(tests) / MOST_LOOKED_AT)]:
             smaller = math.ceil(max(photo.view.size) / LOOKED_AT_PX)
-            shown.append(read(photo, max(factor, smaller), masks))
+            shown += with_values([photo], max(factor, smaller), masks)
     behind = choose_background(background, known, shown) or BLACK
     still = StillBackground()
     if background == "auto" and known is None and behind == BLACK:
@@ -169,20 +171,36 @@ def evaluate_model(
     renderer, scores = ModelRenderer(device, model), {}
     for stop in capture.stops:
         alive = renderer.set_control(stop_for(model, stop).x)
-        names, found = [], []
+        names, found, blank = [], [], []
+        unknown = pixels = 0
         for photo in capture.of(stop.name, "test"):
             loaded = read(photo, factor, masks)  # one at a time is in memory
+            if loaded.is_blank:
+                blank.append(name_in(capture, loaded))
+                continue
+            unknown, pixels = unknown + loaded.unknown, pixels + math.prod(loaded.view.size)
             loaded = replace(loaded, view=moved([loaded.view], apart.tolist())[0])
             names.append(name_in(capture, loaded))
             found.append(photo_scores(renderer, still.cut(loaded), behind, distance))
             if (picture := still.pictures.get(key_of(loaded))) is not None:
                 found[-1]["whole_db"] = whole_psnr(renderer, loaded, picture)
+        if blank and not found:
+            raise BadFile(
+                f"{capture.folder}: no pixel of the photos of '{stop.name}' that are held out has "
+                "a value (no data, or NaN); mark others with split 'test'."
+            )
         if found:
-            each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
-            psnr_db, ssim_mean = (mean_of(found, key) or 0.0 for key in ("psnr_db", "ssim"))
-            some = {key: mean_of(found, key) for key in SOME_HAVE}
-            scores[stop.name] = ModalityScore(psnr_db, ssim_mean, len(found), alive, each, **some)
+            score = mean_score(names, found, alive)
+            scores[stop.name] = replace(score, unknown=unknown / pixels, blank=tuple(blank))
     return scores
+
+
+def mean_score(names: list[str], found: list[dict[str, float]], alive: int) -> ModalityScore:
+    """Of what photo_scores found of photos of these names."""
+    each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
+    psnr_db, ssim_mean = (mean_of(found, key) or 0.0 for key in ("psnr_db", "ssim"))
+    some = {key: mean_of(found, key) for key in SOME_HAVE}
+    return ModalityScore(psnr_db, ssim_mean, len(found), alive, each, **some)
 
 
 def still_of(capture: Capture, factor: int, masks: str, known: object) -> StillBackground:
@@ -199,9 +217,15 @@ def still_of(capture: Capture, factor: int, masks: str, known: object) -> StillB
     looked = [chosen(mine, PICTURE_PHOTOS) for mine in cameras.values()]
     for mine in looked:
         smaller = math.ceil(max(mine[0].view.size) / LOOKED_AT_PX)
-        if known is True or still_share([read(p, max(factor, smaller), masks) for p in mine]):
-            return still_background([read(p, factor, masks) for each in looked for p in each])
+        if known is True or still_share(with_values(mine, max(factor, smaller), masks)):
+            return still_background(with_values([p for m in looked for p in m], factor, masks))
     return StillBackground()
+
+
+def with_values(photos: list[Photo], factor: int, masks: str) -> list[LoadedPhoto]:
+    """Photos as `read` gives them, without those of which no pixel has a value."""
+    loaded = (read(photo, factor, masks) for photo in photos)
+    return [photo for photo in loaded if not photo.is_blank]
 
 
 def whole_psnr(renderer: ModelRenderer, photo: LoadedPhoto, still: StillPicture) -> float:
@@ -279,6 +303,8 @@ def report(path: Path | None, scores: dict[str, ModalityScore], started: float) 
                 "fitted_db": None if s.fitted_db is None else round(s.fitted_db, 4),
                 "psnr_db_each": {photo: round(db, 3) for photo, db in s.each.items()},
             }
+            | ({"unknown": round(s.unknown, 6)} if s.unknown else {})
+            | ({"photos_without_value": list(s.blank)} if s.blank else {})
             | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})
             | ({} if s.whole_db is None else {"whole_db": round(s.whole_db, 4)})
             | ({} if s.depth_error is None else {"depth_error": round(s.depth_error, 5)})

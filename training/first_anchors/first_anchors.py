@@ -184,11 +184,12 @@ def surface_axes(places: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np
 
 
 def photo_colors(points: np.ndarray, photos: list[LoadedPhoto], background: tuple) -> np.ndarray:
-    """(P, 3) the mean colour of the pixels that points (P, 3) fall on; grey where on none."""
+    """(P, 3) the mean colour of the pixels that count and points (P, 3) fall on; grey: on none."""
     total, times = np.zeros((len(points), 3)), np.zeros(len(points))
     for photo in photos[:: -(-len(photos) // COLOR_PHOTOS)]:
         pixel, inside = pixel_of(photo.view, points)
         column, row = pixel[inside].astype(int).T
-        total[inside] += photo.over(background)[row, column]
-        times[inside] += 1
+        weight = 1.0 if (given := photo.weight) is None else given[row, column] > 0
+        total[inside] += photo.over(background)[row, column] * np.reshape(weight, (-1, 1))
+        times[inside] += weight
     return np.where(times[:, None] > 0, total / np.maximum(times, 1)[:, None], 0.5)

@@ -18,18 +18,22 @@ LEAST_SEEN = 0.5  # of a hull's points; of objects seen from all around 0.65 to 
 UNCOVERED = 0.02  # of a silhouette: of photos that agree, a hull leaves nothing but rims
 WRONG_SHARE = 0.1  # of the photos at most; more are no outliers
 WRONG = 0.1  # of a silhouette that misses the hull, or of the hull that a photo denies
-Silhouette = tuple[View, np.ndarray]  # (H, W) bool, where the photo shows the object
+UNKNOWN = 2  # in a silhouette
+# (H, W) where the photo shows the object: 1 or True; where it shows nothing: 0; or UNKNOWN, which
+# carves nothing and asks for nothing.
+Silhouette = tuple[View, np.ndarray]
 
 
 def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | None:
-    """(H, W) bool where the photo shows the object; None where that is unknown."""
+    """(H, W) as of Silhouette; None where nothing of it is known."""
     if photo.see_through:
-        return photo.rgba[..., 3] >= 128
-    if background is None:
+        shape = photo.rgba[..., 3] >= 128
+    elif background is None:
         return None
-    difference = np.abs(photo.over(background) - np.asarray(background, np.float32)).max(axis=2)
-    shape = difference > NOISE
-    return shape if photo.weight is None else shape | ~(photo.weight > 0)  # unknown: not carved
+    else:
+        behind = np.asarray(background, np.float32)
+        shape = np.abs(photo.over(background) - behind).max(axis=2) > NOISE
+    return shape if photo.weight is None else np.where(photo.weight > 0, shape, np.uint8(UNKNOWN))
 
 
 def visual_hulls(
@@ -94,7 +98,7 @@ def carve(photos: list[Silhouette], low: np.ndarray, high: np.ndarray, side: flo
         left = np.flatnonzero(solid)
         pixel, inside = pixel_of(view, points[left])
         column, row = pixel[inside].astype(int).T
-        solid[left[inside]] = shape[row, column]
+        solid[left[inside]] = shape[row, column] != 0
         seen[left[inside]] += 1
     solid &= seen >= least_views(photos)
     cells = np.pad(solid.reshape(counts), 1)
@@ -136,7 +140,7 @@ def contradicting(photos: list[Silhouette], centre: np.ndarray, half: float) -> 
     for number, (view, shape) in enumerate(photos):
         pixel, inside = pixel_of(view, points)
         column, row = pixel[inside].astype(int).T
-        denied[number, inside] = ~shape[row, column]
+        denied[number, inside] = shape[row, column] == 0
         seen += inside
     against = np.where(seen >= least_views(photos), denied.sum(axis=0), len(photos))
     few = int(WRONG_SHARE * len(photos))
@@ -156,7 +160,7 @@ def uncovered(photos: list[Silhouette], points: np.ndarray, edge: float) -> np.n
     out = np.zeros(len(photos))
     for number, (view, shape) in enumerate(photos):
         pixel, inside = pixel_of(view, points)
-        row, column = np.nonzero(shape)
+        row, column = np.nonzero(shape == 1)
         if not len(row):
             continue
         side = 1.0

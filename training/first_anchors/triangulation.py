@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeshift.scene.captures.colmap_child import Progress, run_child
+from shapeshift.scene.captures.colmap.colmap_child import Progress, run_child
 from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.views import common_box, pixel_of
 from shapeshift.training.photos import LoadedPhoto, sampled

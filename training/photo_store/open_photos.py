@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from shapeshift.runtime_models.files.memory import amount
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.photo_store.photo_files import PhotoFiles
 from shapeshift.training.photo_store.photo_store import PhotoStore, StoredPhoto
@@ -16,6 +17,7 @@ from shapeshift.training.photos import (
     load_photos,
     memory_for_photos,
     memory_of,
+    unknown_pixels,
 )
 
 
@@ -34,6 +36,7 @@ class TrainingPhotos:
         self, train: list[LoadedPhoto], test: list[LoadedPhoto], store: PhotoStore | None = None
     ) -> None:
         self.train, self.test, self.store = train, test, store
+        self.said: list[str] = []  # of pixels without a value
         self.load_s = 0.0  # processor time of those that were all read at the beginning
         self.left_out: Any = None  # what leave_out_still found in them, once it has looked
         self.asked = 0  # the first iteration whose photo was not asked for
@@ -80,7 +83,7 @@ class TrainingPhotos:
         """
         if self.store is None:
             out = TrainingPhotos([change(p) for p in self.train], [change(p) for p in self.test])
-            out.load_s = self.load_s
+            out.load_s, out.said = self.load_s, self.said
             return out
         self.store.change_photos(change)
         for photo in (*self.train, *self.test):
@@ -91,14 +94,15 @@ class TrainingPhotos:
     def warnings(self) -> list[str]:
         """What a person should know of where the photos are, a sentence each."""
         if self.store is None:
-            return []
+            return self.said
         store, folder = self.store, self.store.files.folder
         width, height = (*self.train, *self.test)[0].view.size
         return [
+            *self.said,
             f"{len(store.photos):,} photos of {width}x{height} pixels take "
             f"{amount(store.files.size)}, in memory they may take {amount(store.most)}: they are "
             f"read as they are needed and kept in {folder} until the run is done; --memory GB or "
-            "--photo-mb MB allows more."
+            "--photo-mb MB allows more.",
         ]
 
     def close(self, keep: bool = False) -> None:
@@ -112,21 +116,40 @@ def open_photos(
 ) -> TrainingPhotos:
     """The photos of a capture with their sides divided by `factor`.
 
-    Raises BadFile where one cannot be read, or where they fit neither into memory nor on the disk.
-    Photos of a store are read later, and refused then.
+    Photos without any value are left out.  Raises BadFile where one cannot be read, where they fit
+    neither into memory nor on the disk, or where no photo of a modality has a value.  Photos of a
+    store are read later, and refused then; those that may lack values are read now.
     """
     room = room or PhotoRoom()
     most = memory_for_photos() if room.most is None else room.most
     if memory_of(capture.photos, factor) <= most:
         began = time.process_time()
         train, test = (load_photos(capture, split, factor, masks) for split in ("train", "test"))
-        loaded = TrainingPhotos(train, test)
-        loaded.load_s = time.process_time() - began
-        return loaded
+        opened = TrainingPhotos(train, test)
+        opened.load_s = time.process_time() - began
+    else:
+        opened = stored_photos(capture, factor, masks, room.folder, most)
+    used = {photo.name for photo in (*opened.train, *opened.test)}
+    blank = [photo for photo in capture.photos if photo.name not in used]
+    opened.said = unknown_pixels((*opened.train, *opened.test), blank)
+    for name in {photo.modality for photo in blank if photo.split == "train"}:
+        if not any(photo.modality == name for photo in opened.train):
+            raise BadFile(
+                f"{capture.folder}: no pixel of the photos of '{name}' has a value (no data, NaN, "
+                "or beyond what was measured); copy them again, or drop the modality"
+            )
+    return opened
+
+
+def stored_photos(
+    capture: Capture, factor: int, masks: str, folder: Path | None, most: int
+) -> TrainingPhotos:
+    """Photos that do not fit into memory: as `open_photos`."""
     reader = PhotoReader.of(capture.photos, factor, masks)
-    files = PhotoFiles(capture.photos, reader, room.folder)
-    store = PhotoStore(capture.photos, reader, files, most)
+    store = PhotoStore(capture.photos, reader, PhotoFiles(capture.photos, reader, folder), most)
     split: dict[str, list[LoadedPhoto]] = {"train": [], "test": []}
     for number, photo in enumerate(capture.photos):
-        split[photo.split].append(StoredPhoto(store, number))
+        stored = StoredPhoto(store, number)
+        if not (photo.may_lack_values and stored.look().is_blank):
+            split[photo.split].append(stored)
     return TrainingPhotos(split["train"], split["test"], store)

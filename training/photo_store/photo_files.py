@@ -29,7 +29,8 @@ from shapeshift.training.photos import LoadedPhoto, PhotoReader
 
 PIXELS, INDEX = "photos.bin", "index.bin"
 MAGIC = b"shapeshift photos 1\n".ljust(32, b"\0")
-RECORD = struct.Struct("<16sIB11x")  # what it was made of, checksum of the pixels, flags
+# What it was made of, checksum of the pixels, flags, how many pixels have no value.
+RECORD = struct.Struct("<16sIBI7x")
 THERE, WEIGHTED, DEEP, MASKED, MAPPED = 1, 2, 4, 8, 16  # flags
 
 
@@ -44,7 +45,8 @@ class PhotoFiles:
         sizes = [reader.bytes_of(photo) for photo in photos]
         self.starts = np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).tolist()
         self.lock = threading.Lock()
-        self.known: dict[int, tuple[int, int]] = {}  # (checksum, flags) of this run's photos
+        # (checksum, flags, pixels without a value) of this run's photos
+        self.known: dict[int, tuple[int, int, int]] = {}
         self.folder, self.own, self.index, handle = open_folder(place)
         self.pixels = open_ours(self.folder / PIXELS)
         self._end = weakref.finalize(
@@ -85,8 +87,8 @@ class PhotoFiles:
                 stamp, *found = RECORD.unpack(record)
                 if not found[1] & THERE or stamp != self.stamp(number):
                     return None
-                self.known[number] = found[0], found[1]
-            checksum, flags = self.known[number]
+                self.known[number] = found[0], found[1], found[2]
+            checksum, flags, unknown = self.known[number]
             self.pixels.seek(self.starts[number])
             data = self.pixels.read(size) or b""
         if len(data) != size or zlib.crc32(data) != checksum:
@@ -106,7 +108,7 @@ class PhotoFiles:
         photo, masked = self.photos[number], bool(flags & MASKED)
         return LoadedPhoto(
             view.divided(self.reader.factor), photo.modality, rgba, weight, photo.name, depth,
-            masked, normals,
+            masked, normals, unknown,
         )  # fmt: skip
 
     def write(self, number: int, photo: LoadedPhoto, stamp: bytes) -> None:
@@ -122,9 +124,9 @@ class PhotoFiles:
         checksum = zlib.crc32(data)
         with self.lock:
             write_at(self.pixels, self.starts[number], data)
-            record = RECORD.pack(stamp, checksum, flags)
+            record = RECORD.pack(stamp, checksum, flags, photo.unknown)
             write_at(self.index, len(MAGIC) + number * RECORD.size, record)
-            self.known[number] = checksum, flags
+            self.known[number] = checksum, flags, photo.unknown
 
     def stamp(self, number: int) -> bytes:
         """What a photo is made of: its files by time and size, and all that is done to them."""
@@ -134,7 +136,7 @@ class PhotoFiles:
                 state = os.stat(path)
                 about.append(f"{path.absolute()} {state.st_mtime_ns} {state.st_size}")
         units = photo.depth_unit, photo.float_depth_unit
-        of_files = photo.counts, units, photo.lens, photo.normal_axes
+        of_files = photo.counts, photo.band, photo.no_value, units, photo.lens, photo.normal_axes
         about += [repr(self.reader.way(photo)), repr(of_files)]
         return hashlib.blake2b("\n".join(about).encode(), digest_size=16).digest()
 

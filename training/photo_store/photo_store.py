@@ -133,13 +133,19 @@ class StoredPhoto(LoadedPhoto):
         about: dict[str, Any] = {
             "view": photo.view.divided(store.reader.factor), "modality": photo.modality,
             "name": photo.name, "masked": is_masked(photo, store.reader.masks),
-            "store": store, "number": number,
+            "store": store, "number": number, "unknown": 0,
         }  # fmt: skip
         self.__dict__.update(about)
 
     def mask(self) -> None:
         """From now on it has an alpha that says what lies outside of its subject."""
         self.__dict__["masked"] = True
+
+    def look(self) -> LoadedPhoto:
+        """The photo, read now; it knows then how many of its pixels have no value."""
+        found = self.in_memory()
+        self.__dict__["unknown"] = found.unknown
+        return found
 
     @property
     def rgba(self) -> np.ndarray:

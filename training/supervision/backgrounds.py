@@ -43,12 +43,14 @@ def shared_color(photos: list[LoadedPhoto] | tuple) -> Background | None:
         return None
     rims: dict[str, list[np.ndarray]] = {}
     for photo in photos:
-        rims.setdefault(photo.modality, []).append(rim_of(photo.rgba[..., :3]))
+        rims.setdefault(photo.modality, []).append(rim_of(photo.rgba[..., :3], counting(photo)))
     edges = [np.concatenate(parts) for parts in rims.values()]
+    if not all(map(len, edges)):
+        return None
     color = np.median(edges[0], axis=0)
     if not all(near(edge, color).mean() >= ALIKE for edge in edges):
         return None
-    empty = [near(photo.rgba[..., :3], color).mean() for photo in photos]
+    empty = [near(photo.rgba[..., :3][counting(photo)], color).mean() for photo in photos]
     return tuple((color / 255).tolist()) if np.mean(empty) >= EMPTY else None
 
 
@@ -71,13 +73,24 @@ def background_warning(color: Background) -> str:
     )
 
 
-def rim_of(rgb: np.ndarray) -> np.ndarray:
-    """(P, 3) the pixels along the edges of a photo (H, W, 3)."""
+def counting(photo: LoadedPhoto) -> np.ndarray:
+    """(H, W) bool which pixels of a photo count."""
+    return np.ones(photo.rgba.shape[:2], bool) if photo.weight is None else photo.weight > 0
+
+
+def rim_of(rgb: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
+    """(P, 3) the pixels along the edges of a photo (H, W, 3); of what counts (H, W), if given."""
     height, width = rgb.shape[:2]
     inside = np.zeros((height, width), bool)
     y, x = max(round(EDGE * height), 1), max(round(EDGE * width), 1)
     inside[y : height - y, x : width - x] = True
-    return rgb[~inside]
+    if counts is None or counts.all():
+        return rgb[~inside]
+    from scipy.ndimage import binary_fill_holes, minimum_filter
+
+    whole = binary_fill_holes(counts).astype(np.uint8)
+    inside = minimum_filter(whole, (2 * y + 1, 2 * x + 1), mode="constant") > 0
+    return rgb[counts & ~inside]
 
 
 def near(rgb: np.ndarray, color: np.ndarray) -> np.ndarray:

@@ -9,11 +9,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shapeshift.training.first_anchors.hull import VOTE_SIDE, Silhouette, carve, uncovered
+from shapeshift.training.first_anchors.hull import (
+    UNKNOWN,
+    VOTE_SIDE,
+    Silhouette,
+    carve,
+    uncovered,
+)
 from shapeshift.training.first_anchors.views import common_box
 from shapeshift.training.photo_store.open_photos import TrainingPhotos
 from shapeshift.training.photos import LoadedPhoto, sampled
-from shapeshift.training.supervision.backgrounds import ALIKE, EMPTY, near, shared_color
+from shapeshift.training.supervision.backgrounds import (
+    ALIKE,
+    EMPTY,
+    counting,
+    near,
+    shared_color,
+)
 from shapeshift.training.supervision.still_picture import (
     STILL,
     StillPicture,
@@ -30,6 +42,7 @@ TURNED = 30.0  # degrees between two cameras that cannot see the same background
 # 0.12 (a flat disc seen from one height) to 0.66 on turntables; of what nothing ever hides, before
 # a room, 0.01 and, JPEGs of a corridor of two colours, 0.06 by chance.
 HIDDEN = 0.1
+KNOWN = 0.5  # of the photos that must know a pixel before it can be said to stand still
 COVERED = 0.05  # of a silhouette may miss the hull of all of them, in the median
 Key = tuple[str, tuple[int, int]]  # modality and size: photos of one camera
 
@@ -98,8 +111,12 @@ def still_background(photos: list[LoadedPhoto]) -> StillBackground:
     pictures: dict[Key, StillPicture] = {}
     for key in (key for key, share in shares.items() if share):
         mine = chosen(cameras[key], PICTURE_PHOTOS)
-        picture = still_picture([photo.rgba[..., :3] for photo in mine])
-        shapes = [(p.view, subject_mask(p.rgba[..., :3], picture)) for p in mine]
+        pixels = as_others_show(mine)
+        picture = still_picture(pixels)
+        shapes = [
+            (p.view, np.where(counting(p), subject_mask(rgb, picture), UNKNOWN))
+            for p, rgb in zip(mine, pixels, strict=True)
+        ]
         if picture.hidden >= HIDDEN and fit_together(shapes):
             pictures[key] = picture
     return StillBackground(max(shares.values(), default=0.0), pictures)
@@ -124,11 +141,35 @@ def still_share(photos: list[LoadedPhoto]) -> float:
     if len(alike) < STILL_PHOTOS // 3 or not turned >= TURNED:
         return 0.0
     step = -(-max(photos[0].view.size) // STILL_PIXELS)
-    pixels = np.stack([photo.rgba[::step, ::step, :3] for photo in alike])  # (N, h, w, 3)
+    pixels = np.stack([rgb[::step, ::step] for rgb in as_others_show(alike)])  # (N, h, w, 3)
     middle = np.median(pixels, axis=0)
     still = near(pixels, middle).mean(axis=0) >= STILL
+    still &= np.mean([counting(photo)[::step, ::step] for photo in alike], axis=0) >= KNOWN
     plain = not still.any() or near(middle[still], np.median(middle[still], axis=0)).mean() >= ALIKE
     return 0.0 if plain or still.mean() < EMPTY else float(still.mean())
+
+
+def as_others_show(photos: list[LoadedPhoto]) -> list[np.ndarray]:
+    """(H, W, 3) uint8 of photos of one camera; what one does not know as most of the others have
+    it, so that it speaks for nothing else.
+    """
+    pixels = [photo.rgba[..., :3] for photo in photos]
+    counts = [counting(photo) for photo in photos]
+    lacking = ~np.logical_and.reduce(counts)
+    if not lacking.any():
+        return pixels
+    there = np.stack([known[lacking] for known in counts])  # (N, P)
+    values = np.stack([rgb[lacking] for rgb in pixels]).astype(np.float32)  # (N, P, 3)
+    values[~there] = np.inf
+    last = np.maximum(there.sum(axis=0), 1) - 1
+    usual = np.sort(values, axis=0)[last // 2, np.arange(len(last))]  # the lower median
+    usual = np.where(np.isfinite(usual), usual, 0).astype(np.uint8)
+    out = []
+    for rgb, known in zip(pixels, counts, strict=True):
+        made = rgb.copy()
+        made[lacking & ~known] = usual[~known[lacking]]
+        out.append(made)
+    return out
 
 
 def fit_together(shapes: list[Silhouette]) -> bool:

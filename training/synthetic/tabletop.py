@@ -173,7 +173,7 @@ def moved(part: PlainSplats, y: float) -> PlainSplats:
 
 def save(part: PlainSplats, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_spz(part, path)
+    write_spz(part, path, axes="rub")  # whose up is +Y, as the scene file says
 
 
 def write_box(half: np.ndarray, y: float, path: Path) -> None:

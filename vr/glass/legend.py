@@ -41,7 +41,7 @@ class GlassScale:
 
     @staticmethod
     def of(stop: Stop | None, palette: str, ends: tuple[float, float]) -> "GlassScale | None":
-        """That of a thermal stop; None where there is none, or nobody knows its values."""
+        """That of a value stop; None where there is none, or nobody knows its values."""
         if stop is None or not palette or stop.value_range is None:
             return None
         return GlassScale(palette, *stop.value_range, stop.unit, ends)

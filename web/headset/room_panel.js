@@ -75,7 +75,7 @@ export class RoomPanel {
      */
     picture(gpu, panel, sharpness, automatic, prices) {
         const { gl } = gpu, { shown, renderer, chosen, stops } = panel, { blend } = shown.model, x = blend.sliderX(shown.x);
-        const thermal = renderer.thermal(shown), legend = thermal && { ...thermal.stop, clear: Math.min(1, 0.3 + 2 * thermal.weight) };
+        const measured = renderer.measured(shown), legend = measured && { ...measured.stop, clear: Math.min(1, 0.3 + 2 * measured.weight) };
         const state = JSON.stringify([x, chosen?.name, stops, legend, sharpness, automatic, prices, panel.sweep !== null]);
         if (state === this.drawnFor && this.gpu === gpu && this.texture) return this.texture;
         this.drawnFor = state;

@@ -132,11 +132,11 @@ export class Decoder {
     decodeColors(object, shade, way, eye) {
         const { model } = object, k = model.perAnchor;
         if (model.kind === "layers") return this.shader.shade(object, shade, way, eye, null, 0, object.rows, () => {});
-        const thermal = new Set(shade.heats.map((heat) => heat.stop)), mixed = object.own && !shade.pure;
+        const measured = new Set(shade.heats.map((heat) => heat.stop)), mixed = object.own && !shade.pure;
         for (const batch of batchesOf(model)) {
             const { texture } = this.stage("out", batch.rows, staging(k).vectors);
             this.shader.shade(object, shade, way, eye, texture, batch.first, splatRows(batch, object), (control, heat) =>
-                this.run(object, "color", mixed && !heat ? null : control, batch, 0, eye, object.own?.mask((/** @type {number} */ s) => !thermal.has(s))));
+                this.run(object, "color", mixed && !heat ? null : control, batch, 0, eye, object.own?.mask((/** @type {number} */ s) => !measured.has(s))));
         }
     }
 }

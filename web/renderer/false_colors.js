@@ -1,7 +1,9 @@
-// false_colors: where palettes belong, as renderer/colors/false_colors.py has it.  At a pure thermal
-// stop the palette is laid over the whole picture.  Between such a stop and another one both stops'
-// colours are decoded; what is thermal, the heat, is drawn in addition and coloured at the last
+// false_colors: where palettes belong, as renderer/colors/false_colors.py has it.  At a pure stop
+// of values the palette is laid over the whole picture.  Between such a stop and another one both stops'
+// colours are decoded; what is of values, heat or others, is drawn in addition and coloured at the last
 // step.  Where several palettes show at once each splat's heat is coloured before it is drawn.
+
+import { hasFalseColors } from "./stops.js";
 
 /** @typedef {import("./stops.js").Control} Control */
 /** @typedef {{stop: number, control: Control, palette: string, weight: number, ofLayer: boolean}} Heat */
@@ -9,20 +11,20 @@
 /** @typedef {"no heat" | "picture" | "beside" | "splats"} Way */
 
 /**
- * The colours that an object shows: `rest` where the final ones are decoded, `heats` what thermal
- * stops have in them.  own: each anchor has weights of its own, and these stops are met somewhere.
+ * The colours that an object shows: `rest` where the final ones are decoded, `heats` what stops
+ * of values have in them.  own: each anchor has weights of its own, and these stops are met somewhere.
  * @param {any} model @param {Control} control @param {number[] | null} own @returns {Shade}
  */
 export function shadeOf(model, control, own = null) {
     const { blend } = model, { stops } = blend, follows = model.colorsFollow, weights = own ?? blend.weights(control);
     const at = follows ? control : 0;
-    const thermal = stops.map((/** @type {any} */ _, /** @type {number} */ s) => s)
-        .filter((/** @type {number} */ s) => stops[s].kind === "thermal" && stops[s].palette && weights[s] > 0);
-    if (!thermal.length) return { rest: at, heats: [], pure: false };
-    const others = weights.map((/** @type {number} */ weight, /** @type {number} */ s) => (thermal.includes(s) ? 0 : weight));
-    const left = others.reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0), pure = !left && thermal.length === 1;
+    const measured = stops.map((/** @type {any} */ _, /** @type {number} */ s) => s)
+        .filter((/** @type {number} */ s) => hasFalseColors(stops[s]) && weights[s] > 0);
+    if (!measured.length) return { rest: at, heats: [], pure: false };
+    const others = weights.map((/** @type {number} */ weight, /** @type {number} */ s) => (measured.includes(s) ? 0 : weight));
+    const left = others.reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0), pure = !left && measured.length === 1;
     const layered = model.kind === "layers" && model.mode === "exclusive" && !pure;
-    const heats = thermal.map((/** @type {number} */ s) => ({
+    const heats = measured.map((/** @type {number} */ s) => ({
         stop: s, palette: stops[s].palette, ofLayer: layered,
         control: pure && !own ? at : follows ? stops[s].x : 0,
         weight: pure ? 1 : weights[s],

@@ -1,7 +1,7 @@
 // models: what a scene's models are on the GPU, once, however many objects have one.
 import { WIDTH } from "../conventions.js";
 import { rowsOf } from "./gl.js";
-import { StopBlend } from "./stops.js";
+import { hasFalseColors, StopBlend } from "./stops.js";
 
 /** @typedef {import("./gl.js").Gpu} Gpu */
 /** @typedef {import("./container.js").Container} Container */
@@ -46,7 +46,7 @@ function loadLayers(gpu, model, array, table) {
     const harmonics = joined(table(model.sh, count), model.shRest ? table(model.shRest, count) : new Float32Array(0), count), exclusive = new Float32Array(4 * vectors * count);
     for (let i = 0; i < count; i++) {
         exclusive[4 * vectors * i + layer[i]] = 1;
-        exclusive[4 * vectors * i + 4 * (vectors - 1)] = model.stops[layer[i]].kind === "thermal" && model.stops[layer[i]].palette ? 0 : 1;
+        exclusive[4 * vectors * i + 4 * (vectors - 1)] = hasFalseColors(model.stops[layer[i]]) ? 0 : 1;
     }
     return {
         ...model, layer, opacity: table(model.opacity, count), shList: gpu.list("rgba32f", harmonics.length / 4, harmonics),

@@ -4,6 +4,7 @@
 import { WIDTH } from "../conventions.js";
 import { rowsOf } from "./gl.js";
 import { add, conjugate, dot, length, moved, turn } from "../poses.js";
+import { hasFalseColors } from "./stops.js";
 
 /** @typedef {{kind: string, x: import("./stops.js").Control, border: number, space: string, centre?: number[], half?: number[],
  *   wxyz?: number[], radius?: number, point?: number[], normal?: number[], weight?: ArrayLike<number>}} Region */
@@ -60,7 +61,7 @@ export class Regions {
             let kept = 1;
             for (let s = 0; s < stops; s++) {
                 this.most[s] = Math.max(this.most[s], weights[s]);
-                if (model.stops[s].kind === "thermal" && model.stops[s].palette) kept -= weights[s];
+                if (hasFalseColors(model.stops[s])) kept -= weights[s];
             }
             texels[4 * (this.vectors * (a + 1) - 1)] = Math.max(0, kept);
         }

@@ -9,6 +9,7 @@ import { Gpu, rowsOf } from "./gl.js";
 import { loadModel } from "./models.js";
 import { add, chain, dot, inverse, length, rows } from "../poses.js";
 import { Regions } from "./regions.js";
+import { hasFalseColors } from "./stops.js";
 import { Projector } from "./project.js";
 import { Resolver } from "./resolve.js";
 import { Sorter } from "./sort.js";
@@ -71,7 +72,7 @@ export class Renderer {
             }
             return object;
         });
-        const hasHeat = this.models.some((/** @type {any} */ model) => model.stops.some((/** @type {any} */ stop) => stop.kind === "thermal" && stop.palette));
+        const hasHeat = this.models.some((/** @type {any} */ model) => model.stops.some(hasFalseColors));
         this.arena = new Arena(this.gpu, row, this.palettes, hasHeat, scene.brightest ?? Infinity);
         this.decoder = new Decoder(this.gpu, this.arena);
         this.projector = new Projector(this.gpu, this.arena);
@@ -217,15 +218,15 @@ export class Renderer {
     }
 
     /** How much of a palette an object shows, and of which stop: for a legend. @param {SceneObject} object */
-    thermal(object) {
+    measured(object) {
         const weights = object.model.blend.weights(object.x);
         let best = null;
         for (const [s, stop] of object.model.stops.entries())
-            if (stop.kind === "thermal" && stop.palette && weights[s] > (best?.weight ?? 0)) best = { weight: weights[s], stop };
+            if (hasFalseColors(stop) && weights[s] > (best?.weight ?? 0)) best = { weight: weights[s], stop };
         return best;
     }
 
-    /** The value 0..1 that a thermal stop shows at a place of the last picture; null: none there. @param {number} x @param {number} y  0..1 from lower left */
+    /** The value 0..1 that a value stop shows at a place of the last picture; null: none there. @param {number} x @param {number} y  0..1 from lower left */
     valueAt(x, y) {
         const { gl, colors, arena } = this, image = arena.images[0], beside = colors.way === "beside";
         if (!image || !["picture", "beside"].includes(colors.way)) return null;

@@ -1,4 +1,4 @@
-// shade: colours of splats and the heat that thermal stops have in them, as heat.comp, shade_sh.comp
+// shade: colours of splats and the heat that value stops have in them, as heat.comp, shade_sh.comp
 // and weigh.comp of renderer/shaders.  One fragment a splat; of several parts the later are added.
 import { LUMINANCE, WIDTH } from "../conventions.js";
 import { rowsOf } from "./gl.js";

@@ -2,9 +2,12 @@
 // enters the first layer of every network linearly, so x between two stops stands for a blend of
 // their encodings, Psi = sum of w_s Psi(x_s), at the pace that makes even steps look even.
 
-/** @typedef {{name: string, x: number, kind: string, palette: string, valueRange: number[] | null, unit: string}} Stop */
+/** @typedef {{name: string, x: number, kind: string, palette: string, valueRange: number[] | null, unit: string, digits: number}} Stop */
 /** @typedef {number | number[]} Control  x on the slider, 0 to 1, or the weights of all stops */
 /** @typedef {{d: number, spacing: number, sigma: number}} Encoding */
+
+/** Whether a palette makes the colours of a stop: it shows values, heat or others. @param {any} stop */
+export const hasFalseColors = (stop) => (stop.kind === "thermal" || stop.kind === "values") && Boolean(stop.palette);
 
 /** @param {number} x @param {number[]} xs  rising @param {number[]} ys @returns {number} as numpy.interp */
 export function interpolate(x, xs, ys) {

@@ -19,7 +19,9 @@ NOWHERE = np.zeros((0, 0))
 def words_of(value: float, picture: ValuePicture, wanted: str) -> str:
     """A value in the unit of temperature that is wanted; "--" where it is not known."""
     unit, low, high = in_unit(picture.unit, *picture.value_range, wanted)
-    return value_text(in_unit(picture.unit, value, value, wanted)[1], unit, (low, high))
+    ends = None if picture.may_exceed else (low, high)
+    shown = in_unit(picture.unit, value, value, wanted)[1]
+    return value_text(shown, unit, ends, picture.digits)
 
 
 def draw_mark(

@@ -1,4 +1,4 @@
-"""The scale of thermal stops in the scene view: palette, values, unit; it fades in with them."""
+"""The scale of value stops in the scene view: palette, values, unit; it fades in with them."""
 
 import numpy as np
 from imgui_bundle import imgui
@@ -9,7 +9,7 @@ from shapeshift.renderer.colors.palette import (
     ALL_VALUES,
     legend_opacity,
     palette_between,
-    thermal_blend,
+    value_blend,
 )
 from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
 from shapeshift.scene.scene import Scene
@@ -33,10 +33,10 @@ def draw_scale_bar(
     ends: tuple[float, float] | None = None,
 ) -> None:
     """Draws the bar with its ticks into a box, over the picture or into a list that is given; it
-    fades in with the thermal stop.  wanted: a unit of temperature instead of the stop's own.  ends:
+    fades in with the value stop.  wanted: a unit of temperature instead of the stop's own.  ends:
     shares of the range that the palette's ends stand for, each with a handle; None: all, and none.
     """
-    palette, weight, stop = thermal_blend(scene)
+    palette, weight, stop = value_blend(scene)
     weight = legend_opacity(weight)
     if not palette or stop is None or stop.value_range is None or not weight > 0.01:
         return
@@ -106,7 +106,7 @@ def in_unit(unit: str, low: float, high: float, wanted: str) -> tuple[str, float
 
 def has_scale(scene: Scene) -> bool:
     """Whether there is something of it to be seen."""
-    palette, weight, stop = thermal_blend(scene)
+    palette, weight, stop = value_blend(scene)
     known = bool(palette) and stop is not None and stop.value_range is not None
     return known and legend_opacity(weight) > 0.01
 

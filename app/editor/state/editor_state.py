@@ -369,7 +369,7 @@ class EditorState:
                 self.set_x(index, sweep.advance(seconds))
 
     def choose_palette(self, name: str) -> None:
-        """Shows every thermal stop in that palette; AS_FILED gives back the scene's own."""
+        """Shows every value stop in that palette; AS_FILED gives back the scene's own."""
         self.palette = name
         objects = [
             replace(obj, model=self.in_palette(model))
@@ -383,12 +383,12 @@ class EditorState:
 
     @property
     def has_palettes(self) -> bool:
-        """Whether any thermal stop is drawn through a palette at all."""
+        """Whether any value stop is drawn through a palette at all."""
         return any(stop.palette for obj in self.scene.objects for stop in obj.model.stops)
 
     @property
     def has_legend(self) -> bool:
-        """Whether any thermal stop that may be seen has values to tell."""
+        """Whether any value stop that may be seen has values to tell."""
         if self._legend[0] is not self.scene:  # asked several times a frame, of many objects
             seen = [obj for obj in self.scene.objects if obj.visible]
             stops = [stop for obj in seen for stop in obj.model.stops]

@@ -10,7 +10,7 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import stamp_of
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
-from shapeshift.app.inspection.draw_values import ThermalScene, thermal_scene
+from shapeshift.app.inspection.draw_values import MeasuredScene, measured_scene
 from shapeshift.app.inspection.mark_texts import free_name
 from shapeshift.app.inspection.pictures import ColorScale, auto_ends
 from shapeshift.app.paths import is_bundled
@@ -67,23 +67,23 @@ class Inspecting:
         self._left: dict[Path, MarksFile] = {}  # of scenes that were left without saving
         self._path: Path | None = None
         self._warned: MarksFile | None = None  # that somebody wanted to close, and was told
-        self._thermal: tuple[Scene | None, ThermalScene | None] = (None, None)
+        self._measured: tuple[Scene | None, MeasuredScene | None] = (None, None)
 
     # ---- the scene
 
     @property
-    def thermal(self) -> ThermalScene | None:
-        """What is measured; None: the scene has no thermal stop whose range is known."""
+    def measured(self) -> MeasuredScene | None:
+        """What is measured; None: the scene has no value stop whose range is known."""
         state = self._state
-        if self._thermal[0] is not state.scene:
+        if self._measured[0] is not state.scene:
             found = None
             if state.has_legend:
                 try:
-                    found = thermal_scene(self.document)
+                    found = measured_scene(self.document)
                 except UsageError:  # several that do not agree
                     found = None
-            self._thermal = (state.scene, found)
-        return self._thermal[1]
+            self._measured = (state.scene, found)
+        return self._measured[1]
 
     @property
     def document(self) -> Document:
@@ -329,8 +329,8 @@ class Inspecting:
     @property
     def value_range(self) -> tuple[float, float]:
         """Of the stop that is measured."""
-        thermal = self.thermal
-        found = thermal.stop.value_range if thermal is not None else None
+        measured = self.measured
+        found = measured.stop.value_range if measured is not None else None
         return found or ALL_VALUES
 
     def auto(self) -> None:
@@ -345,8 +345,8 @@ class Inspecting:
     @property
     def scale(self) -> ColorScale:
         """As the legend shows it."""
-        assert self.thermal is not None, "asked for where there is a thermal stop"
-        return ColorScale(*self.ends, self.thermal.stop.palette)
+        assert self.measured is not None, "asked for where there is a value stop"
+        return ColorScale(*self.ends, self.measured.stop.palette)
 
     # ---- files
 

@@ -48,7 +48,7 @@ def lay_out(
 ) -> Layout:
     """The parts in a window of `size` (W, H) logical pixels.
 
-    `rows` is the number of sliders; `legend`: the scene has a thermal stop, so that room is kept
+    `rows` is the number of sliders; `legend`: the scene has a value stop, so that room is kept
     for its legend at every x, and `both`: at the left as well.  `panel_open` None: as there is
     room.
     """

@@ -58,6 +58,6 @@ def origin_of(model: Model) -> np.ndarray:
 
 
 def with_palette(model: Model, name: str) -> Model:
-    """The model with another palette on those thermal stops that have one."""
+    """The model with another palette on those value stops that have one."""
     stops = [replace(stop, palette=name) if stop.palette else stop for stop in model.stops]
     return replace(model, stops=tuple(stops))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from shapeshift.app.editor.state.regions import farthest_stop
-from shapeshift.renderer.colors.palette import thermal_weights
+from shapeshift.renderer.colors.palette import value_weights
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.control import Shift
@@ -27,7 +27,7 @@ class SplitState:
     def toggle(
         self, obj: SceneObject, over: bool = False, way: Shift | AutoSlide | None = None
     ) -> None:
-        """On for this object, at a thermal stop, else the one farthest from its x; or off.
+        """On for this object, at a value stop, else the one farthest from its x; or off.
 
         over: heat over shape instead of a line; from one of the two to the other nothing goes off.
         way: that its x is on, to where it counts as being.
@@ -37,8 +37,8 @@ class SplitState:
         self.on = not self.on or self.name != obj.name or self.over != over
         self.over = over
         if self.name != obj.name or self.x == obj.slider_x:
-            thermal = [stop.x for stop in obj.model.stops if stop.kind == "thermal"]
-            others = [x for x in thermal if abs(x - obj.slider_x) > ON_STOP]
+            measured = [stop.x for stop in obj.model.stops if stop.is_measured]
+            others = [x for x in measured if abs(x - obj.slider_x) > ON_STOP]
             self.name, self.x = obj.name, (others or [farthest_stop(obj)])[0]
 
     def shows(self, scene: Scene) -> bool:
@@ -63,8 +63,8 @@ class SplitState:
 
 
 def heat_at(obj: SceneObject, x: Control) -> float:
-    """How much of a thermal stop an object shows at x, 0 to 1."""
-    weights, _ = thermal_weights(obj.model.blend, x)
+    """How much of a value stop an object shows at x, 0 to 1."""
+    weights, _ = value_weights(obj.model.blend, x)
     return float(weights[0]) if len(weights) else 0.0
 
 

@@ -19,7 +19,7 @@ from shapeshift.app.headset.in_hand.finger_brush import FingerBrush
 from shapeshift.app.headset.in_hand.held_shapes import HeldShapes
 from shapeshift.app.headset.in_hand.probe import REPORT_PX, before_head
 from shapeshift.app.headset.in_hand.ray_marks import Measure, RayMarks
-from shapeshift.app.inspection.draw_values import ThermalScene
+from shapeshift.app.inspection.draw_values import MeasuredScene
 from shapeshift.app.inspection.inspect_view import InspectedView
 from shapeshift.app.paths import WorkFolders, config_folder
 from shapeshift.runtime_models.files.json_fields import control_row
@@ -31,7 +31,7 @@ from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.panel.carried import Carried
 
-Inspect = Callable[[Document, ThermalScene, View], InspectedView]
+Inspect = Callable[[Document, MeasuredScene, View], InspectedView]
 AHEAD_M, BELOW_M = 0.45, 0.2  # of the room, from the head: where a section is brought to
 DECIMALS = 6
 
@@ -86,13 +86,13 @@ class HandTools:
 
     def _report(self, view: View) -> None:
         """One HTML file of a view with all its marks; the session waits for it."""
-        tool, thermal = self.inspecting, self.inspecting.thermal
-        if thermal is None or self.inspect is None:
+        tool, measured = self.inspecting, self.inspecting.measured
+        if measured is None or self.inspect is None:
             return
         folder, title = self.folder or WorkFolders.of().exports, self.editor.title
         try:
-            inspected = self.inspect(tool.document, thermal, view)
-            path = write_view_report(tool, thermal, title, inspected, folder)
+            inspected = self.inspect(tool.document, measured, view)
+            path = write_view_report(tool, measured, title, inspected, folder)
         except (BadFile, ValueError, OSError) as error:
             tool.fail(said("No report was written: {error}", error=error))
             return

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.app.document import DARK, Document
-from shapeshift.app.inspection.draw_values import ThermalScene, depth_picture, draw_values
+from shapeshift.app.inspection.draw_values import MeasuredScene, depth_picture, draw_values
 from shapeshift.app.inspection.inspect_view import InspectedView, first_photo, inspect_view
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
@@ -32,7 +32,7 @@ class Probe:
     eyes: Renderer | None = None
     _renderer: Renderer | None = None
 
-    def inspect(self, document: Document, thermal: ThermalScene, view: View) -> InspectedView:
+    def inspect(self, document: Document, measured: MeasuredScene, view: View) -> InspectedView:
         """A view for a report: values, and the first stop that is not thermal beside them.  Raises
         BadFile where there is no room for it.
         """
@@ -40,7 +40,7 @@ class Probe:
         before = renderer.settings
         try:
             renderer.settings = RenderSettings(background=document.background_or(DARK))
-            return inspect_view(renderer, document, thermal, first_photo(document, thermal), view)
+            return inspect_view(renderer, document, measured, first_photo(document, measured), view)
         finally:
             renderer.settings = before
             if bound is not None:
@@ -52,15 +52,15 @@ class Probe:
             self._renderer = Renderer(self.ctx, drawing)
         return self._renderer
 
-    def measure(self, thermal: ThermalScene | None, scene: Scene, view: View) -> ValuePicture:
+    def measure(self, measured: MeasuredScene | None, scene: Scene, view: View) -> ValuePicture:
         """Values and depths, or depths alone where nothing is thermal.  Raises BadFile where there
         is no room for it.
         """
         renderer, bound = self._opened(), self.ctx.fbo
         try:
-            if thermal is None:
+            if measured is None:
                 return depth_picture(renderer, scene, view)
-            return draw_values(renderer, thermal, view)
+            return draw_values(renderer, measured, view)
         finally:
             if bound is not None:
                 bound.use()

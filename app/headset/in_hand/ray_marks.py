@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.in_hand.probe import along_ray, before_head, middle_of
-from shapeshift.app.inspection.draw_values import ThermalScene
+from shapeshift.app.inspection.draw_values import MeasuredScene
 from shapeshift.app.inspection.mark_texts import free_name
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.contours import contour_lines
@@ -26,7 +26,7 @@ POINTS_EVERY_S, SEES_EVERY_S = 0.15, 0.5  # so often the ray, and what the head 
 NEAR_DEG, NEAR_M = 1.5, 0.01  # so near to the ray a mark is meant; metres of the room
 BEHIND = 0.05  # of the ray's length: a mark so far behind what it meets is hidden
 SPOTS, LENGTHS = "spots", "lengths"  # what a pull of the trigger begins
-Measure = Callable[[ThermalScene | None, Scene, View], ValuePicture]
+Measure = Callable[[MeasuredScene | None, Scene, View], ValuePicture]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class RayMarks:
             self._end()
         elif self.under:
             self.tool.chosen = self.under
-        elif self.pointed is not None and self.tool.thermal is not None:
+        elif self.pointed is not None and self.tool.measured is not None:
             width, height = self.pointed.picture.view.size
             self.tool.lay("spot", (width / 2, height / 2), (0, 0), self.pointed.picture)
 
@@ -111,21 +111,21 @@ class RayMarks:
         if self.measure is None:
             return
         self._pointed_s = now_s
-        picture = self.measure(self.tool.thermal, scene, along_ray(aim, play_space))
+        picture = self.measure(self.tool.measured, scene, along_ray(aim, play_space))
         picture = self.tool.corrected(picture)
         self.pointed = Pointed(*middle_of(picture), picture)
 
     def _see(self, frame: Frame, play_space: PlaySpace, scene: Scene) -> None:
         """What marks read and where isotherms lie, as the head has it before it."""
-        tool, thermal = self.tool, self.tool.thermal
-        if thermal is None or self.measure is None:
+        tool, measured = self.tool, self.tool.measured
+        if measured is None or self.measure is None:
             return
         due = frame.seen_s - self._saw_s >= SEES_EVERY_S or frame.seen_s < self._saw_s
         due |= tool.file.marks is not self._marks
         asks = bool(tool.file.marks or tool.file.isotherms) or self.wants_auto
         if asks and due:
             self._saw_s, self._marks = frame.seen_s, tool.file.marks
-            tool.saw(self.measure(thermal, scene, before_head(frame.head, play_space)))
+            tool.saw(self.measure(measured, scene, before_head(frame.head, play_space)))
         if self.wants_auto and tool.picture is not None:
             self.wants_auto = False
             tool.auto()

@@ -154,7 +154,7 @@ def _pointed(tools: HandTools, frame: Frame, carried: Carried) -> Card | None:
     metres = pointed.metres * tools.inspecting.file.metres_per_unit
     far = f"{metres:.2f} m" if np.isfinite(metres) else "--"
     texts = [far]
-    if tools.inspecting.thermal is not None:
+    if tools.inspecting.measured is not None:
         texts.insert(0, words_of(pointed.value, pointed.picture, tools.unit))
     right = frame.head.matrix()[:3, 0] * (1.0 if carried.pointer == SIDES[1] else -1.0)
     place = hand.aim.position + ASIDE_M * right + np.array([0.0, ABOVE_M, 0.0])

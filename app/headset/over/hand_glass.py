@@ -8,7 +8,7 @@ import moderngl
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.over.glass_state import seen_through
 from shapeshift.app.headset.xr_user import XrState
-from shapeshift.renderer.colors.palette import thermal_blend
+from shapeshift.renderer.colors.palette import value_blend
 from shapeshift.renderer.colors.two_looks import same_shape
 from shapeshift.renderer.gl.gpu import release_framebuffer
 from shapeshift.renderer.renderer import Renderer
@@ -79,7 +79,7 @@ class HandGlass:
         if glass.held is None:
             return over
         _, moved = self._scenes(state)
-        palette, _, stop = thermal_blend(moved)
+        palette, _, stop = value_blend(moved)
         scale = GlassScale.of(stop, palette, self._renderer.settings.heat_ends)
         cards = (*over.cards, *cards_of(glass.held, self._side, glass.stop, scale))
         return replace(over, hands=(*over.hands, *frame_of(glass.held)), cards=cards)

@@ -21,7 +21,7 @@ Vec = imgui.ImVec2
 SIZES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
 SURE_S = 4.0  # Exit asks once more for so long
 QUALITY_NAMES = {"auto": "Auto", "best": "Best", "balanced": "Balanced", "fast": "Fast"}
-SCALE_TALL = 124.0  # units of the overlay, of the scale of a thermal stop
+SCALE_TALL = 124.0  # units of the overlay, of the scale of a value stop
 SCALE_WIDE = 100.0
 HOW = (
     "The menu button, or the palm turned up, opens and closes the panel. The stick of the hand "
@@ -113,7 +113,7 @@ def draw_help() -> None:
 
 
 def draw_scale(state: EditorState, ui_scale: float) -> None:
-    """The palette of the thermal stop with its values."""
+    """The palette of the value stop with its values."""
     corner = imgui.get_cursor_screen_pos()
     box = (corner.x, corner.y, corner.x + SCALE_WIDE * ui_scale, corner.y + SCALE_TALL * ui_scale)
     ends = state.settings.heat_ends if state.settings.heat_ends != ALL_VALUES else None

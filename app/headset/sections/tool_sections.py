@@ -71,7 +71,7 @@ def _draw_regions(tools: HandTools, save: Callable[[], None], scale: float) -> N
 def _draw_inspect(tools: HandTools, scale: float) -> None:
     tool, marks = tools.inspecting, tools.marks
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
-    if tool.thermal is None:
+    if tool.measured is None:
         marks.pulls = LENGTHS
         changed, on = imgui.checkbox(item_label("measure lengths"), tool.on)
         if changed:
@@ -83,7 +83,7 @@ def _draw_inspect(tools: HandTools, scale: float) -> None:
         draw_inspect(tool, actions, tools.unit, scale)
         _ends(tools)
     if tool.on:
-        if tool.thermal is not None:
+        if tool.measured is not None:
             width = (room - gap) / 2
             if lit_button(item_label("spots"), marks.pulls == SPOTS, width):
                 marks.pulls, marks.first = SPOTS, None
@@ -105,13 +105,17 @@ def _toggle(tools: HandTools) -> Callable[[], None]:
 def _ends(tools: HandTools) -> None:
     """Level and span: the values that the ends of the palette stand for."""
     tool = tools.inspecting
-    assert tool.thermal is not None  # asked for where there is heat
-    own, wanted = tool.thermal.stop.unit, tools.unit
+    assert tool.measured is not None  # asked for where there is heat
+    own, wanted = tool.measured.stop.unit, tools.unit
     unit, low, high = in_unit(own, *tool.value_range, wanted)
     _, first, last = in_unit(own, *tool.ends, wanted)
     sign = f" {unit.replace('%', '%%')}".rstrip()
-    moved, first = labelled_slider("coldest", first, low, high, said("coldest: %.1f") + sign)
-    also, last = labelled_slider("hottest", last, low, high, said("hottest: %.1f") + sign)
+    words = said("coldest: %.1f"), said("hottest: %.1f")
+    if tool.measured.stop.kind == "values":
+        number = f": %.{tool.measured.stop.digits}f"
+        words = said("lowest") + number, said("highest") + number
+    moved, first = labelled_slider("coldest", first, low, high, words[0] + sign)
+    also, last = labelled_slider("hottest", last, low, high, words[1] + sign)
     if moved or also:
         back = in_unit(unit, first, last, own)[1:] if unit != own else (first, last)
         tool.ends = back

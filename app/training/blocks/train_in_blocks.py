@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.errors import UsageError, as_typed
+from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
@@ -53,6 +54,7 @@ def train_blocks(
     check_writable(options.out)
     refuse_foreign_folder(options.out)
     capture = open_capture(options.capture, options.memory)
+    print_files(capture.files)
     if wanted.count is None and wanted.grid is None:
         refuse_one(options, capture, said)
     work = work_folder(options.out)

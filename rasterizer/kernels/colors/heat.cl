@@ -1,6 +1,6 @@
-// heat: what thermal stops have in the colours of splats, kept apart from the colours of the others
+// heat: what value stops have in the colours of splats, kept apart from the colours of the others
 // until a palette is laid over the picture, or made colours of at once.
-// Reads:   color (N, 4), of a thermal stop as decoded: its values are their luminance; a palette of
+// Reads:   color (N, 4), of a value stop as decoded: its values are their luminance; a palette of
 //          256 colours, or NULL; weights, one for each `per_weight` splats side by side.
 // Writes:  heat (N, 4): sum of weight * (value, 0, 0, 1), with a palette of weight * (palette's,
 //          1); blend_heat also color.

@@ -1,6 +1,6 @@
-// heat: what thermal stops have in the colours of splats, kept apart from the colours of the others
+// heat: what value stops have in the colours of splats, kept apart from the colours of the others
 // until a palette is laid over the picture, or made colours of at once.
-// Needs:   BLEND = 0: color (a thermal stop's, as decoded) -> heat; 1: heat -> color of other
+// Needs:   BLEND = 0: color (a value stop's, as decoded) -> heat; 1: heat -> color of other
 //          stops.
 // Reads:   color, palette, weights, or heat.
 // Writes:  heat: sum of weight * (value, 0, 0, 1), value 0..1; with a palette of weight * (its

@@ -178,13 +178,17 @@ def read_spz_view(asset: Asset, view: int, turned: bool, reading: Reading) -> Ra
     up, back; glTF is left, up, front).  Drafts, which name no colour space, are as stored.
     """
     from shapeshift.runtime_models.splats.spz.read_spz import read_spz_bytes
+    from shapeshift.runtime_models.splats.spz.spz_axes import FORMAT_AXES
 
     data, _ = asset.view(view)
     with asset.memory.lend(len(data), "its bytes of spz"):
-        raw = read_spz_bytes(data.tobytes(), asset.path.name, reading)
+        raw = read_spz_bytes(data.tobytes(), asset.path.name, reading, FORMAT_AXES)
     matrix = np.eye(4)
-    matrix[:3, :3] = (HALF_TURN_Y if turned else np.eye(3)) @ ours_from_file(raw.up)
-    metres = replace(raw, scales=np.exp(raw.scales), log_scales=False, up="+Y")
+    upright = ours_from_file(raw.up, front=raw.front)
+    matrix[:3, :3] = (HALF_TURN_Y if turned else np.eye(3)) @ upright
+    metres = replace(
+        raw, scales=np.exp(raw.scales), log_scales=False, up="+Y", front=False, axes=""
+    )
     return replace(moved(metres, matrix), format=f"{NAME} with {raw.format}")
 
 

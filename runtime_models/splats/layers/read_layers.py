@@ -69,6 +69,8 @@ def join_layers(
     counts, last = [len(part.means) for part in parts], len(parts) - 1
     kinds = sorted({part.format for part in parts})
     provenance: dict[str, object] = {"format": " + ".join(kinds), "files": list(files)}
+    if axes := sorted({part.axes for part in parts if part.axes}):
+        provenance["axes"] = " / ".join(axes)
     if dropped := sum(part.dropped for part in parts):
         provenance["dropped_rows"] = dropped
     origin, antialiased = parts[0].origin, any(part.antialiased for part in parts)

@@ -25,10 +25,13 @@ from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
 from shapeshift.runtime_models.splats.sog.read_streamed import finest_within
 from shapeshift.runtime_models.splats.sog.sog_files import EXPORT_AGAIN, LARGEST_META, file_inside
 from shapeshift.runtime_models.splats.spz.read_spz import read_raw_spz
+from shapeshift.runtime_models.splats.spz.spz_axes import FORMAT_AXES
 from shapeshift.runtime_models.splats.spz.spz_file import count_in
 
 ENDING = ".lcc2"
-SPZ_UP = "-Z"  # an spz says y up, z back of what is x, z, -y here: half a turn about x from LCC's
+# An spz says y up, z back of what is x, z, -y here: half a turn about x from LCC's; one that says
+# y down, z forward has LCC's own.
+SPZ_UPS = {"+Y": "-Z", "-Y": "+Z"}
 LOOSE = re.compile(r'"(?:\\.|[^"\\])*"|,(?=\s*[}\]])')  # texts; commas before a closing bracket
 
 
@@ -64,8 +67,9 @@ def read_lcc2(path: Path, reading: Reading) -> SplatLayers:
 def read_chunk(path: Path, reading: Reading) -> RawSplats:
     """One file of a level, in LCC's axes."""
     if path.suffix.lower() == ".spz":
-        raw = read_raw_spz(path, reading)
-        return replace(raw, up=SPZ_UP if raw.up == "+Y" else raw.up, format=f"LCC2 of {raw.format}")
+        raw = read_raw_spz(path, reading, FORMAT_AXES)
+        up = SPZ_UPS.get(raw.up, raw.up)
+        return replace(raw, up=up, axes="", format=f"LCC2 of {raw.format}")
     raw = read_raw_sog(path, reading)
     return replace(raw, up=UP, format=f"LCC2 of {raw.format}")
 

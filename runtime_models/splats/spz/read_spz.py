@@ -6,9 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK
-from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.model import Finding
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
 from shapeshift.runtime_models.splats.ply.read_compressed_ply import from_smallest_three
+from shapeshift.runtime_models.splats.spz.spz_axes import (
+    AXES_EXTENSION,
+    Axes,
+    axes_of,
+    axes_said,
+    put_axes,
+)
 from shapeshift.runtime_models.splats.spz.spz_file import (
     ANTIALIASED,
     REST,
@@ -18,11 +25,6 @@ from shapeshift.runtime_models.splats.spz.spz_file import (
 )
 
 COLOR_SCALE = 0.15  # of the first coefficient: code / 255 = 0.5 + 0.15 f
-AXES_EXTENSION = 0xADBE0003  # Adobe's: which axes the places are in
-NAMED_AXES = (
-    "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF",
-    "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU",
-)  # fmt: skip
 SMALL = np.float32(0.5**0.5 / 511)  # of a code of the smallest three
 
 
@@ -31,15 +33,20 @@ def has_spz_mark(head: bytes, path: Path) -> bool:
     return is_spz(head)
 
 
-def read_raw_spz(path: Path, reading: Reading) -> RawSplats:
-    """Splats of SH degree 0 to 3.  Raises BadFile."""
+def read_raw_spz(path: Path, reading: Reading, axes: str = "") -> RawSplats:
+    """Splats of SH degree 0 to 3.  Raises BadFile.
+
+    axes: what they are in where no extension says otherwise; "" where nobody tells (spz_axes.py).
+    """
     reading = reading.within(path)
     with reading.account.lend(path.stat().st_size, "its bytes"):
-        return read_spz_bytes(path.read_bytes(), path.name, reading)
+        return read_spz_bytes(path.read_bytes(), path.name, reading, axes, path)
 
 
-def read_spz_bytes(data: bytes, file: str, reading: Reading) -> RawSplats:
-    """The same of a file in memory; x right, y up, z back, if no extension says otherwise."""
+def read_spz_bytes(
+    data: bytes, file: str, reading: Reading, axes: str = "", path: Path | None = None
+) -> RawSplats:
+    """The same of a file in memory; path: where it lies, where cameras may lie beside it."""
     memory = reading.within(Path(file), len(data)).account
     spz = unpack_spz(data, file, memory)
     header = spz.header
@@ -60,13 +67,21 @@ def read_spz_bytes(data: bytes, file: str, reading: Reading) -> RawSplats:
             rows = slice(first, min(first + BLOCK, count))
             stream = spz.read(width * (rows.stop - first))
             decode(rows, np.frombuffer(stream, np.uint8).reshape(-1, width))
-    findings: list[Finding] = []
-    raw.up = axis_up(spz.extensions(), file, findings)
+    extensions, findings = spz.extensions(), []
+    others = [f"{kind:#010x}" for kind in extensions if kind != AXES_EXTENSION]
+    if others:
+        what = f"extensions {', '.join(others)}"
+        findings.append(Finding(what, 0, "not looked at", file=file, repaired=False))
     if kept < there:
         what = f"{there - kept} coefficients of SH degree 4 a splat"
         done = "left out, degree 3 is drawn"
         findings.append(Finding(what, 0, done, file=file, repaired=False))
     raw.findings = tuple(findings)
+    if axes and not axes_said(extensions):
+        found = Axes(axes, "as what it lies in says", True)
+    else:
+        found = axes_of(raw, header.version, extensions, path)
+    put_axes(raw, found, bool(reading.up))
     return raw
 
 
@@ -130,33 +145,3 @@ def unpack_smallest_three(codes: np.ndarray, out: np.ndarray) -> None:
     xyzw = np.empty_like(out)
     from_smallest_three(small, words >> 30, xyzw)
     out[:] = xyzw[:, (3, 0, 1, 2)]
-
-
-def axis_up(extensions: dict[int, bytes], file: str, findings: list[Finding]) -> str:
-    """The file's axis that points up.  Raises BadFile for axes that are a mirror image."""
-    content = extensions.get(AXES_EXTENSION, b"")
-    others = [kind for kind in extensions if kind != AXES_EXTENSION]
-    if others:
-        what = f"extensions {', '.join(f'{kind:#010x}' for kind in others)}"
-        findings.append(Finding(what, 0, "not looked at", file=file, repaired=False))
-    number = int.from_bytes(content, "little") if len(content) == 4 else 0
-    if not 1 <= number <= len(NAMED_AXES):
-        return "+Y"
-    axes = NAMED_AXES[number - 1]
-    if not right_handed(axes):
-        raise BadFile(
-            f"{file} has the axes {axes}, a mirror image of ours; write it again with "
-            "RUB, the format's own."
-        )
-    place = next(i for i, letter in enumerate(axes) if letter in "UD")
-    return ("+" if axes[place] == "U" else "-") + "XYZ"[place]
-
-
-def right_handed(axes: str) -> bool:
-    """Whether axes such as RUB (right, up, back) are a right-handed frame."""
-    directions = {"R": (0, 1), "L": (0, -1), "U": (1, 1), "D": (1, -1), "B": (2, 1), "F": (2, -1)}
-    frame = np.zeros((3, 3))
-    for row, letter in enumerate(axes):
-        column, sign = directions[letter]
-        frame[row, column] = sign
-    return np.linalg.det(frame) > 0

@@ -8,10 +8,17 @@ import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.splats.operations.rotate_splats import (
+    HALF_TURN,
+    rotator,
+    signs_of_harmonics,
+)
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.spz.read_spz import COLOR_SCALE
+from shapeshift.runtime_models.splats.spz.spz_axes import FORMAT_AXES, PLY_AXES, axes_extension
 from shapeshift.runtime_models.splats.spz.spz_file import (
     ANTIALIASED,
+    EXTENSIONS,
     HEADER,
     LEGACY_HEADER,
     MAGIC,
@@ -23,10 +30,15 @@ FINEST_BITS = 16  # of a metre, 15 micrometres: finer ones only make the file la
 LARGEST_CODE = (1 << 23) - 1  # of a place
 LEVEL = 12  # of zstd, as the format's own writer
 VERSIONS = (2, 3, 4)
+AXES = {"ply": PLY_AXES, "rub": FORMAT_AXES}  # that can be written, by an option's name
 
 
-def write_spz(splats: PlainSplats, path: str | Path, version: int = 3) -> None:
-    """Atomic; our axes are the format's.  Raises ValueError where the places do not fit.
+def write_spz(splats: PlainSplats, path: str | Path, version: int = 3, axes: str = "ply") -> None:
+    """Atomic.  Raises ValueError where the places do not fit.
+
+    axes: "ply", x right, y down, z forward, as most of today's programs write and read them, or
+    "rub", x right, y up, z back, as the format's text says.  The file says which, by an extension
+    that programs without it pass over (docs/formats.md: who reads what).
 
     Half a code's step is lost: 2**-17 m in place (more in scenes wider than 256 m), 1/32 in the
     logarithm of a scale (4.5e-5 m to 379 m; those beyond are held there), 1/510 in opacity, 1/76
@@ -35,19 +47,36 @@ def write_spz(splats: PlainSplats, path: str | Path, version: int = 3) -> None:
     """
     if version not in VERSIONS:
         raise ValueError(f".spz version {version} was asked for; {VERSIONS} are written.")
+    if axes not in AXES:
+        raise ValueError(f".spz axes {axes!r} were asked for; {', '.join(AXES)} are written.")
     degree = REST.index(splats.sh.shape[1] - 1)
     count, bits = len(splats.means), fractional_bits(splats, path)
-    flags = ANTIALIASED if splats.antialiased else 0
+    flags = EXTENSIONS | (ANTIALIASED if splats.antialiased else 0)
     head = (MAGIC, version, count, degree, bits, flags)
+    turn = HALF_TURN if axes == "ply" else np.eye(3)
     streams: list[Iterable[bytes]] = [
-        blocks_of(rows_of, count) for rows_of in streams_of(splats, bits, version)
+        blocks_of(rows_of, count) for rows_of in streams_of(splats, bits, version, turn)
     ]
-    write_whole(Path(path), (deflated if version < 4 else compressed)(head, streams))
+    contain = deflated if version < 4 else compressed
+    write_whole(Path(path), contain(head, streams, axes_extension(AXES[axes])))
 
 
-def streams_of(splats: PlainSplats, bits: int, version: int) -> list[Callable[[slice], np.ndarray]]:
-    """The codes of some rows, for each of the streams."""
-    rotations = pack_smallest_three if version >= 3 else pack_first_three
+def streams_of(
+    splats: PlainSplats, bits: int, version: int, turn: np.ndarray
+) -> list[Callable[[slice], np.ndarray]]:
+    """The codes of some rows, for each of the streams, after a half turn (3, 3), or none."""
+    pack_rotations = pack_smallest_three if version >= 3 else pack_first_three
+    signs, origin = turn.diagonal(), np.array(splats.origin)
+    of_harmonics = signs_of_harmonics(signs, splats.sh.shape[1])[1:, None]
+    rotate_rows, no_places = rotator(turn, 1), np.empty((0, 3), np.float32)
+
+    def places(rows: slice) -> np.ndarray:
+        return pack_places((splats.means[rows].astype(np.float64) + origin) * signs, bits)
+
+    def rotations(rows: slice) -> np.ndarray:
+        wxyz = splats.wxyz[rows].copy()
+        rotate_rows(no_places, wxyz, splats.sh[:0, :1])
+        return pack_rotations(wxyz)
 
     def scales(rows: slice) -> np.ndarray:
         with np.errstate(divide="ignore"):  # a scale of 0 has the smallest code
@@ -57,12 +86,12 @@ def streams_of(splats: PlainSplats, bits: int, version: int) -> list[Callable[[s
         return as_bytes((splats.sh[rows, 0] * np.float32(COLOR_SCALE) + np.float32(0.5)) * 255)
 
     return [
-        lambda rows: pack_places(splats.means[rows].astype(np.float64) + splats.origin, bits),
+        places,
         lambda rows: as_bytes(splats.opacity[rows] * 255),
         colors,
         scales,
-        lambda rows: rotations(splats.wxyz[rows]),
-        lambda rows: as_bytes(splats.sh[rows, 1:] * 128 + 128),
+        rotations,
+        lambda rows: as_bytes(splats.sh[rows, 1:] * of_harmonics * 128 + 128),
     ]
 
 
@@ -72,16 +101,17 @@ def blocks_of(rows_of: Callable[[slice], np.ndarray], count: int) -> Iterator[by
         yield rows_of(slice(first, first + BLOCK)).tobytes()
 
 
-def deflated(head: tuple, streams: list[Iterable[bytes]]) -> Iterator[bytes]:
+def deflated(head: tuple, streams: list[Iterable[bytes]], extensions: bytes) -> Iterator[bytes]:
     """The container of versions 2 and 3: one gzip stream of it all, never whole in memory."""
     packer = zlib.compressobj(6, zlib.DEFLATED, 31)
     yield packer.compress(LEGACY_HEADER.pack(*head, 0))
     for stream in streams:
         yield from map(packer.compress, stream)
+    yield packer.compress(extensions)
     yield packer.flush()
 
 
-def compressed(head: tuple, streams: list[Iterable[bytes]]) -> Iterator[bytes]:
+def compressed(head: tuple, streams: list[Iterable[bytes]], extensions: bytes) -> Iterator[bytes]:
     """The container of version 4.  Its table of sizes stands first, so all that is compressed is
     in memory, and one stream as it was: zstd packs a little worse piece by piece.
     """
@@ -95,7 +125,8 @@ def compressed(head: tuple, streams: list[Iterable[bytes]]) -> Iterator[bytes]:
         if whole:
             packed.append(zstandard.ZstdCompressor(level=LEVEL).compress(whole))
             rows.append(TABLE_ROW.pack(len(packed[-1]), len(whole)))
-    yield b"".join([HEADER.pack(*head, len(rows), HEADER.size), *rows])
+    table = HEADER.size + len(extensions)
+    yield b"".join([HEADER.pack(*head, len(rows), table), extensions, *rows])
     yield from packed
 
 

@@ -30,6 +30,8 @@ def lens_of(entry: Mapping, path: Path, where: str) -> ColmapCamera:
 
     Of a panorama one whose focal lengths are pixels a radian.  Raises BadFile.
     """
+    if isinstance(lens := entry.get("lens"), ColmapCamera):  # of another program; JSON has none
+        return lens
     fields = Fields(entry, where)
     for key in NUMBERS:
         fields.number(key, 0.0, low=-LARGEST_NUMBER, high=LARGEST_NUMBER)

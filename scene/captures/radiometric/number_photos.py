@@ -6,6 +6,7 @@ temperatures of them by Planck's law.  flyr (EUPL 1.2, an optional extra) knows 
 behind the gate, flir_run.py.
 """
 
+import math
 import re
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,6 +20,7 @@ from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.radiometric.dji_photo import ADVICE, converter, dji_celsius, is_dji
+from shapeshift.scene.captures.radiometric.no_value import resized_numbers
 
 GRIDS = (".npy", ".csv")
 JPEGS = (".jpg", ".jpeg", ".jfif")
@@ -27,6 +29,10 @@ NUMBER = 12  # bytes of memory a number of a grid
 RAW = 40  # the same of a radiometric JPEG
 TEXT = 40  # bytes of memory a letter of a CSV file, while it is split
 MOST_BYTES = 1 << 26  # of a CSV or a radiometric JPEG
+# Words that programs write into a cell where nothing was measured, in small letters.
+NO_NUMBER = frozenset(
+    ("", "-", "--", "---", "nan", "na", "n/a", "#n/a", "#na", "null", "none", "nodata", "no data")
+)
 HEAD_LINES = 20  # of words that programs write before a grid
 FLIR = re.compile(rb"\xff\xe1..FLIR\x00", re.DOTALL)  # where such a segment begins
 LOOKED_AT = 1 << 16  # bytes of a JPEG: the first segment begins before
@@ -62,38 +68,61 @@ def _npy(path: Path) -> np.ndarray:
 
 def _csv(path: Path) -> np.ndarray:
     """Lines of numbers between commas, semicolons or tabs; with semicolons or tabs a comma is a
-    decimal point.  Lines of words before them are left out.
+    decimal point.  Lines of words before them are left out.  Cells without a number are NaN.
     """
     where, size = path_end(path), path.stat().st_size
     if not 0 < size <= MOST_BYTES:
         raise BadFile(f"{where}: {size:,} bytes; a grid of numbers has 1 to {MOST_BYTES:,}")
     Memory().of(path).charge(TEXT * size, f"{size:,} letters")
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
-    lines = [line.rstrip(",; \t\r") for line in text.splitlines()]
     rows: list[np.ndarray] = []
-    for number, line in enumerate(lines):
-        if not line.strip():
+    lines: list[int] = []
+    used: list[int] = []  # cells of each row up to the last one that is not blank
+    words = False
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip(" \r"):
             continue
-        row = _row(line)
-        if row is None and not rows and number < HEAD_LINES:
+        row, filled = _row(line)
+        if row is None and not any(used) and number <= HEAD_LINES:
+            rows, lines, used, words = [], [], [], True
             continue
-        if row is None or (rows and len(row) != len(rows[0])):
-            wanted = f"{len(rows[0])} numbers" if rows else "numbers between commas"
-            raise BadFile(f"{where}: line {number + 1} is not {wanted}; save the grid again")
-        rows.append(row)
-    if len(rows) < 2 or len(rows[0]) < 2:
+        if row is None:
+            raise BadFile(f"{where}: line {number} is not numbers between commas; save it again")
+        if filled or not words or any(used):  # blanks between words and numbers are no row
+            rows.append(row)
+            lines.append(number)
+            used.append(filled)
+    width = _width([len(row) for row in rows], used)
+    for row, number in zip(rows, lines, strict=True):
+        if len(row) < width:
+            raise BadFile(f"{where}: line {number} is not {width} numbers; save the grid again")
+    if len(rows) < 2 or width < 2:
         raise BadFile(f"{where}: no grid of numbers; lines of numbers with commas are wanted")
-    return np.stack(rows)
+    return np.stack([row[:width] for row in rows])
 
 
-def _row(line: str) -> np.ndarray | None:
-    """The numbers of a line; None: there are others than numbers."""
+def _width(cells: list[int], used: list[int]) -> int:
+    """Columns of a grid whose rows have so many cells, the last ones perhaps blank.
+
+    One blank column at the end is what programs leave that write a comma after every number; more
+    of them, in all rows alike, are pixels without a value.
+    """
+    widest = max(used, default=0)
+    return cells[0] if len(set(cells)) == 1 and cells[0] > widest + 1 else widest
+
+
+def _row(line: str) -> tuple[np.ndarray | None, int]:
+    """The numbers of a line, NaN where a cell has none, and how many cells there are up to the last
+    that is not blank; None: there are other words.
+    """
     between = next((sign for sign in ";\t" if sign in line), ",")
     line = line.replace(",", ".") if between != "," else line
+    cells = [cell.strip() for cell in line.split(between)]
+    filled = max((i for i, cell in enumerate(cells, 1) if cell), default=0)
     try:
-        return np.array([float(word) if word.strip() else np.nan for word in line.split(between)])
+        return np.array([math.nan if c.lower() in NO_NUMBER else float(c) for c in cells]), filled
     except ValueError:
-        return None
+        return None, filled
 
 
 def is_radiometric(path: Path) -> bool:
@@ -132,10 +161,7 @@ def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
             f"{path_end(path)}: {width}x{height} numbers in a picture of {size[0]}x{size[1]}; both "
             "must show the same field of view"
         )
-    picture = Image.fromarray(celsius)
-    if picture.size != size:
-        picture = picture.resize(size, Image.Resampling.BILINEAR)
-    return np.asarray(picture, np.float32)
+    return celsius if (width, height) == size else resized_numbers(celsius, size)
 
 
 def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:

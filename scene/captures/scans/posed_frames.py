@@ -1,6 +1,7 @@
 """What readers of scans and data sets hand on: frames in the words of transforms.json."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,11 @@ class PosedFrames:
     where: str  # the file or folder that has the poses, for messages
     frames: list[dict]
     doubts: tuple[str, ...] = ()  # what a person should know, a sentence each
+    left: Mapping[str, Sequence[str]] = field(default_factory=dict)  # why -> photos; doubts say it
+    alone: bool = True  # no other captures have photos in the same folders
+    points: np.ndarray | None = None  # (P, 3) float64, the file's world
+    colors: np.ndarray | None = None  # (P, 3) 0..1
+    program: str = ""  # whose file it is, where not a data set's
 
 
 def table_of(path: Path, *shapes: tuple[int, ...]) -> np.ndarray:
@@ -50,9 +56,3 @@ def photos_in(folder: Path) -> list[Path]:
     """Pictures of a folder, by number where their names are numbers, else by name."""
     found = [p for p in folder.iterdir() if p.suffix.lower() in {".jpg", ".jpeg", ".png"}]
     return sorted(found, key=lambda p: (int(p.stem) if p.stem.isdecimal() else -1, p.name))
-
-
-def left_out(count: int, of: int, example: str) -> tuple[str, ...]:
-    if not count:
-        return ()
-    return (f"{count} of {of} frames have no pose, for example {example}; they are left out.",)

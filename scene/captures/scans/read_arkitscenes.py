@@ -8,7 +8,6 @@ from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.scans.posed_frames import (
     PosedFrames,
-    left_out,
     opengl_pose,
     photos_in,
     table_of,
@@ -33,9 +32,8 @@ def arkitscenes_frames(path: Path) -> PosedFrames:
     Raises BadFile.
     """
     place, (times, poses) = path.parent, trajectory(path)
-    frames, without = [], []
-    photos = photos_in(place / "lowres_wide")
-    for photo in photos:
+    frames = []
+    for photo in photos_in(place / "lowres_wide"):
         video, _, moment = photo.stem.rpartition("_")
         try:
             seconds = float(moment)
@@ -43,7 +41,6 @@ def arkitscenes_frames(path: Path) -> PosedFrames:
             raise BadFile(f"{photo}: photos are called VIDEO_SECONDS.png") from None
         nearest = int(np.abs(times - seconds).argmin())
         if not abs(times[nearest] - seconds) < SAME_MOMENT:
-            without.append(photo.name)
             continue
         names = [f"{video}_{seconds + aside:.3f}.pincam" for aside in SAME_LENS]
         lenses = [place / "lowres_wide_intrinsics" / name for name in names]
@@ -55,8 +52,7 @@ def arkitscenes_frames(path: Path) -> PosedFrames:
         if (place / "lowres_depth" / photo.name).is_file():
             frame["depth_path"] = f"lowres_depth/{photo.name}"
         frames.append(frame)
-    doubts = left_out(len(without), len(photos), without[0] if without else "")
-    return PosedFrames(place, str(path), frames, doubts)
+    return PosedFrames(place, str(path), frames)
 
 
 def trajectory(path: Path) -> tuple[np.ndarray, np.ndarray]:

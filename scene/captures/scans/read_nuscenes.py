@@ -70,7 +70,7 @@ def nuscenes_frames(folder: Path) -> PosedFrames:
             continue
         frames.append(frame_of(row, rig, found_in(poses, row, "ego_pose_token"), root))
     masked = any("mask_path" in frame for frame in frames)
-    return PosedFrames(root, str(tables), frames, () if masked else (MOVING,))
+    return PosedFrames(root, str(tables), frames, () if masked else (MOVING,), alone=False)
 
 
 def chosen_scene(root: Path, asked: str) -> tuple[Path, str]:

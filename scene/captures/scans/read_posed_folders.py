@@ -6,7 +6,6 @@ import numpy as np
 
 from shapeshift.scene.captures.scans.posed_frames import (
     PosedFrames,
-    left_out,
     opengl_pose,
     photos_in,
     table_of,
@@ -25,12 +24,10 @@ def scannet_frames(folder: Path) -> PosedFrames:
     """Camera to world with OpenCV axes, one pinhole, depth in millimetres.  Raises BadFile."""
     k = table_of(folder / "intrinsic" / "intrinsic_color.txt", (4, 4), (3, 3))
     lens = {"fl_x": k[0, 0], "fl_y": k[1, 1], "cx": k[0, 2], "cy": k[1, 2]}
-    frames, without = [], []
-    photos = photos_in(folder / "color")
-    for photo in photos:
+    frames = []
+    for photo in photos_in(folder / "color"):
         pose = table_of(folder / "pose" / f"{photo.stem}.txt", (4, 4))
         if not np.isfinite(pose).all():
-            without.append(photo.name)
             continue
         frame = {"file_path": f"color/{photo.name}", "transform_matrix": opengl_pose(pose)} | lens
         if (folder / "depth" / f"{photo.stem}.png").is_file():
@@ -38,8 +35,7 @@ def scannet_frames(folder: Path) -> PosedFrames:
         if (folder / f"{folder.name}.ply").is_file():
             frame["ply_file_path"] = f"{folder.name}.ply"
         frames.append(frame)
-    doubts = left_out(len(without), len(photos), without[0] if without else "")
-    return PosedFrames(folder, str(folder / "pose"), frames, doubts)
+    return PosedFrames(folder, str(folder / "pose"), frames)
 
 
 def find_posed_splits(folder: Path) -> Path | None:

@@ -56,6 +56,21 @@ def test_every_format(scenes, tmp_path, capsys, writer):
     assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 
+@pytest.mark.parametrize("axes, words", [("ply", "right, down"), ("rub", "right, up")])
+def test_spz_in_either_axes_says_which(scenes, tmp_path, capsys, axes, words):
+    out, wanted = tmp_path / "a.spz", read_plain(scenes / "plain.ply")
+    for version in "234":
+        given = (scenes / "plain.ply", "--out", out, "--overwrite", "--spz-axes", axes)
+        assert export(*given, "--spz-version", version) == 0
+        found = read_plain(out)
+        assert np.abs(found.means - wanted.means).max() < 1e-4 and found.axes.startswith(words)
+        capsys.readouterr()
+        assert cli.main(["info", str(out)]) == 0
+        assert words in capsys.readouterr().out
+    refused(capsys, "are of .spz", scenes / "plain.ply", "--out", tmp_path / "a.ply",
+            "--spz-axes", "rub")  # fmt: skip
+
+
 def test_x_by_number_by_name_and_by_default(scenes, tmp_path):
     for i, words in enumerate([(), ("--x", "0"), ("--x", "RGB"), ("--x", "rgb")]):
         assert export(scenes / "random.shift", "--out", tmp_path / f"{i}.ply", *words) == 0

@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.app.document import Document
 from shapeshift.app.drawing import open_renderer
-from shapeshift.app.inspection.draw_values import draw_values, thermal_scene
+from shapeshift.app.inspection.draw_values import draw_values, measured_scene
 from shapeshift.app.paths import DEMO
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.scene.inspection.marks import read_mark, spot_at
@@ -26,7 +26,7 @@ def measured():
         for view in VIEWS[:6]:
             color, share = photograph(view, radiance("Thermal"))
             celsius = COLD + (HOT - COLD) * color[..., 0].astype(np.float64)
-            values = draw_values(renderer, thermal_scene(document), view)
+            values = draw_values(renderer, measured_scene(document), view)
             found.append((values, celsius, share))
     return found
 

@@ -14,9 +14,9 @@ from shapeshift.app.document import Document
 from shapeshift.app.drawing import open_renderer
 from shapeshift.app.errors import UsageError
 from shapeshift.app.inspection.draw_values import (
-    ThermalChoice,
+    ValueChoice,
     draw_values,
-    thermal_scene,
+    measured_scene,
     value_of_colors,
 )
 from shapeshift.app.inspection.held_out import held_out_error
@@ -63,7 +63,7 @@ def drawn(wall):
     """The wall's values in the first view."""
     document = Document.of(read_model(wall))
     with open_renderer("none", "tiles") as (renderer, _):
-        return draw_values(renderer, thermal_scene(document), wall_view())
+        return draw_values(renderer, measured_scene(document), wall_view())
 
 
 def thermal(*arguments) -> int:
@@ -94,7 +94,7 @@ def test_half_a_coverage_decides_what_is_known(wall):
     for opacity, known in ((0.02, False), (0.99, True)):
         thin = replace(model, opacity=np.full_like(model.opacity, opacity))
         with open_renderer("none", "tiles") as (renderer, _):
-            values = draw_values(renderer, thermal_scene(Document.of(thin)), wall_view())
+            values = draw_values(renderer, measured_scene(Document.of(thin)), wall_view())
         assert values.known[36, 48] == known
         spot = Mark("Sp1", "spot", np.zeros((1, 3)))
         assert read_mark(spot, values).samples == int(known)
@@ -106,7 +106,7 @@ def test_a_mark_reads_the_same_from_another_view(wall, drawn):
     with open_renderer("none", "tiles") as (renderer, _):
         for eye in ((0.5, 0.2, 1.4), (-0.6, 0.3, 1.3), (0.1, -0.5, 1.5)):
             view = wall_view(eye, (192, 144))  # pixels half as wide as where it was laid
-            seen = draw_values(renderer, thermal_scene(document), view)
+            seen = draw_values(renderer, measured_scene(document), view)
             reading = read_mark(spot, seen)
             assert reading.mean == pytest.approx(celsius_at(spot.points[0, 0]), abs=PIXEL_C)
 
@@ -270,11 +270,11 @@ def test_scenes_without_heat_or_range_are_one_sentence():
     plain = make_random_model(20)
     without = replace(plain, stops=(Stop("A", 0.0), Stop("B", 1.0)))
     with pytest.raises(UsageError, match=r"no thermal stop \(it has A, B\)"):
-        thermal_scene(Document.of(without))
+        measured_scene(Document.of(without))
     unknown = replace(plain, stops=(Stop("A", 0.0), Stop("T", 1.0, "thermal", "ironbow")))
     with pytest.raises(UsageError, match="--range LOW HIGH"):
-        thermal_scene(Document.of(unknown))
-    said = thermal_scene(Document.of(unknown), ThermalChoice(value_range=(0, 9), unit="K"))
+        measured_scene(Document.of(unknown))
+    said = measured_scene(Document.of(unknown), ValueChoice(value_range=(0, 9), unit="K"))
     assert (said.stop.value_range, said.stop.unit) == ((0.0, 9.0), "K")
 
 
@@ -329,7 +329,7 @@ def test_the_held_out_error_is_what_the_photos_are_off_by(wall, tmp_path):
     capture = Capture(tmp_path, STOPS, tuple(photos), none, none, (0.0, 0.0, 0.0), {})
     document = Document.of(read_model(wall))
     with open_renderer("none", "tiles") as (renderer, _):
-        thermal_stop = thermal_scene(document)
+        thermal_stop = measured_scene(document)
         error = held_out_error(renderer, thermal_stop, document, capture)
         assert (error.photos, error.mean) == (2, pytest.approx(5, abs=0.3))
         assert error.percentile_95 == pytest.approx(5, abs=1.0)
@@ -343,7 +343,7 @@ def test_what_has_no_heat_hides_heat_and_has_none(wall, drawn):
     ball = SceneObject("ball", one_splat(means=[[0, 0, 0.4]], opacity=[0.99]))
     document = Document(Scene((SceneObject("wall", read_model(wall), x=1.0), ball)))
     with open_renderer("none", "tiles") as (renderer, _):
-        values = draw_values(renderer, thermal_scene(document), wall_view())
+        values = draw_values(renderer, measured_scene(document), wall_view())
     assert not values.known[36, 48] and values.known[36, 20]
     beside = np.s_[15:-15, 15:25]
     assert np.abs(values.values - drawn.values)[beside].max() < 0.2
@@ -356,7 +356,7 @@ def test_objects_that_mean_another_range_are_refused(wall):
     other = replace(model, stops=(STOPS[0], replace(STOPS[1], value_range=(0.0, 50.0))))
     pair = (SceneObject("a", model), SceneObject("b", other))
     with pytest.raises(UsageError, match="different palettes, ranges or units"):
-        thermal_scene(Document(Scene(pair)))
+        measured_scene(Document(Scene(pair)))
 
 
 def test_marks_have_notes_and_photos_that_go_into_reports(wall, tmp_path, capsys):

@@ -12,7 +12,7 @@ from shapeshift.renderer.colors.palette import (
     palette_between,
     palette_colors,
     palette_values,
-    thermal_blend,
+    value_blend,
 )
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
@@ -76,21 +76,21 @@ def test_an_unknown_palette_is_named_with_those_there_are():
 
 @pytest.mark.parametrize(("x", "weight"), [(0.0, 0), (0.1, 0.25), (0.4, 1), (0.7, 0.5), (1.0, 0)])
 def test_weight_is_a_hat_over_the_thermal_stop(x, weight):
-    name, got, stop = thermal_blend(Scene((obj(x),)))
+    name, got, stop = value_blend(Scene((obj(x),)))
     assert got == pytest.approx(weight)
     assert (name, stop) == (("ironbow", STOPS[1]) if weight else ("", None))
 
 
 def test_between_two_thermal_stops_nothing_is_taken_back():
     stops = (Stop("a", 0, "thermal", "gray"), Stop("b", 1, "thermal", "ironbow"))
-    assert thermal_blend(Scene((obj(0.3, stops),))) == ("gray", pytest.approx(1), stops[0])
-    assert thermal_blend(Scene((obj(0.7, stops),)))[::2] == ("ironbow", stops[1])
+    assert value_blend(Scene((obj(0.3, stops),))) == ("gray", pytest.approx(1), stops[0])
+    assert value_blend(Scene((obj(0.7, stops),)))[::2] == ("ironbow", stops[1])
 
 
 def test_the_nearest_visible_object_decides_and_hidden_ones_do_not():
     scene = Scene((obj(0.2), obj(0.4, visible=False), obj(0.3), obj(1.0)))
-    assert thermal_blend(scene)[1] == pytest.approx(0.75)
-    assert thermal_blend(Scene(())) == ("", 0.0, None)
+    assert value_blend(scene)[1] == pytest.approx(0.75)
+    assert value_blend(Scene(())) == ("", 0.0, None)
 
 
 def test_the_palette_colors_what_is_there_and_leaves_coverage_alone():

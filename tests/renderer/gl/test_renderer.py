@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.device import NoDevice
-from shapeshift.renderer.colors.palette import thermal_blend
+from shapeshift.renderer.colors.palette import value_blend
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
@@ -182,7 +182,7 @@ def test_presented_is_what_resolved_says_with_and_without_palette(opened, ctx, d
     images = []
     for x in (0.0, 0.5, 1.0):
         scene = alone(scene.objects[0].model, x=x)
-        assert thermal_blend(scene)[1] == pytest.approx(x)
+        assert value_blend(scene)[1] == pytest.approx(x)
         renderer.update(scene)
         assert "resolve" in renderer.draw([view], [shown]).ms
         images.append(pixels(shown))

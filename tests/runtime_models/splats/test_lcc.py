@@ -117,7 +117,7 @@ def chunks(folder: Path, ending: str) -> dict[str, bytes]:
             file = write_zip(folder / f"{i}.sog", *random_sog(count, seed=i))
         else:
             file = folder / f"{i}.spz"
-            write_spz(some_splats(count, 4), file, version=3)
+            write_spz(some_splats(count, 4), file, 3, ("rub", "ply")[i % 2])  # said in each
         out[f"parts/{i}{ending}"] = file.read_bytes()
     return out
 

@@ -18,7 +18,7 @@ def splats(count: int, degree: int = 0, seed: int = 0, wide: float = 3.0) -> Pla
     """Splats that fill the codes: colours to their ends, scales from 5e-5 m to 300 m."""
     rng = np.random.default_rng(seed)
     wxyz = rng.normal(size=(count, 4))
-    sh = rng.uniform(-1, 127 / 128, (count, (degree + 1) ** 2, 3))
+    sh = rng.uniform(-127 / 128, 127 / 128, (count, (degree + 1) ** 2, 3))
     sh[:, 0] = rng.uniform(-3.3, 3.3, (count, 3))
     arrays = (
         rng.uniform(-wide, wide, (count, 3)),
@@ -30,8 +30,8 @@ def splats(count: int, degree: int = 0, seed: int = 0, wide: float = 3.0) -> Pla
     return PlainSplats(*(a.astype(np.float32) for a in arrays))
 
 
-def back(tmp_path, wanted: PlainSplats, version: int = 3) -> PlainSplats:
-    write_spz(wanted, tmp_path / "a.spz", version)
+def back(tmp_path, wanted: PlainSplats, version: int = 3, axes: str = "ply") -> PlainSplats:
+    write_spz(wanted, tmp_path / "a.spz", version, axes)
     return read_plain(tmp_path / "a.spz")
 
 
@@ -46,12 +46,13 @@ def largest_angle(a: np.ndarray, b: np.ndarray) -> float:
     return float(2 * np.arccos(dot).max())
 
 
+@pytest.mark.parametrize("axes", ["ply", "rub"])
 @pytest.mark.parametrize("version", [2, 3, 4])
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 @pytest.mark.parametrize("count", [1, 255, 3000])
-def test_what_comes_back_is_within_half_a_step(tmp_path, version, degree, count):
+def test_what_comes_back_is_within_half_a_step(tmp_path, version, degree, count, axes):
     wanted = splats(count, degree, seed=count + degree)
-    got = back(tmp_path, wanted, version)
+    got = back(tmp_path, wanted, version, axes)
     assert got.sh.shape == wanted.sh.shape and got.findings == () and not got.antialiased
     assert np.abs(places(got) - places(wanted)).max() <= 2.0**-17 * SLACK
     assert np.abs(np.log(got.scales) - np.log(wanted.scales)).max() <= 1 / 32 * SLACK
@@ -82,7 +83,7 @@ def test_what_lies_beyond_a_code_is_held_at_its_end(tmp_path):
     wanted.scales[:] = [[0, 1e-30, 1e-6], [1e3, 1e30, 400], [1, 1, 1], [1, 1, 1]]
     wanted.sh[:, 0], wanted.sh[:2, 1:], wanted.sh[2:, 1:] = 9.0, 5.0, -5.0
     wanted.opacity[:] = [0, 1, 0.5, 0.002]
-    got = back(tmp_path, wanted)
+    got = back(tmp_path, wanted, axes="rub")  # whose harmonics keep their signs
     np.testing.assert_allclose(np.log(got.scales[0]), -10, atol=1e-6)
     np.testing.assert_allclose(np.log(got.scales[1]), 255 / 16 - 10, atol=1e-6)
     np.testing.assert_allclose(got.sh[:, 0], 0.5 / 0.15, rtol=1e-6)
@@ -121,7 +122,7 @@ def test_the_origin_is_put_back(tmp_path):
     wanted = replace(splats(300), origin=(500.25, -20.5, 3.0))
     write_spz(wanted, tmp_path / "a.spz")
     raw = read_raw_spz(tmp_path / "a.spz", Reading())
-    want = wanted.means + np.array(wanted.origin)
+    want = (wanted.means + np.array(wanted.origin)) * (1, -1, -1)  # as a PLY has it
     assert np.abs(raw.means - want).max() <= 2.0**-14 * SLACK  # 13 bits below the metre
 
 
@@ -140,6 +141,8 @@ def test_places_that_do_not_fit_are_refused(tmp_path):
         write_spz(nowhere, tmp_path / "a.spz")
     with pytest.raises(ValueError, match="version 1 was asked for"):
         write_spz(splats(3), tmp_path / "a.spz", 1)
+    with pytest.raises(ValueError, match="axes 'luf' were asked for"):
+        write_spz(splats(3), tmp_path / "a.spz", 3, "luf")
     assert list(tmp_path.iterdir()) == []
 
 

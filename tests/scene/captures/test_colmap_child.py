@@ -5,7 +5,7 @@ from collections import namedtuple
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.colmap_child import FULL_BYTES, run_child
+from shapeshift.scene.captures.colmap.colmap_child import FULL_BYTES, run_child
 
 Usage = namedtuple("Usage", "total used free")
 FAILURE = "it ended with code {code}; {log} has its last words."

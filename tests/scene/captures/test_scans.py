@@ -219,8 +219,23 @@ def sitcoms3d(folder, drawn):
     save_text(folder / "cameras.json", json.dumps(said))
 
 
+def scanner_app(folder, drawn):
+    """3D Scanner App: a table each frame, a photo every few."""
+    for i, (view, (photo, depth)) in enumerate(zip(VIEWS, drawn, strict=True)):
+        said = {
+            "cameraPoseARFrame": view.world_from_eye.matrix().ravel().tolist(),
+            "intrinsics": k_matrix(view, 3).ravel().tolist(), "frame_index": 3 * i,
+        }  # fmt: skip
+        for number in (3 * i, 3 * i + 1):
+            save_text(folder / f"frame_{number:05d}.json", json.dumps(said))
+        save(folder / f"frame_{3 * i:05d}.jpg", photo)
+        save_depth(folder / f"depth_{3 * i:05d}.png", depth)
+    save_text(folder / "info.json", json.dumps({"device": "x"}))
+
+
+WITH_DEPTH = (polycam, scannet, arkitscenes, scanner_app)
 WRITERS = (polycam, record3d, scannet, arkitscenes, scannetpp, sdfstudio, nerfies, posed_splits,
-           nuscenes, sitcoms3d)  # fmt: skip
+           nuscenes, sitcoms3d, scanner_app)  # fmt: skip
 
 
 @pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
@@ -242,9 +257,9 @@ def test_views_and_depth_are_those_that_were_photographed(tmp_path, drawn, write
         assert np.allclose(photo.view.pinhole()[1:], view.pinhole()[1:], atol=1e-9)
         if photo.path.suffix == ".png":  # JPEG is not exact
             assert np.array_equal(load_photo(photo).rgb, pixels)
-        if write in (polycam, scannet, arkitscenes):
+        if write in WITH_DEPTH:
             assert np.allclose(load_depth(photo), depth, atol=0.0006), "millimetres, rounded"
-        assert (photo.depth is not None) == (write in (polycam, scannet, arkitscenes))
+        assert (photo.depth is not None) == (write in WITH_DEPTH)
     assert {p.path.stem for p in photos if p.split == "test"} == {photos[0].path.stem}
 
 
@@ -252,9 +267,10 @@ def test_what_is_left_out_is_said(tmp_path, drawn):
     folder = tmp_path / "scene"
     folder.mkdir()
     scannet(folder, drawn)
-    assert any(
-        "1 of 6 frames have no pose, for example 5.png" in d for d in read_capture(folder).doubts
-    )
+    capture = read_capture(folder)
+    (row,) = [row for row in capture.files if row.left_out]
+    assert (row.kind, row.found, row.left_out, row.why) == ("photos", 1, 1, "they have no pose")
+    assert any("they have no pose" in d and "5.png" in d for d in capture.doubts)
     other = tmp_path / "other"
     other.mkdir()
     scannetpp(other, drawn)

@@ -58,12 +58,6 @@ def test_counts_say_what_is_black_and_white(tmp_path, kind):
     assert read_capture(tmp_path).photos[0].counts == capture.photos[0].counts
 
 
-def test_what_is_no_number_is_black(tmp_path):
-    values = picture([np.nan, np.inf, -np.inf, 95]).astype(np.float32)
-    rgb = load_photo(capture_of(tmp_path, values, counts=[15, 95]).photos[0]).rgb
-    np.testing.assert_array_equal(rgb[0, :4, 0], [0, 255, 0, 255])
-
-
 @pytest.mark.parametrize(
     "values, heat, told",
     [

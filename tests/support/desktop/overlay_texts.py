@@ -37,7 +37,8 @@ TABLES = {
     "sections.film_panel": {"AROUND": ALL, "PAST": ALL},
     "sections.histogram_panel": {"EXPLAINED": ALL},
     "sections.inspect_panel": {
-        "COLUMNS": ALL, "BOUND_TIPS": ALL, "MEASURES": ALL, "EMISSIVITY": ALL,
+        "COLUMNS": ALL, "BOUND_TIPS": ALL, "VALUE_TIPS": ALL, "AUTO_TIPS": ALL, "MEASURES": ALL,
+        "EMISSIVITY": ALL,
     },
     "sections.look_panel": {"TWO_STOPS": ALL, "PALETTE_TIP": ALL, "DEBUG_NAMES": VALUES},
     "sections.objects_panel": {"MODES": VALUES, "FOUR_VIEW_NAMES": VALUES, "DEEDS": ALL},

@@ -40,7 +40,7 @@ def wall_splats(values: bool) -> PlainSplats:
 
 def write_wall(folder: Path, stops: tuple[Stop, ...] = STOPS) -> Path:
     """The wall as a folder that every command opens."""
-    write_layer_list([(stop, wall_splats(stop.kind == "thermal")) for stop in stops], folder)
+    write_layer_list([(stop, wall_splats(stop.is_measured)) for stop in stops], folder)
     return folder
 
 

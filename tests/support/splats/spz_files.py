@@ -92,3 +92,71 @@ def splat_by_hand(streams: list[bytes], i: int, version: int, degree: int, bits:
         "sh": [(code / 255 - 0.5) / 0.15 for code in colors[3 * i : 3 * i + 3]]
         + [(code - 128) / 128 for code in rest[size * i : size * (i + 1)]][:45],
     }
+
+
+def spz_of(splats, axes: str, version: int, named: int | None = None, bits: int = 12) -> bytes:
+    """A file of splats of SH degree 0 or 1 as another writer stores it, in axes such as RDF.
+
+    splats: in ours, right up back.  named: the number that the extension gives; None: without one.
+    Places, rotations and harmonics are taken to those axes by a matrix, a mirrored one, too.
+    """
+    columns = {"R": (0, 1), "L": (0, -1), "U": (1, 1), "D": (1, -1), "B": (2, 1), "F": (2, -1)}
+    turn = np.zeros((3, 3))
+    for row, letter in enumerate(axes):
+        column, sign = columns[letter]
+        turn[row, column] = sign  # file from ours
+    count = len(splats.means)
+    codes = np.rint((splats.means @ turn.T) * 2.0**bits).astype("<i4")
+    places = codes.view(np.uint8).reshape(-1, 3, 4)[:, :, :3].tobytes()
+    words = []
+    for wxyz in splats.wxyz:
+        matrix = turn @ matrix_of(wxyz)
+        matrix[:, 0] *= np.linalg.det(turn)  # an axis of a splat and its minus are the same
+        words.append(pack_quaternion(xyzw_of(matrix)))
+    rest = b""
+    if splats.sh.shape[1] == 4:  # degree 1 is -y, z, -x, times the same number
+        vectors = splats.sh[:, [3, 1, 2]] * [[-1], [-1], [1]]
+        turned = np.einsum("ij,njc->nic", turn, vectors)
+        harmonics = turned[:, [1, 2, 0]] * [[-1], [1], [-1]]
+        rest = np.rint(harmonics * 128 + 128).clip(0, 255).astype(np.uint8).tobytes()
+    streams = [
+        places,
+        np.rint(splats.opacity * 255).astype(np.uint8).tobytes(),
+        np.rint((splats.sh[:, 0] * 0.15 + 0.5) * 255).clip(0, 255).astype(np.uint8).tobytes(),
+        np.rint((np.log(splats.scales) + 10) * 16).clip(0, 255).astype(np.uint8).tobytes(),
+        struct.pack(f"<{count}I", *words),
+        rest,
+    ]
+    said = b"" if named is None else struct.pack("<III", 0xADBE0003, 4, named)
+    kind = {"flags": 2 if said else 0, "extensions": said, "bits": bits}
+    degree = 1 if rest else 0
+    if version == 4:
+        return modern(count, degree, streams, **kind)
+    return legacy(count, version, degree, streams, **kind)
+
+
+def matrix_of(wxyz: np.ndarray) -> np.ndarray:
+    """(3, 3) of a unit quaternion."""
+    w, x, y, z = (float(v) for v in wxyz)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def xyzw_of(matrix: np.ndarray) -> np.ndarray:
+    """(4,) x y z w of a rotation, by the largest of the four."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    rows = np.array(
+        [
+            [1 + a - e - i, b + d, c + g, h - f],
+            [b + d, 1 - a + e - i, f + h, c - g],
+            [c + g, f + h, 1 - a - e + i, d - b],
+            [h - f, c - g, d - b, 1 + a + e + i],
+        ]
+    )
+    row = rows[np.argmax(rows.diagonal())]
+    return row / np.linalg.norm(row)

@@ -64,4 +64,4 @@ def _draw_colors(exporting: Exporting, state: EditorState, ui_scale: float) -> N
     tip("How colours may change with the direction; less is smaller.", ui_scale)
     if state.has_palettes:
         _, exporting.palette = imgui.checkbox(item_label("with the palette"), exporting.palette)
-        tip("False colours of the thermal stop, as they are shown; else gray.", ui_scale)
+        tip("False colours of a stop of values, as they are shown; else gray.", ui_scale)

@@ -26,6 +26,14 @@ BOUND_TIPS: dict[Bound, str] = {
     "above": "All that is hotter is red, over every stop.",
     "below": "All that is colder is blue, over every stop.",
 }
+VALUE_TIPS: dict[Bound, str] = {  # of other values than heat
+    "above": "All that is higher is red, over every stop.",
+    "below": "All that is lower is blue, over every stop.",
+}
+AUTO_TIPS = (  # of heat, and of other values
+    "The palette shows what this view has, from its coldest to its hottest.",
+    "The palette shows what this view has, low to high.",
+)
 USUAL_EMISSIVITY = 0.95  # of most paints, and of brick, wood, rubber
 EMISSIVITY = (
     "Readings become temperatures of surfaces; colours and their scale stay as photographed."
@@ -46,30 +54,35 @@ class InspectActions:
 
 def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scale: float) -> None:
     """All of the section; wanted: a unit of temperature instead of the stop's own."""
-    thermal = tool.thermal
-    if thermal is None:
-        imgui.text_wrapped(said("The thermal stops of these objects do not agree; show one."))
+    measured = tool.measured
+    if measured is None:
+        imgui.text_wrapped(said("The values of these objects do not agree; show one."))
         return
     changed, _ = imgui.checkbox(item_label("lay marks"), tool.on)
     tip(MEASURES, ui_scale)
     if changed:
         actions.toggle()
-    unit = in_unit(thermal.stop.unit, 0, 1, wanted)[0]
+    unit = in_unit(measured.stop.unit, 0, 1, wanted)[0]
     if tool.file.marks:
         _table(tool, wanted, unit, ui_scale)
     for of, less in tool.file.differences:
         _difference(tool, of, less, wanted)
     if tool.chosen:
         _chosen(tool, ui_scale)
-    for kind, words in BOUND_TIPS.items():
+    heat, digits = measured.stop.kind != "values", measured.stop.digits
+    for kind, words in (BOUND_TIPS if heat else VALUE_TIPS).items():
         _bound(tool, kind, words, wanted, ui_scale)
-    if thermal.stop.unit in KELVINS:
+    if measured.stop.temperature_unit in KELVINS:
         _emissivity(tool, wanted, ui_scale)
-    low, high = in_unit(thermal.stop.unit, *tool.ends, wanted)[1:]
+    low, high = in_unit(measured.stop.unit, *tool.ends, wanted)[1:]
     level, span = (low + high) / 2, high - low
-    imgui.text_disabled(said("level {level:.1f}, span {span:.1f}", level=level, span=span))
+    if heat:
+        imgui.text_disabled(said("level {level:.1f}, span {span:.1f}", level=level, span=span))
+    else:
+        ends = {"level": f"{level:.{digits}f}", "span": f"{span:.{digits}f}"}
+        imgui.text_disabled(said("level {level}, span {span}", **ends))
     tips = {
-        "Auto": "The palette shows what this view has, from its coldest to its hottest.",
+        "Auto": AUTO_TIPS[not heat],
         "All values": "The palette shows all of the range that the photos could.",
     }
     clicked = button_row(tips, ui_scale, 2)
@@ -100,8 +113,8 @@ def _table(tool: Inspecting, wanted: str, unit: str, ui_scale: float) -> None:
     for number, name in enumerate(("", *COLUMNS)):
         imgui.table_set_column_index(number)
         imgui.text_disabled(said(name) if name else unit)
-    thermal = tool.thermal
-    assert thermal is not None  # draw_inspect has seen to it
+    measured = tool.measured
+    assert measured is not None  # draw_inspect has seen to it
     for mark in tool.file.marks:
         imgui.table_next_row()
         imgui.table_set_column_index(0)
@@ -116,17 +129,18 @@ def _table(tool: Inspecting, wanted: str, unit: str, ui_scale: float) -> None:
         values = (reading.least, reading.mean, reading.most)
         for number, value in enumerate(values[:1] if mark.kind == "spot" else values):
             imgui.table_set_column_index(2 if mark.kind == "spot" else 1 + number)
-            shown = in_unit(thermal.stop.unit, value, value, wanted)[1]
-            imgui.text_unformatted(f"{shown:.1f}" if np.isfinite(shown) else "--")
+            shown = in_unit(measured.stop.unit, value, value, wanted)[1]
+            digits = measured.stop.digits
+            imgui.text_unformatted(f"{shown:.{digits}f}" if np.isfinite(shown) else "--")
     imgui.end_table()
 
 
 def _difference(tool: Inspecting, of: str, less: str, wanted: str) -> None:
     """A row of two marks: the mean of the one less that of the other."""
-    thermal = tool.thermal
-    assert thermal is not None  # draw_inspect has seen to it
-    unit, one, none = in_unit(thermal.stop.unit, tool.difference(of, less), 0.0, wanted)
-    shown = f"{one - none:+.1f} {unit}" if np.isfinite(one) else "--"
+    measured = tool.measured
+    assert measured is not None  # draw_inspect has seen to it
+    unit, one, none = in_unit(measured.stop.unit, tool.difference(of, less), 0.0, wanted)
+    shown = f"{one - none:+.{measured.stop.digits}f} {unit}" if np.isfinite(one) else "--"
     imgui.text_unformatted(f"{of} \u2212 {less}   {shown}")
 
 
@@ -162,8 +176,8 @@ def _name(tool: Inspecting, name: str, ui_scale: float) -> None:
 
 def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:
     """Whether readings are of surfaces that mirror, and how much."""
-    thermal, emission = tool.thermal, tool.file.emission
-    assert thermal is not None  # draw_inspect has seen to it
+    measured, emission = tool.measured, tool.file.emission
+    assert measured is not None  # draw_inspect has seen to it
     changed, on = imgui.checkbox(item_label("emissivity"), emission is not None)
     tip(EMISSIVITY, ui_scale)
     if changed:
@@ -171,7 +185,7 @@ def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:
         emission = tool.file.emission
     if emission is None:
         return
-    surface, own = emission.surface, thermal.stop.unit
+    surface, own = emission.surface, measured.stop.unit
     width = imgui.get_window_size().x
     imgui.same_line(0.4 * width)
     imgui.set_next_item_width(0.22 * width)
@@ -226,9 +240,9 @@ def _air(tool: Inspecting, wanted: str, ui_scale: float) -> None:
 
 def _bound(tool: Inspecting, kind: Bound, words: str, wanted: str, ui_scale: float) -> None:
     """An isotherm: on or off, and its number."""
-    thermal, isotherm = tool.thermal, tool.isotherm(kind)
-    assert thermal is not None  # draw_inspect has seen to it
-    own = thermal.stop.unit
+    measured, isotherm = tool.measured, tool.isotherm(kind)
+    assert measured is not None  # draw_inspect has seen to it
+    own = measured.stop.unit
     changed, on = imgui.checkbox(item_label(kind), isotherm is not None)
     tip(words, ui_scale)
     if changed:
@@ -241,7 +255,7 @@ def _bound(tool: Inspecting, kind: Bound, words: str, wanted: str, ui_scale: flo
     imgui.set_next_item_width(-1)
     value = isotherm.low if kind == "above" else isotherm.high
     unit, shown, _ = in_unit(own, value, value, wanted)
-    style = f"%.1f {unit.replace('%', '%%')}".rstrip()
+    style = f"%.{measured.stop.digits}f {unit.replace('%', '%%')}".rstrip()
     low, high = in_unit(own, *tool.value_range, wanted)[1:]
     done, new = imgui.drag_float(f"##{kind}", shown, (high - low) / 500, 0, 0, style)
     tip("Drag it, or Ctrl+click it and type.", ui_scale)

@@ -17,7 +17,7 @@ from shapeshift.renderer.settings import DEBUG_VIEWS
 TWO_STOPS = ("one stop", "two stops beside a line", "heat over shape")
 MOST_DETAIL = 3.0
 PALETTE_TIP = (
-    "The colours in which a thermal stop shows temperatures. In all but turbo and rainbow lighter "
+    "The colours in which a stop shows its values. In all but turbo and rainbow lighter "
     "is hotter (in black-hot darker), also for eyes that confuse colours; viridis and cividis are "
     "made for them."
 )

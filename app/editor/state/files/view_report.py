@@ -5,7 +5,7 @@ from pathlib import Path
 
 from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.state.inspecting import Inspecting
-from shapeshift.app.inspection.draw_values import ThermalScene
+from shapeshift.app.inspection.draw_values import MeasuredScene
 from shapeshift.app.inspection.inspect_view import InspectedView, with_readings
 from shapeshift.app.inspection.report import CAMERAS_ENDING, ReportHead, report_of
 from shapeshift.app.inspection.report_pdf import write_report
@@ -13,14 +13,14 @@ from shapeshift.app.paths import file_name
 
 
 def write_view_report(
-    tool: Inspecting, thermal: ThermalScene, title: str, inspected: InspectedView, folder: Path
+    tool: Inspecting, measured: MeasuredScene, title: str, inspected: InspectedView, folder: Path
 ) -> Path:
     """title: of the scene.  Values are as the tool shows them: of surfaces, where it has their
     emissivity.  Raises ValueError, OSError.
     """
     inspected = replace(inspected, values=tool.corrected(inspected.values))
     report = report_of(
-        ReportHead(f"{thermal.stop.name}: {title}"), tool.source or Path(title), thermal.stop,
+        ReportHead(f"{measured.stop.name}: {title}"), tool.source or Path(title), measured.stop,
         [with_readings(inspected, tool.file)], tool.file, tool.scale, tool.document.origin,
     )  # fmt: skip
     make_folder(folder)

@@ -28,7 +28,7 @@ class ProgramSettings:
     language: str = "en"  # code of a table of texts
     temperature: str = ""  # unit of legends; "": as the scene has it
     lengths: str = ""  # unit of what is measured; "": metres
-    palette: str = ""  # of thermal stops; "": the scene's own
+    palette: str = ""  # of value stops; "": the scene's own
     place: tuple[int, int, int, int] | None = None  # left, top, width, height of the window
     sections: dict[str, bool] = field(default_factory=dict)  # of the panel, that a hand has moved
 

@@ -64,19 +64,19 @@ class Reports:
 
     def write(self) -> None:
         """The view of now with all its marks."""
-        tool, state, thermal = self.tool, self.state, self.tool.thermal
-        if thermal is None:
+        tool, state, measured = self.tool, self.state, self.tool.measured
+        if measured is None:
             return
         document, view = tool.document, self.viewpoint.view()
         part = min(1.0, REPORT_PX / max(view.size))
         width, height = (max(round(side * part), 1) for side in view.size)
         renderer = self.seen.renderer
         renderer.settings = RenderSettings(background=state.settings.background)
-        photo = first_photo(document, thermal)
+        photo = first_photo(document, measured)
         try:
             view = replace(view, size=(width, height))
-            inspected = inspect_view(renderer, document, thermal, photo, view)
-            path = write_view_report(tool, thermal, state.title, inspected, self.folder)
+            inspected = inspect_view(renderer, document, measured, photo, view)
+            path = write_view_report(tool, measured, state.title, inspected, self.folder)
         except (BadFile, ValueError, OSError) as error:
             state.problem = said("No report was written: {error}", error=error)
             return

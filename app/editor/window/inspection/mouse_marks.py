@@ -69,7 +69,7 @@ class MouseMarks:
 
     def handle_event(self, event: Event) -> bool:
         """True for what concerns the tool, its key and the handles of the scale."""
-        if self._tool.thermal is None:
+        if self._tool.measured is None:
             return False
         if isinstance(event, KeyDown):
             return not self._window.popup_open and self._press_key(event)
@@ -185,7 +185,7 @@ class MouseMarks:
         tool, state = self._tool, self._state
         if self._parts.on:
             tool.on = False
-        if not state.has_legend or tool.thermal is None:
+        if not state.has_legend or tool.measured is None:
             return False
         key = self._seen_now()
         still = self._under.is_still(key)
@@ -213,13 +213,13 @@ class MouseMarks:
 
     def _measure(self) -> None:
         """Values and depths of what is seen now, unless they are there."""
-        tool, thermal, key = self._tool, self._tool.thermal, self._seen_now()
-        if thermal is None or (self._measured == key and tool.picture is not None):
+        tool, measured, key = self._tool, self._tool.measured, self._seen_now()
+        if measured is None or (self._measured == key and tool.picture is not None):
             return
         self._measured = key
         self._models = tuple(obj.model for obj in self._state.scene.objects)
         try:
-            tool.saw(self._under.draw(lambda renderer, view: draw_values(renderer, thermal, view)))
+            tool.saw(self._under.draw(lambda renderer, view: draw_values(renderer, measured, view)))
         except BadFile as error:
             tool.on = False
             self._state.problem = str(error)
@@ -238,7 +238,7 @@ class MouseMarks:
     def draw(self, ui_scale: float) -> None:
         """Alarms, marks, and what lies under the mouse."""
         tool, state = self._tool, self._state
-        if not state.overlay or tool.thermal is None:
+        if not state.overlay or tool.measured is None:
             return
         if tool.is_current and tool.picture is not None and tool.file.isotherms:
             self._draw_alarms()

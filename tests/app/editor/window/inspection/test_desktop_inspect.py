@@ -293,5 +293,5 @@ def test_a_scene_without_heat_has_no_such_section(window, renderer, tmp_path):
     wall = write_wall(tmp_path / "plain", STOPS[:1])
     viewer = viewer_on_wall(window, renderer, wall, "RGB")
     section = next(s for s in viewer.hooks.sections if s.name == "Inspect")
-    assert not section.shown() and viewer.inspecting.thermal is None
+    assert not section.shown() and viewer.inspecting.measured is None
     viewer.parts.finder.close()

@@ -7,15 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.colmap_tables import (
-    AGAIN,
-    COUNT,
-    count_of,
-    mapped,
-    numbers_of,
-    short_of,
-    text_lines,
-)
+from shapeshift.scene.captures.colmap.text_lines import AGAIN, lines_of, numbers_of
+from shapeshift.scene.captures.colmap_tables import COUNT, count_of, mapped, short_of
 
 POINT = np.dtype([("number", "<u8"), ("xyz", "<f8", 3), ("rgb", "u1", 3), ("error", "<f8")])
 STEP_OF_TRACK = 8  # bytes
@@ -62,9 +55,9 @@ def points_of_bytes(data: bytes | mmap.mmap, path: Path) -> np.ndarray:
 def points_of_text(path: Path) -> np.ndarray:
     """(P,) POINT."""
     values = []
-    for line, text in enumerate(text_lines(path), 1):
+    for line, text in enumerate(lines_of(path), 1):
         words = text.split(maxsplit=WORDS)
-        if not words or words[0].startswith("#"):
+        if not words or words[0].startswith(b"#"):
             continue
         if len(words) < WORDS:
             raise BadFile(f"{path}, line {line}: a number, a place, a colour and an error wanted.")

@@ -120,7 +120,12 @@ def test_without_the_reader_a_sentence_says_so(tmp_path, monkeypatch):
     [
         ("1,2\n3,4\n", [[1, 2], [3, 4]]),
         ("\ufeff1;2,5\r\n3;4\r\n", [[1, 2.5], [3, 4]]),
-        ("Camera,E8\nunit,C\n\n1,2,\n3,,\n", None),
+        ("Camera,E8\nunit,C\n\n1,2,\n3,,\n", [[1, 2], [3, np.nan]]),
+        ("Camera,E8,,\n,,,\n1,2,,\n3,4,,\n", [[1, 2, np.nan, np.nan], [3, 4, np.nan, np.nan]]),
+        (",\n1,2\n,\n", [[np.nan] * 2, [1, 2], [np.nan] * 2]),
+        ("1;--;n/a\n;NaN;2,5\n", [[1, np.nan, np.nan], [np.nan, np.nan, 2.5]]),
+        ("1,2,3\n4,5\n", None),
+        (",,\n,,\n", [[np.nan] * 3] * 2),
         ("Camera,E8\nunit,C\n\n1,2,\n3,4,\n", [[1, 2], [3, 4]]),
         ("1\tnan\n3\t4", [[1, np.nan], [3, 4]]),
         ("1,2\n3\n", None),

@@ -1,0 +1,77 @@
+"""What a command says of a capture: its stops, and what of its files was found, used, left out."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapeshift.app.terminal import open_console, print_text
+
+if TYPE_CHECKING:
+    from shapeshift.scene.captures.capture import Capture, FoundFiles
+
+
+def capture_facts(path: Path) -> dict | None:
+    """Of the capture at `path`; None where nothing there is posed photos.  Raises BadFile."""
+    from shapeshift.scene.captures.foreign.read_foreign import read_foreign
+    from shapeshift.scene.captures.read_capture import has_frames, has_poses, read_capture
+
+    if path.is_dir():
+        posed = has_poses(path) or read_foreign(path) is not None
+    else:
+        posed = path.is_file() and (has_frames(path) or read_foreign(path) is not None)
+    if not posed:
+        return None
+    capture = read_capture(path)
+    return {
+        "capture": str(path),
+        "stops": [
+            {
+                "name": stop.name, "x": stop.x, "kind": stop.kind, "unit": stop.unit,
+                "value_range": stop.value_range,
+                "train": photos_of(capture, stop.name, "train"),
+                "test": photos_of(capture, stop.name, "test"),
+            }
+            for stop in capture.stops
+        ],
+        "points": 0 if capture.points is None else len(capture.points),
+        "files": [asdict(row) for row in capture.files],
+        "doubts": list(capture.doubts),
+    }  # fmt: skip
+
+
+def photos_of(capture: "Capture", stop: str, split: str) -> int:
+    """Of a panorama all faces are one."""
+    return len({photo.path for photo in capture.of(stop, split)})
+
+
+def print_capture(facts: dict) -> None:
+    """On standard output: a line a stop, the table of files, what a person should know."""
+    from shapeshift.scene.captures.capture import FoundFiles
+
+    for stop in facts["stops"]:
+        print_text(
+            f"{stop['x']:.3f}  {stop['name']} ({stop['kind']}): {stop['train']} photos to train "
+            f"on, {stop['test']} held out"
+        )
+    print_files([FoundFiles(**row) for row in facts["files"]], stderr=False)
+    for doubt in facts["doubts"]:
+        print_text(doubt)
+
+
+def print_files(rows: "Sequence[FoundFiles]", stderr: bool = True) -> None:
+    """The table of what was found, used, left out and why."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("files", "found", "used", "left out", "why, for example"):
+        table.add_column(name, justify="right" if name in ("found", "used", "left out") else "left")
+    before = ""
+    for row in rows:
+        kind = "" if row.kind == before else row.kind
+        counts = (f"{count:,}" for count in (row.found, row.used, row.left_out))
+        table.add_row(kind, *counts, Text(", ".join(filter(None, (row.why, row.example)))))
+        before = row.kind
+    open_console(stderr=stderr).print(table)

@@ -1,0 +1,155 @@
+"""The files that lie with a COLMAP model: photos, masks, points, lists; and what is not read."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.capture_files import (
+    SMALLER,
+    entries_of,
+    files_below,
+    is_picture,
+    photo_key,
+)
+from shapeshift.scene.capture_found import FileTable
+from shapeshift.scene.captures.capture import Photo
+from shapeshift.scene.captures.capture_rules import split_every_8th
+from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
+from shapeshift.scene.captures.colmap.text_lines import lines_of
+from shapeshift.scene.captures.colmap_tables import images_in, models_in
+from shapeshift.scene.mask_files import NO_NAME, find_masks
+
+BESIDE = {"depth photos": ("depth", "depths", "depth_maps"), "normal maps": ("normal", "normals")}
+OTHER_MASKS = "their white hides, or stands for a class; masks/ is for those whose white counts"
+FEW = 4  # models that a sentence names
+# nerfstudio's, beside the model
+LISTS = {"train_list.txt": "train", "validation_list.txt": "test", "test_list.txt": "test"}
+
+
+def base_of(folder: Path, model: Path) -> Path:
+    """Where the folder of photos lies: a model may be named itself, to be read and no other."""
+    if model == folder / "dense" / "sparse":
+        return folder / "dense"
+    if model == folder and photos_folder(folder) == folder:
+        for place in (folder.absolute(), folder.absolute().parent):
+            if place.name == "sparse" and photos_folder(place.parent) != place.parent:
+                return place.parent
+    return folder
+
+
+def photos_folder(base: Path) -> Path:
+    """images/, else the first of those with smaller photos, else the folder itself."""
+    names = ("images", *(f"images_{factor}" for factor in SMALLER))
+    return next((base / name for name in names if (base / name).is_dir()), base)
+
+
+def masks_of(base: Path, root: Path, paths: Sequence[Path], table: FileTable) -> dict[Path, Path]:
+    """The masks of photos; what else lies among these and these masks is left out."""
+    name_of = {path: Path(os.path.relpath(path, root)).as_posix() for path in paths}
+    names = list(name_of.values())
+    if root == base:  # beside the model: only folders that have photos of it
+        places = sorted({name.rpartition("/")[0] for name in names})
+        listed = [
+            f"{place}/{name}" if place else name
+            for place in places
+            for name in files_below(root / place, deep=False)
+        ]
+    else:
+        listed = files_below(root)
+    found = find_masks(base, root, names, listed)
+    known = {photo_key(name) for name in names}
+    no_photos = {*found.unread, *(root / name for name in found.beside)}
+    others = [root / name for name in listed if is_picture(name) and photo_key(name) not in known]
+    table.unposed(path for path in others if path not in no_photos)
+    table.left_out("masks", found.others, NO_NAME)
+    table.left_out("masks", found.unread, OTHER_MASKS)
+    return {path: found.of[key] for path in paths if (key := photo_key(name_of[path])) in found.of}
+
+
+def points_of(
+    model: Path, ending: str
+) -> tuple[np.ndarray | None, np.ndarray | None, tuple[str, ...]]:
+    """Points and colours 0..1 of a model, and what is doubtful: a model may come without."""
+    other = {".bin": ".txt", ".txt": ".bin"}[ending]
+    paths = [model / f"points3D{each}" for each in (ending, other)]
+    path = next((path for path in paths if path.is_file()), None)
+    if path is None:
+        return None, None, (f"The points {path_end(paths[0])} are not there.",)
+    xyz, rgb = read_colmap_points(path)
+    said = () if path == paths[0] else (f"The points are those of {path_end(path)}.",)
+    return (xyz, rgb.astype(np.float32) / 255, said) if len(xyz) else (None, None, said)
+
+
+def left_beside(base: Path, model: Path, ending: str, table: FileTable) -> None:
+    """Says what else lies there that is not read: other models, depth photos, normal maps."""
+    other_models(model, ending, table)
+    unread_folders(base, table)
+
+
+def other_models(model: Path, ending: str, table: FileTable) -> None:
+    """Says which of several was taken, and what the others have."""
+    others = [found for found in models_in(model.parent) if found[0] != model]
+    if model.parent.name != "sparse" or not others:
+        return
+    mine, counts = images_in(model, ending), [images_in(*found) for found in others]
+    table.used("models", 1, f"sparse/{model.name}, {mine} images")
+    few = [f"sparse/{path.name} ({count})" for (path, _), count in zip(others, counts, strict=True)]
+    why = f"not joined to sparse/{model.name}, which has {mine} images"
+    table.left_out("models", [path for path, _ in others], why, said=True)
+    table.sentences.append(
+        f"Of {len(others) + 1} models that are not joined, sparse/{model.name} with {mine} images "
+        f"is used, not {', '.join(few[:FEW])}{' ...' if len(few) > FEW else ''}; name the folder "
+        "of another one to use that."
+    )
+
+
+def unread_folders(base: Path, table: FileTable) -> None:
+    """Depth photos and normal maps beside COLMAP's model, whose tables name none."""
+    there = entries_of(base, base.stat().st_mtime_ns)
+    for kind, names in BESIDE.items():
+        files = [
+            base / there[name] / below
+            for name in names
+            if name in there and (base / there[name]).is_dir()
+            for below in files_below(base / there[name])
+        ]
+        table.left_out(kind, files, "a COLMAP model names none, a transforms.json can")
+
+
+def listed_split(
+    photos: list[Photo], folder: Path, root: Path, table: FileTable, by_folder: bool
+) -> list[Photo]:
+    """By nerfstudio's lists beside the model, a name a line; without them as it is where the
+    photos' folders say it, else every 8th is held out.
+
+    Photos in none of the lists are not used.  Names are compared as photos are found.
+    """
+    splits: dict[str, tuple[str, str, str]] = {}  # by photo_key: list, name, split
+    for name, split in LISTS.items():
+        if (folder / name).is_file():
+            for line in lines_of(folder / name):
+                if text := line.decode("utf-8", "replace").strip():
+                    splits[photo_key(text).removeprefix("images/")] = name, text, split
+    if not splits:
+        return photos if by_folder else split_every_8th(photos)
+    used, left, taken = [], [], set()
+    for photo in photos:
+        key = photo_key(Path(os.path.relpath(photo.path, root)).as_posix())
+        key = key if key in splits else os.path.splitext(key)[0]  # lists may leave out endings
+        if key in splits:
+            used.append(replace(photo, split=splits[key][2]))
+            taken.add(key)
+        else:
+            left.append(photo.path)
+    if not used:
+        raise BadFile(f"{folder}: its lists of training and test photos name none of its photos")
+    table.left_out("photos", list(dict.fromkeys(left)), f"they are in none of {', '.join(LISTS)}")
+    for name in LISTS:
+        lost = [text for key, (of, text, _) in splits.items() if of == name and key not in taken]
+        table.left_out(f"names in {name}", lost, "no photo of the model has them", there=False)
+    return used

@@ -1,0 +1,183 @@
+"""Poses in other programs' files that lie with photos: which file is whose, and which is used."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.foreign.foreign_frames import PhotoIndex
+from shapeshift.scene.captures.foreign.known_programs import Program, program_of
+from shapeshift.scene.captures.foreign.read_alicevision import alicevision_frames
+from shapeshift.scene.captures.foreign.read_blocks import blocks_frames
+from shapeshift.scene.captures.foreign.read_bundler import bundler_frames, nvm_frames
+from shapeshift.scene.captures.foreign.read_metashape import metashape_frames
+from shapeshift.scene.captures.foreign.read_openmvg import openmvg_frames
+from shapeshift.scene.captures.foreign.read_opensfm import SHOTS, odm_frames, opensfm_frames
+from shapeshift.scene.captures.foreign.read_pix4d import MARK as PIX4D_MARK
+from shapeshift.scene.captures.foreign.read_pix4d import pix4d_frames
+from shapeshift.scene.captures.foreign.read_realityscan import realityscan_frames
+from shapeshift.scene.captures.foreign.read_scaniverse import scaniverse_frames
+from shapeshift.scene.captures.foreign.read_xmp import xmp_frames
+from shapeshift.scene.captures.scans.posed_frames import PosedFrames
+
+PEEK_BYTES = 1 << 16
+MOST_LOOKED_AT = 400  # files of a folder, and folders in it
+ENDINGS = {".xml", ".csv", ".json", ".sfm", ".out", ".nvm", ".txt", ".geojson", ".xmp"}
+XMP = ".xmp"  # one beside each photo
+
+
+@dataclass(frozen=True)
+class Form:
+    """One form of file."""
+
+    program: str
+    read: Callable[[Path, PhotoIndex], PosedFrames]
+    marks: tuple[str, ...]  # expressions that are all found at the file's beginning
+    endings: tuple[str, ...]
+
+
+FORMS = (
+    Form("Metashape", metashape_frames, (r"<document\b", r"<chunk\b"), (".xml",)),
+    Form("Blocks Exchange", blocks_frames, (r"<BlocksExchange\b",), (".xml",)),
+    Form("RealityScan", realityscan_frames,
+         (r"(?im)^\ufeff?#?name *[,;\t] *x *[,;\t] *y *[,;\t].*(heading|yaw)",), (".csv", ".txt")),
+    Form("OpenMVG", openmvg_frames, (r'"sfm_data_version"',), (".json",)),
+    Form("Scaniverse", scaniverse_frames, (r'"largeImageSize"', r'"smallImageSize"'), (".json",)),
+    Form("Meshroom", alicevision_frames, (r'"version"', r'"viewId"|"intrinsicId"|"poseId"'),
+         (".sfm", ".json")),
+    Form("OpenDroneMap", odm_frames, (r'"FeatureCollection"', r'"rotation"', r'"filename"'),
+         (".geojson", ".json")),
+    Form("OpenSfM", opensfm_frames, (r"^\s*\[\s*\{", r'"projection_type"'), (".json",)),
+    Form("Bundler", bundler_frames, (r"^\s*# Bundle file",), (".out", ".txt")),
+    Form("RealityScan", xmp_frames, (r"xcr:Rotation",), (XMP,)),
+    Form("VisualSFM", nvm_frames, (r"^\s*NVM_V3",), (".nvm",)),
+    Form("Pix4D", pix4d_frames, (PIX4D_MARK,), (".txt",)),
+)  # fmt: skip
+# Of OpenDroneMap's folder: the reconstruction has the lenses with it.
+LENSES = "cameras.json"
+ODM = ("opensfm/reconstruction.json", SHOTS)
+
+
+def head_of(path: Path) -> bytes:
+    """Its first bytes; b"" of what cannot be read, which is then nobody's."""
+    try:
+        with path.open("rb") as file:
+            return file.read(PEEK_BYTES)
+    except OSError:
+        return b""
+
+
+def form_of(path: Path, head: bytes | None = None) -> Form | None:
+    """Whose form a file has, by its ending and its beginning."""
+    if path.suffix.lower() not in ENDINGS or not path.is_file():
+        return None
+    head = head_of(path) if head is None else head
+    text = head.decode(
+        "utf-16" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", "replace"
+    )
+    for form in FORMS:
+        if path.suffix.lower() in form.endings and all(re.search(m, text) for m in form.marks):
+            return form
+    return None
+
+
+def is_table_of_lenses(path: Path) -> bool:
+    """Whether a cameras.json is OpenSfM's or OpenDroneMap's, which has no poses."""
+    head = head_of(path) if path.name == LENSES else b""
+    return b'"projection_type"' in head and b'"frames"' not in head
+
+
+def files_of(folder: Path) -> list[Path]:
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in ENDINGS)
+    return found[:MOST_LOOKED_AT]
+
+
+def forms_in(folder: Path) -> list[tuple[Path, Form]]:
+    """The files of other programs' poses in a folder, the newest first."""
+    found = [(p, form) for p in files_of(folder) if (form := form_of(p)) is not None]
+    found.sort(key=lambda row: -row[0].stat().st_mtime_ns)
+    whole = [row for row in found if row[0].suffix.lower() != XMP]
+    return whole or found[:1]  # all of them are read together
+
+
+def find_foreign(folder: Path) -> list[tuple[Path, Form]]:
+    """Files with poses of photos in `folder`, best first: in it, below it, above it.
+
+    Of several in one place the newest is first.
+    """
+    for name in ODM:
+        if (form := form_of(folder / name)) is not None:
+            return [(folder / name, form)]
+    if found := forms_in(folder):
+        return found
+    inside = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+    for place in inside[:MOST_LOOKED_AT]:
+        if found := forms_in(place):
+            return found
+    above = folder.absolute().parent
+    return forms_in(above) if above != folder.absolute() else []
+
+
+def read_foreign(path: Path) -> PosedFrames | None:
+    """The frames of a file, or of a folder with photos; None where none of these forms is there.
+
+    Raises BadFile.
+    """
+    if path.is_file():
+        form = form_of(path)
+        return None if form is None else form.read(path, photos_of(path))
+    if not path.is_dir() or not (found := find_foreign(path)):
+        return None
+    photos = PhotoIndex(path)
+    if not photos.by_name and found[0][0].parent != path:
+        return None  # what lies elsewhere is of this folder only where it has photos
+    file, form = found[0]
+    posed = form.read(file, photos)
+    if file.parent == path.absolute().parent and not any(
+        (path / frame["file_path"]).is_file() for frame in posed.frames
+    ):
+        return None  # of other photos
+    return replace(posed, doubts=(*posed.doubts, *said_of(found[1:])))
+
+
+def said_of(others: Sequence[tuple[Path, Form]]) -> tuple[str, ...]:
+    """That there are more of them."""
+    if not others:
+        return ()
+    listed = ", ".join(f"{path_end(path)} ({form.program})" for path, form in others[:3])
+    return (
+        f"{len(others)} other files of poses lie there, for example {listed}; the newest is used, "
+        "name another to use that.",
+    )
+
+
+def photos_of(path: Path) -> PhotoIndex:
+    """The photos of a file that was named: below its folder, else beside that, no deeper, since
+    what lies there may be of others."""
+    own = path.absolute().parent
+    photos = PhotoIndex(own)
+    if photos.by_name or own.parent == own:
+        return photos
+    above = PhotoIndex(own.parent, 1)
+    return above if above.by_name else photos
+
+
+def refuse_known(path: Path) -> None:
+    """Raises BadFile for a file that holds, or stands for, poses in a form that is not read."""
+    if path.is_file() and (program := program_of(path, head_of(path))) is not None:
+        raise BadFile(f"{path} is {program.what}, which is not read here; {program.advice}.")
+
+
+def known_beside(folder: Path) -> str:
+    """What to do about a file in a folder, or in the one above, whose poses are not read; "" where
+    there is none."""
+    for place in (folder, folder.absolute().parent):
+        for path in sorted(place.iterdir())[:MOST_LOOKED_AT]:
+            program: Program | None = None
+            if path.is_file() and path.suffix.lower() not in (".jpg", ".jpeg", ".png"):
+                program = program_of(path, head_of(path))
+            if program is not None:
+                return f"{path_end(path)} is {program.what}: {program.advice}"
+    return ""

@@ -1,0 +1,116 @@
+"""The stops of frames in JSON, and which each frame is of; capture.json beside them."""
+
+import os
+from collections import ChainMap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.capture_files import find_file
+from shapeshift.scene.capture_photos import image_size
+from shapeshift.scene.captures.capture_rules import spread_stops, stops_from
+from shapeshift.scene.captures.dated_stops import day_of_frame
+from shapeshift.scene.captures.modalities.photo_modality import modalities_of
+from shapeshift.scene.captures.modalities.said_modalities import (
+    Group,
+    said_modality_of,
+    settling_line,
+)
+
+MOST_BYTES = 1 << 30  # of JSON
+
+
+def read_capture_json(file: Path) -> dict:
+    """The object of a file; a version of our own form that is not known is refused."""
+    data = read_json(file, most_bytes=MOST_BYTES)
+    if not isinstance(data, dict):
+        raise BadFile(f"{file} holds {shown(data)}; an object with 'frames' is wanted")
+    if data.get("format", "shapeshift-capture") == "shapeshift-capture":
+        version = data.get("version", 1)
+        if version != 1:
+            raise BadFile(
+                f"{file}: version {shown(version)} of the capture form; this program reads 1"
+            )
+    return data
+
+
+def said_beside(folder: Path) -> dict:
+    """What capture.json in the folder of a capture says; {} without one."""
+    path = folder / "capture.json"
+    return read_capture_json(path) if path.is_file() else {}
+
+
+def stops_of_frames(
+    folder: Path, data: dict, entries: Sequence[Mapping], where: str
+) -> tuple[tuple[Stop, ...], list[str], list]:
+    """Stops; of each frame the stop that it is of where it names none itself, "" where it stands
+    for one of each; and 'modalities' of capture.json, where they were needed.
+    """
+    days = [
+        "" if "modality" in entry else day_of_frame(entry, f"{where}: frame {i}")
+        for i, entry in enumerate(entries)
+    ]
+    listed = data.get("modalities")
+    if listed:
+        if isinstance(listed, list) and all(isinstance(name, str) and name for name in listed):
+            if len(set(listed)) < len(listed):
+                raise BadFile(f"{where}: two modalities have the same name; rename one")
+            return spread_stops(listed), days, []
+        stops = tuple(sorted(stops_from(listed, where), key=lambda stop: stop.x))
+        return stops, days, []
+    bare = [i for i, entry in enumerate(entries) if "modality" not in entry]
+    names = [named_file(entries[i]) for i in bare]
+    if len(bare) == len(entries) and (told := said_beside(folder).get("modalities")):
+        place = f"{folder}/capture.json"
+        stops = stops_from(told, place)
+
+        def cameras_of(row: int) -> set[str]:
+            path = find_file(folder, names[row]).path
+            return {"{}x{}".format(*image_size(path, None))} if os.path.isfile(path) else set()
+
+        of = said_modality_of(told, stops, names, place, cameras_of)
+        return tuple(sorted(stops, key=lambda stop: stop.x)), of, told
+    found, of = modalities_of(names, folder, [own_keys(entries[i]) for i in bare], False)
+    usual = dict(zip(bare, of, strict=True))
+    if len(found) > 1 and any(days):
+        raise of_days(days, found, usual, entries, where)
+    said = [
+        Fields(entry, f"{where}: frame {i}").text("modality", days[i] or usual.get(i, "RGB"))
+        for i, entry in enumerate(entries)
+    ]
+    if "" in said:
+        raise BadFile(f"{where}: frame {said.index('')}: 'modality' is empty; give it a name")
+    stops = found if set(said) == {s.name for s in found} else spread_stops(dict.fromkeys(said))
+    return stops, said, []
+
+
+def of_days(
+    days: list[str],
+    stops: Sequence[Stop],
+    usual: Mapping[int, str],
+    entries: Sequence[Mapping],
+    where: str,
+) -> BadFile:
+    """Of frames of several days of which some show heat: each would be of two stops."""
+    groups: dict[tuple[str, str], Group] = {}
+    kinds = {stop.name: stop.kind for stop in stops}
+    for row, name in sorted(usual.items(), key=lambda item: (days[item[0]], kinds[item[1]])):
+        each = Group(f"{name} {days[row]}".strip(), kinds[name])
+        groups.setdefault((days[row], name), each).rows.append(row)
+    line = settling_line(list(groups.values()), [named_file(entry) for entry in entries])
+    return BadFile(
+        f"{where}: its frames have dates, and some show heat and others do not; say which are of "
+        f"which stop in capture.json beside it, such as {line}"
+    )
+
+
+def named_file(entry: Mapping) -> str:
+    """The photo that a frame names; "" where it is no text, which shots_of refuses."""
+    name = entry.get("file_path") or entry.get("file") or ""
+    return name if isinstance(name, str) else ""
+
+
+def own_keys(entry: Mapping) -> Mapping:
+    """What a frame says itself, without what its file says for all."""
+    return entry.maps[0] if isinstance(entry, ChainMap) else entry

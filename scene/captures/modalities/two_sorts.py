@@ -1,0 +1,160 @@
+"""Photos of two sorts in one stop, which their pixels show where nothing else says it."""
+
+import os
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.capture_files import parts_of
+from shapeshift.scene.captures.capture import Photo
+from shapeshift.scene.captures.modalities.said_modalities import Group, settling_line
+
+ONE_CHANNEL = {"L", "LA", "La", "1"}  # how PIL names pictures of a byte without colours,
+NUMBERS = {"I;16", "I;16B", "I;16L", "I;16N", "I", "F"}  # and what is 16 bits or more
+FEWEST = 3  # photos: one or two grey ones are no camera of another sort
+
+
+class Opened(NamedTuple):
+    """What is known of a photo when its file was opened."""
+
+    name: str  # as the capture writes it
+    stop: str
+    mode: str  # as PIL names it
+    size: tuple[int, int]  # of its file
+    camera: str = ""  # as the capture numbers it
+
+    @property
+    def grey(self) -> bool:
+        return self.mode in ONE_CHANNEL or self.mode in NUMBERS
+
+
+def opened_photos(
+    photos: Iterable[Photo], root: Path, cameras: Mapping[Path, str] | None = None
+) -> list[Opened]:
+    """Of a reader's photos, below `root`; cameras: as the capture numbers them."""
+    cameras = cameras or {}
+    return [
+        Opened(
+            os.path.relpath(path, root).replace(os.sep, "/"),
+            photo.modality,
+            photo.mode,
+            photo.file_size,
+            cameras.get(path, ""),
+        )
+        for path, photo in {photo.path: photo for photo in photos}.items()
+    ]
+
+
+def refuse_two_sorts(photos: Sequence[Opened], stops: Sequence[Stop], folder: Path) -> None:
+    """Raises BadFile where a stop that nobody named has colour photos, and a folder or a camera of
+    which every photo has one channel or 16 bits.
+
+    Size, camera, or single grey photos are no reason.
+    """
+    cameras = cameras_of(photos)
+    for stop in stops:
+        mine = [row for row, photo in enumerate(photos) if photo.stop == stop.name]
+        grey = grey_groups(photos, mine, cameras)
+        if grey:
+            raise mixed(photos, stops, stop, grey, cameras, folder)
+    refuse_swapped(photos, stops, folder)
+
+
+def cameras_of(photos: Sequence[Opened]) -> list[str]:
+    """Of each photo: the capture's number where several photos have it, else the size."""
+    used = Counter(photo.camera for photo in photos)
+    if any(used[photo.camera] < 2 or not photo.camera for photo in photos):
+        return ["{}x{}".format(*photo.size) for photo in photos]
+    return [photo.camera for photo in photos]
+
+
+def grey_groups(photos: Sequence[Opened], mine: list[int], cameras: list[str]) -> set[int]:
+    """Rows of a stop's photos in folders and of cameras that are all grey; empty where no photo of
+    the stop has colours.
+    """
+    found: set[int] = set()
+    if all(photos[row].grey for row in mine) or not any(photos[row].grey for row in mine):
+        return found
+    groups: dict[tuple, list[int]] = defaultdict(list)
+    for row in mine:
+        groups["folder", *parts_of(photos[row].name)[:-1]].append(row)
+        groups["camera", cameras[row]].append(row)
+    for rows in groups.values():
+        if len(rows) >= FEWEST and all(photos[row].grey for row in rows):
+            found |= set(rows)
+    return found
+
+
+def mixed(
+    photos: Sequence[Opened],
+    stops: Sequence[Stop],
+    stop: Stop,
+    grey: set[int],
+    cameras: list[str],
+    folder: Path,
+) -> BadFile:
+    """Of a stop whose rows `grey` are of another sort than its others."""
+    rest = [row for row, p in enumerate(photos) if p.stop == stop.name and row not in grey]
+    light = Group("RGB" if stop.kind == "layer" else stop.name, stop.kind, stop.palette, rest)
+    light.kind = "rgb" if stop.kind == "layer" and len(stops) == 1 else stop.kind
+    heat = Group("Thermal", "thermal", "ironbow", sorted(grey))
+    if stop.kind == "thermal":  # then those in colours are the odd ones
+        light, heat = (
+            Group("RGB", "rgb", "", rest),
+            Group(stop.name, "thermal", "ironbow", sorted(grey)),
+        )
+    others = [g for g in groups_of(photos, stops) if g.name != stop.name]
+    names = [photo.name for photo in photos]
+    taken = {group.name for group in others}
+    for group in (light, heat):
+        while group.name in taken:
+            group.name += " 2"
+    groups = sorted([light, heat, *others], key=lambda g: g.kind != "rgb")
+    line = settling_line(groups, names, cameras)
+    colour = next((p for i, p in enumerate(photos) if i in rest and not p.grey), photos[rest[0]])
+    one = photos[min(grey)]
+    return BadFile(
+        f"{folder}: photos of two sorts would be one stop, {stop.name}: {len(grey)} of "
+        f"{bits_of(one)} and {of(one)}, for example {path_end(one.name)}, beside {len(rest)} in "
+        f"colours of {of(colour)}, for example {path_end(colour.name)}; say which are which in "
+        f"capture.json beside them, such as {line}"
+    )
+
+
+def groups_of(photos: Sequence[Opened], stops: Sequence[Stop]) -> list[Group]:
+    """The stops as they are."""
+    return [
+        Group(s.name, s.kind, s.palette, [i for i, p in enumerate(photos) if p.stop == s.name])
+        for s in stops
+    ]
+
+
+def bits_of(photo: Opened) -> str:
+    return "numbers" if photo.mode in NUMBERS else "one channel"
+
+
+def of(photo: Opened) -> str:
+    return "{}x{} pixels".format(*photo.size)
+
+
+def refuse_swapped(photos: Sequence[Opened], stops: Sequence[Stop], folder: Path) -> None:
+    """Raises BadFile where names say heat of photos that are all in colours, and light of those
+    that are all grey.
+    """
+    light = [photo for photo in photos if photo.stop in {s.name for s in stops if s.kind == "rgb"}]
+    heat = [
+        photo for photo in photos if photo.stop in {s.name for s in stops if s.kind == "thermal"}
+    ]
+    if not min(len(light), len(heat)) >= FEWEST:
+        return
+    if all(photo.grey for photo in light) and not any(photo.grey for photo in heat):
+        line = settling_line(groups_of(photos, stops), [photo.name for photo in photos])
+        raise BadFile(
+            f"{folder}: names and pixels disagree: {path_end(light[0].name)} and the other "
+            f"{len(light) - 1} photos of visible light are of {bits_of(light[0])}, "
+            f"{path_end(heat[0].name)} and the other {len(heat) - 1} of heat are in colours; if "
+            f"the names are right, say so in capture.json beside them: {line}"
+        )
