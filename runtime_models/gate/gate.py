@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -172,8 +173,8 @@ def ask(
     except Ended as ended:
         raise cut_off(door, path, size, seconds, str(ended)) from None
     finally:
-        if kept and process.served < MOST_FILES:
-            put_back(name, process)
+        if kept:
+            let_go(name, process)
         else:
             process.end()
     return value_of(answer, door, path, size)
@@ -260,6 +261,9 @@ class Held:
         self.door, self.path = DOORS[name], path
         self.size = path.stat().st_size
         self.process: Process | None = taken(name)
+        # Not by __del__: in a ring of garbage the pipes may be closed before it is called.
+        self._forgotten = weakref.finalize(self, let_go, name, self.process)
+        self._forgotten.atexit = False  # the process ends with its pipe
         self.facts = self._ask(words, "", seconds_of(self.door, self.size), memory)
 
     def call(self, method: str, *words: Any, seconds: float, memory: int) -> Any:
@@ -290,14 +294,19 @@ class Held:
         process, self.process = self.process, None
         if process is None:
             return
-        if for_good or process.served >= MOST_FILES:
+        self._forgotten.detach()
+        if for_good:
             process.end()
         else:
-            put_back(self.door.name, process)
+            let_go(self.door.name, process)
 
-    def __del__(self) -> None:
-        if getattr(self, "process", None) is not None:
-            self.close(for_good=sys.is_finalizing())
+
+def let_go(name: str, process: Process) -> None:
+    """Another file may have the process."""
+    if process.served >= MOST_FILES:
+        process.end()
+    else:
+        put_back(name, process)
 
 
 def end_all() -> None:

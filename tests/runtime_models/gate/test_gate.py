@@ -1,6 +1,7 @@
 """The gate by stand-ins that sleep, allocate, crash: what a damaged file makes a parser do."""
 
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -230,6 +231,20 @@ def test_what_is_held_open_has_one_budget_of_memory_and_time_for_each_call(serve
         held.call("spin", **may)
     with pytest.raises(BadFile, match="cut off before"):
         held.call("add", np.ones(5), **may)
+
+
+def test_what_is_forgotten_lets_go_of_its_process(served):
+    """Also in a ring of garbage, whose parts are closed in any order."""
+    ring = [Held("held", served, [2.0], 50 * MB)]
+    process = ring[0].process.child.pid
+    ring.append(ring)
+    del ring
+    gc.collect()
+    again = Held("held", served, [3.0], 50 * MB)
+    assert again.process.child.pid == process
+    assert again.call("add", np.ones(5), seconds=0.3, memory=50 * MB) == 8.0
+    again.close()
+    gate.end_all()
 
 
 def test_the_structures_of_windows_have_its_sizes():
