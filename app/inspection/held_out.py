@@ -35,6 +35,11 @@ def held_out_error(
         raise UsageError("--capture is of one model; a scene file has none of its own.")
     provenance = document.models[0].provenance
     capture = with_extrinsics(capture, rig_of(provenance))
+    if measured.parts:
+        raise UsageError(
+            f"'{measured.stop.name}' is by formula and has no photos; its stops have: --stop "
+            f"{measured.parts[0][1].stop.name}."
+        )
     photos = capture.of(measured.stop.name, "test")
     if not photos:
         raise BadFile(

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import shown
-from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.scene.captures.capture import Photo
@@ -23,6 +23,7 @@ PERCENTILES = (0.1, 99.9)  # between which the range begins; a dead pixel is bey
 GREY_STEPS = 2  # of 255: JPEG makes of a grey saved in three channels no more
 BYTES = (0.0, 255.0)  # of photos of 8 bits, whose counts are all that is known
 LARGEST = 1e9  # of a value that anybody measures
+FEW, SHARE = 10, 1e-4  # of the numbers looked at: so many alike may stand for no value
 MARGIN = 0.05  # of what lies between, added at each end: the hottest spot is not cut off
 
 
@@ -56,7 +57,11 @@ def with_own_ranges(
         if not kind or (kind == "counts" and stop.value_range is not None):
             out.append(stop)
             continue
-        ends = stop.value_range or _own_range(mine)
+        ends = stop.value_range
+        if ends is None:
+            every = _some_values(mine)
+            ends = _own_range(every, mine[0].path)
+            doubts += untold_no_data(stop.name, every)
         gaps = {"may_lack_values": True} if kind == "radiometric" else {}
         photos = [replace(p, counts=ends, **gaps) if p.modality == stop.name else p for p in photos]
         unit = stop.unit or ("°C" if kind == "radiometric" else "")
@@ -84,14 +89,14 @@ def refuse_colors(photo: Photo) -> None:
     pixels = np.asarray(image.convert("RGB"))
     if np.ptp(pixels, axis=2).max(initial=0) > GREY_STEPS:
         raise BadFile(
-            f"{path_end(photo.path)}: a photo of colours in {shown(photo.modality)}, which is of "
+            f"{photo.path}: a photo of colours in {shown(photo.modality)}, which is of "
             "kind values; photos of one number a pixel are wanted, or say with 'band' which of "
             "its channels counts"
         )
 
 
-def _own_range(photos: list[Photo]) -> tuple[float, float]:
-    """What some of the photos hold.  Raises BadFile."""
+def _some_values(photos: list[Photo]) -> np.ndarray:
+    """(N,) what some of the photos of a modality hold.  Raises BadFile where none has a value."""
     step = -(-len(photos) // LOOKED_AT)
     some, others = photos[::step], [p for i, p in enumerate(photos) if i % step]
     every = np.concatenate([_sample(photo) for photo in some])
@@ -102,11 +107,35 @@ def _own_range(photos: list[Photo]) -> tuple[float, float]:
             f"{photos[0].path}: no pixel of it has a value, nor of the {len(photos)} photos of "
             f"{photos[0].modality} (NaN, or what stands for no data); copy them again"
         )
+    return every
+
+
+def untold_no_data(name: str, values: np.ndarray) -> list[str]:
+    """A sentence where many of the values (N,) of a modality are one number far from all others, as
+    programs write for no data; nothing else tells it from a value.
+    """
+    for end in (values.min(), values.max()):
+        alone = values == end
+        others = values[~alone]
+        if not alone.sum() >= max(FEW, SHARE * len(values)) or not len(others):
+            continue
+        low, high = float(others.min()), float(others.max())
+        if min(abs(end - low), abs(end - high)) > high - low > 0:
+            return [
+                f"{name}: {alone.mean():.2%} of the numbers are {end:g}, far from all others "
+                f"({low:g} to {high:g}); if that stands for no value, say 'no_data': {end:g} of "
+                "the modality in capture.json (docs/capture.md)."
+            ]
+    return []
+
+
+def _own_range(every: np.ndarray, path: Path) -> tuple[float, float]:
+    """Of values (N,), the first of which lie in a photo.  Raises BadFile."""
     low, high = np.percentile(every.astype(np.float64), PERCENTILES)
     if not max(abs(low), abs(high)) <= LARGEST:
         end, way = (low, "down") if abs(low) > abs(high) else (high, "up")
         raise BadFile(
-            f"{photos[0].path}: numbers {way} to {end:.3g}; say with 'value_range' what counts, or "
+            f"{path}: numbers {way} to {end:.3g}; say with 'value_range' what counts, or "
             f"with 'no_data' that {end:.3g} is no value"
         )
     more = MARGIN * (high - low) or 0.5

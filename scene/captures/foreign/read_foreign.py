@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.files.plain_text import name_line, path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.foreign.foreign_frames import PhotoIndex
 from shapeshift.scene.captures.foreign.known_programs import Program, program_of
@@ -146,11 +146,8 @@ def said_of(others: Sequence[tuple[Path, Form]]) -> tuple[str, ...]:
     """That there are more of them."""
     if not others:
         return ()
-    listed = ", ".join(f"{path_end(path)} ({form.program})" for path, form in others[:3])
-    return (
-        f"{len(others)} other files of poses lie there, for example {listed}; the newest is used, "
-        "name another to use that.",
-    )
+    listed = ", ".join(f"{name_line(path.name)} ({form.program})" for path, form in others[:3])
+    return (f"Beside it lie {listed}; the newest is used, name another file to use that.",)
 
 
 def photos_of(path: Path) -> PhotoIndex:

@@ -9,10 +9,11 @@ import numpy as np
 from shapeshift.runtime_models.gate.refusal import Unreadable
 
 
-def flir_numbers(path: str) -> dict:
+def flir_numbers(path: str, low: float, high: float) -> dict:
     """{"celsius": (H, W) float32 °C as the camera was set, "settings": to what, by flyr's names}.
 
-    Raises Unreadable.
+    low, high: kelvins where the camera's numbers end, see saturation_kelvin; at and beyond them,
+    of a black body without air before it, it measured nothing: NaN.  Raises Unreadable.
     """
     import flyr
 
@@ -20,6 +21,12 @@ def flir_numbers(path: str) -> dict:
         opened = flyr.unpack(io.BytesIO(Path(path).read_bytes()))
         with np.errstate(all="ignore"):  # of a camera set to nonsense: NaN stays
             celsius = np.asarray(opened.celsius, np.float32)
+            if high < math.inf:
+                apparent = opened.adjust_metadata(
+                    emissivity=1.0, object_distance=0.0, ir_window_transmission=1.0
+                ).kelvin
+                measured = (apparent > low) & (apparent < high)
+                celsius = np.where(measured, celsius, np.float32(np.nan))
         told = dict(opened.metadata)
     except MemoryError:
         raise

@@ -8,6 +8,7 @@ behind the gate, flir_run.py.
 
 import math
 import re
+import struct
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -35,6 +36,9 @@ NO_NUMBER = frozenset(
 )
 HEAD_LINES = 20  # of words that programs write before a grid
 FLIR = re.compile(rb"\xff\xe1..FLIR\x00", re.DOTALL)  # where such a segment begins
+# Of FLIR's segments and of the directory in them; ExifTool documents both.
+FLIR_HEAD, MOST_RECORDS, CAMERA_INFO = 8, 256, 32
+SATURATED = 168  # bytes into the record of the camera: its largest temperature, then its smallest
 LOOKED_AT = 1 << 16  # bytes of a JPEG: the first segment begins before
 PNG_SIZE = re.compile(rb"\x89PNG\r\n\x1a\n....IHDR(....)(....)", re.DOTALL)
 ASPECT = 0.02  # by how much the numbers may be wider or narrower than their picture
@@ -185,5 +189,29 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
         raise BadFile(f"{where}: more numbers than a thermal camera has; copy it again")
     most = max([len(data) // 2, *(width * height for width, height in sides)])
     Memory().of(path).charge(RAW * most, f"{most:,} numbers")
-    found = ask("thermal photo", path, [str(path.absolute())])
+    low, high = saturation_kelvin(data)
+    found = ask("thermal photo", path, [str(path.absolute()), low, high])
     return found["celsius"], found["settings"]
+
+
+def saturation_kelvin(jpeg: bytes) -> tuple[float, float]:
+    """Where a FLIR camera's numbers end, as its JPEG states; all temperatures where it does not.
+
+    ExifTool's CameraTemperatureMinSaturated and CameraTemperatureMaxSaturated.
+    """
+    nothing, held, start = (-math.inf, math.inf), b"", 2
+    while jpeg[start : start + 1] == b"\xff" and jpeg[start + 1 : start + 2] == b"\xe1":
+        end = start + 2 + int.from_bytes(jpeg[start + 2 : start + 4], "big")
+        segment, start = jpeg[start + 4 : end], max(end, start + 4)
+        held += segment[FLIR_HEAD:] if segment.startswith(b"FLIR\0") else b""
+    try:
+        first, count = struct.unpack_from(">II", held, 24)
+        for number in range(min(count, MOST_RECORDS)):
+            kind, _, _, _, at = struct.unpack_from(">HHIII", held, first + 32 * number)
+            if kind == CAMERA_INFO:
+                order = ">" if held[at : at + 2] == b"\0\2" else "<"
+                high, low = struct.unpack_from(f"{order}ff", held, at + SATURATED)
+                return (low, high) if 0 < low < high < math.inf else nothing
+    except struct.error:
+        pass
+    return nothing

@@ -15,7 +15,6 @@ from PIL import Image
 from PIL.TiffImagePlugin import TiffImageFile
 
 from shapeshift.runtime_models.files.memory import Memory
-from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.pictures.rare_photo import is_rare, rare_photo
 from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
@@ -99,7 +98,7 @@ def read_pages(path: Path) -> tuple[str, list[Page]]:
 
     Raises BadFile.
     """
-    where, size, pages = path_end(path), path.stat().st_size, []
+    where, size, pages = str(path), path.stat().st_size, []
     with path.open("rb") as file:
         head = file.read(16)
         order, big = "<" if head[:2] == b"II" else ">", head[2:4] in (b"+\0", b"\0+")
@@ -152,12 +151,12 @@ def bands_of(path: Path, pages: list[Page]) -> list[tuple[Page, int]]:
         if page.size != first.size:
             one, other = ("{}x{}".format(*each.size) for each in (first, page))
             raise BadFile(
-                f"{path_end(path)}: bands of {one} and of {other} pixels; those of one file must "
+                f"{path}: bands of {one} and of {other} pixels; those of one file must "
                 "have one size: save them apart, or resample them"
             )
         found += [(page, sample) for sample in range(page.samples)]
         if len(found) > MOST_BANDS:
-            raise BadFile(f"{path_end(path)}: more than {MOST_BANDS:,} bands; save fewer")
+            raise BadFile(f"{path}: more than {MOST_BANDS:,} bands; save fewer")
     return found
 
 
@@ -180,7 +179,7 @@ def band_header(path: Path) -> Image.Image | None:
 
 def open_band(path: Path, band: int) -> Image.Image:
     """One band, counted from 1, with its pixels: of mode L, I;16, I or F.  Raises BadFile."""
-    where = path_end(path)
+    where = str(path)
     if is_tiff(path):
         order, pages = read_pages(path)
         found = bands_of(path, pages)
@@ -211,7 +210,7 @@ def refuse_band(where: str, band: int, bands: int) -> None:
 
 def _opened(path: Path, order: str, page: Page, sample: int, band: int) -> Image.Image:
     """The band by Pillow's decoders, through a header of its own behind the file's bytes."""
-    where, size = path_end(path), path.stat().st_size
+    where, size = str(path), path.stat().st_size
     if size > MOST_BYTES:
         raise BadFile(f"{where}: {size:,} bytes; at most {MOST_BYTES:,} are read of a TIFF's bands")
     if page.beside and len(set(page.tags.get(BITS, (1,)))) > 1:

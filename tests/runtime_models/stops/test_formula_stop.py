@@ -7,9 +7,7 @@ import pytest
 
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Stop
-from shapeshift.runtime_models.package.feature_codes import decode_features, encode_features
 from shapeshift.runtime_models.package.read_package import read_package
-from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stops.formula_stop import (
     LUMINANCE,
@@ -17,26 +15,10 @@ from shapeshift.runtime_models.stops.formula_stop import (
     with_placed_formulas,
 )
 from shapeshift.runtime_models.stops.remove_stop import remove_stop
-from tests.support.models import make_random_model
-from tests.support.new_stops import framed_model
+from tests.support.band_model import EYES, band_model
 
-EYES = [[2.0, 1.0, 0.5], [-1.0, 2.0, 3.0]]
 EYE = np.array([3.0, 1.0, 2.0])
-BANDS = (
-    Stop("Red", 0.0, "values", "gray", (0.0, 1.0), ""),
-    Stop("NIR", 0.5, "values", "gray", (0.1, 2.1), ""),
-    Stop("RGB", 1.0),
-)
 NDVI = Stop("NDVI", 0.0, "values", "turbo", (-1.0, 1.0), "", "", "(nir - red) / (NIR + red)")
-
-
-def model_of(kind: str = "float16", framed: bool = False) -> AnchorModel:
-    """A random model of three stops; framed: with anchors' own frames, as training makes them."""
-    encoding = encoding_for([stop.x for stop in BANDS])
-    model = framed_model(150) if framed else make_random_model(150, k=3, seed=1, encoding=encoding)
-    coded = encode_features(model.features, kind)
-    features = decode_features(coded["features"], coded.get("feature_range"), "")
-    return replace(model, stops=BANDS, features=features, provenance={"eyes": EYES}, pace=())
 
 
 def x_of(model: AnchorModel, name: str) -> float:
@@ -58,7 +40,7 @@ def index_of(model: AnchorModel) -> np.ndarray:
 @pytest.mark.parametrize(("kind", "bound"), [("float32", 2e-5), ("float16", 4e-4), ("uint8", 4e-5)])
 def test_splats_have_the_index_and_other_stops_what_they_had(tmp_path, kind, bound, framed):
     """A half has 11 bits: 2.4e-4 of a share below 1, less behind a sigmoid; two bytes have 16."""
-    model, path = model_of(kind, framed), tmp_path / "a.shift"
+    model, path = band_model(kind, framed), tmp_path / "a.shift"
     write_package(with_formula_stop(model, NDVI, "Red"), path, "exact")
     made, wanted = read_package(path), index_of(model)
     assert [stop.name for stop in made.stops] == ["Red", "NDVI", "NIR", "RGB"]
@@ -85,7 +67,7 @@ def test_splats_have_the_index_and_other_stops_what_they_had(tmp_path, kind, bou
 
 
 def test_the_usual_range_holds_nearly_all_values_in_round_numbers():
-    model = model_of()
+    model = band_model()
     made = with_formula_stop(model, replace(NDVI, value_range=None, palette=""))
     low, high = made.stops[-1].value_range
     wanted = index_of(model)
@@ -96,7 +78,7 @@ def test_the_usual_range_holds_nearly_all_values_in_round_numbers():
 
 
 def test_stops_by_formula_stand_where_a_capture_says():
-    model = model_of()
+    model = band_model()
     half = Stop("Half", 0.25, "values", "gray", (0.0, 1.0), "", "", "nir / 2")
     made = with_placed_formulas(model, (half, replace(NDVI, x=0.9)))
     places = [(stop.name, stop.x) for stop in made.stops]
@@ -109,7 +91,7 @@ def test_stops_by_formula_stand_where_a_capture_says():
 
 
 def test_it_goes_out_again_and_keeps_its_stops():
-    model = model_of()
+    model = band_model()
     made = with_formula_stop(model, NDVI)
     with pytest.raises(BadFile, match="'NDVI' is by formula of 'NIR'"):
         remove_stop(made, "NIR")
@@ -122,7 +104,7 @@ def test_it_goes_out_again_and_keeps_its_stops():
 
 
 def test_what_cannot_be_a_formula_stop():
-    model = model_of()
+    model = band_model()
     for stop, words in (
         (replace(NDVI, formula="x / red"), "no stop 'x'"),
         (replace(NDVI, formula="rgb"), "no values in a range"),

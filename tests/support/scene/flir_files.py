@@ -24,11 +24,15 @@ def raw_counts(celsius: np.ndarray) -> np.ndarray:
     return np.rint(R1 / (R2 * (np.exp(B / kelvin) - F)) - O).astype(np.uint16)
 
 
-def camera_record() -> bytes:
-    """Emissivity 1 at no distance: temperatures are those of the surface."""
+def camera_record(saturated: tuple[float, float] | None = None, emissivity: float = 1) -> bytes:
+    """At no distance; of emissivity 1 temperatures are those of the surface.  saturated: °C, where
+    the camera's numbers end.
+    """
     out = bytearray(1000)
+    if saturated is not None:
+        struct.pack_into("<ff", out, 168, saturated[1] + KELVIN, saturated[0] + KELVIN)
     for offset, value in (
-        (32, 1.0), (36, 0.0), (40, 293.15), (44, 293.15), (48, 293.15), (52, 1.0), (60, 0.5),
+        (32, emissivity), (36, 0.0), (40, 293.15), (44, 293.15), (48, 293.15), (52, 1.0), (60, 0.5),
         (88, R1), (92, B), (96, F), (112, 0.006569), (116, 0.01262), (120, -0.002276),
         (124, -0.00667), (128, 1.9), (780, R2),
     ):  # fmt: skip
@@ -47,9 +51,12 @@ def raw_record(counts: np.ndarray, png: bool) -> bytes:
     return head + held.getvalue()
 
 
-def write_flir(path: Path, celsius: np.ndarray, size: tuple[int, int], png: bool = False) -> Path:
+def write_flir(
+    path: Path, celsius: np.ndarray, size: tuple[int, int], png: bool = False,
+    camera: bytes | None = None,
+) -> Path:  # fmt: skip
     """A picture of `size` (W, H) in false colours with the numbers (H, W) in it."""
-    records = {RAW: raw_record(raw_counts(celsius), png), CAMERA: camera_record()}
+    records = {RAW: raw_record(raw_counts(celsius), png), CAMERA: camera or camera_record()}
     directory, body, start = b"", b"", 0x40 + 32 * 6
     for kind, record in records.items():
         entry = struct.pack(">HHIIII", kind, 1, 100, 1, start + len(body), len(record))

@@ -75,7 +75,7 @@ def test_the_newest_of_two_is_used_and_the_other_named(photos):
         os.utime(last, (2_000_000, 2_000_000))
         capture = read_capture(photos)
         assert f"The poses are those of {program}" in said(capture)
-        assert f"1 other files of poses lie there, for example {first}" in said(capture)
+        assert f"Beside it lie {first.name} (" in said(capture)
 
 
 def test_photos_without_pose_and_missing_photos_are_counted(photos):

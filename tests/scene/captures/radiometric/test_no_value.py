@@ -10,6 +10,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.photo import numbers_of
 from shapeshift.scene.captures.radiometric.no_value import filled, resized_numbers
 from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.value_ranges import untold_no_data
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.photo_store.open_photos import PhotoRoom, open_photos
 from shapeshift.training.photos import read
@@ -228,3 +229,18 @@ def test_numbers_in_another_size_lose_no_neighbour():
     far = np.indices(ours.shape).sum(axis=0) > 15
     np.testing.assert_array_equal(ours[far], whole[far])
     assert 20 <= np.nanmin(ours) and np.nanmax(ours) < 100
+
+
+@pytest.mark.parametrize(
+    "end, count, asked",
+    [(-9999, 10, True), (-9999, 9, False), (65535, 300, True), (0, 10, False), (-61, 10, True),
+     (-59, 10, False), (180, 10, True), (178, 10, False)],
+)  # fmt: skip
+def test_a_number_far_from_all_others_is_asked_about(end, count, asked):
+    """The others are 20 to 99: what is 79 and less away from them may be one of them."""
+    values = np.concatenate([np.linspace(20, 99, 5000), np.full(count, end)]).astype(np.float32)
+    said = untold_no_data("Heat", values)
+    assert len(said) == asked
+    if asked:
+        assert f"say 'no_data': {end:g} of" in said[0] and "(20 to 99)" in said[0]
+    assert not untold_no_data("Heat", np.full(50, end)) and not untold_no_data("Heat", values[:50])

@@ -13,11 +13,12 @@ from shapeshift.scene.captures.radiometric.number_photos import (
     is_radiometric,
     open_grid,
     radiometric_celsius,
+    saturation_kelvin,
 )
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
 from tests.support.scene.captures import simple, write_transforms
-from tests.support.scene.flir_files import write_flir
+from tests.support.scene.flir_files import camera_record, write_flir
 
 RAMP = np.linspace(20.0, 80.0, 12 * 16).reshape(12, 16)
 
@@ -165,3 +166,30 @@ def test_an_npy_that_is_no_grid_is_refused(tmp_path, values):
     assert "PNG" not in str(refused.value)  # its own sentence, not that of a picture
     with pytest.raises(BadFile, match="missing"):
         open_image(tmp_path / "b.npy")
+
+
+def test_what_a_flir_camera_calls_saturated_is_no_value(tmp_path):
+    """Its limits are of black bodies, whatever emissivity it is set to: at 0.5 the surface is
+    hotter than what saturates.  A limit belongs to what is beyond, the float next to it does not.
+    """
+    celsius = np.linspace(-40, 160, 192, dtype=np.float32).reshape(12, 16)
+    for emissivity in (1.0, 0.5):
+        camera = camera_record((-20, 120), emissivity)
+        path = write_flir(tmp_path / "a.jpg", celsius, (16, 12), camera=camera)
+        found = radiometric_celsius(path, (16, 12))
+        away = np.minimum(np.abs(celsius - 120), np.abs(celsius + 20)) > 0.1  # but for a count
+        away &= (emissivity == 1) | (celsius > 20)  # below what it mirrors no surface is known
+        inside = (celsius > -20) & (celsius < 120)
+        np.testing.assert_array_equal(np.isfinite(found)[away], inside[away])
+    assert np.nanmax(found) > 150
+    plain = write_flir(tmp_path / "b.jpg", celsius, (16, 12))
+    np.testing.assert_allclose(radiometric_celsius(plain, (16, 12)), celsius, atol=0.1)
+    assert saturation_kelvin(plain.read_bytes()) == (-np.inf, np.inf)
+    low, high = saturation_kelvin(path.read_bytes())
+    assert (low, high) == (pytest.approx(253.15), pytest.approx(393.15))
+    for wrong in [(-20, np.nan), (np.nan, 120), (120, -20), (50, 50), (-300, 120), (0, np.inf)]:
+        path = write_flir(tmp_path / "c.jpg", celsius, (16, 12), camera=camera_record(wrong))
+        assert saturation_kelvin(path.read_bytes()) == (-np.inf, np.inf)
+    whole = path.read_bytes()
+    for end in range(0, len(whole), 97):  # cut anywhere: nothing stated, and no fault
+        assert saturation_kelvin(whole[:end]) == (-np.inf, np.inf)
