@@ -59,7 +59,7 @@ def is_strange(name: str) -> bool:
 
 def alike_named(folder: Path, parts: Sequence[str], endings: Sequence[str]) -> Path | None:
     """A file below `folder` whose name is the same but for capitals and composed letters."""
-    if ".." in parts or not folder.is_dir():
+    if not parts or ".." in parts or not folder.is_dir():  # none of the name "."
         return None
     for part in parts[:-1]:
         name = entries_of(folder, folder.stat().st_mtime_ns).get(folded(part))
