@@ -11,6 +11,7 @@ from shapeshift.runtime_models.blocks.block_model import FORMAT as BLOCKS_FORMAT
 from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.blocks.read_blocks import LIST as BLOCK_LIST
 from shapeshift.runtime_models.blocks.read_blocks import has_block_list, read_blocks
+from shapeshift.runtime_models.checkpoint.read_png_folder import is_png_folder
 from shapeshift.runtime_models.files.memory import refuse_empty
 from shapeshift.runtime_models.files.zip_files import member_names
 from shapeshift.runtime_models.lod.level_files import (
@@ -49,8 +50,11 @@ from shapeshift.runtime_models.splats.operations.decimate import within_most_spl
 from shapeshift.runtime_models.splats.operations.prune_by_importance import left_whole
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.read_output_folder import (
+    CLOUD,
     in_run,
+    newest_checkpoints,
     newest_cloud,
+    read_checkpoints,
     read_file,
     read_pair,
     thermal_pair,
@@ -123,8 +127,13 @@ def read_whole(path: Path, reading: Reading) -> Model:
             return read_scaffold(path, reading)
         if (pair := thermal_pair(path)) is not None:
             return read_pair(pair, path, reading)
+        if checkpoints := newest_checkpoints(path):
+            return read_checkpoints(checkpoints, path, reading)
         if (cloud := newest_cloud(path)) is not None:
-            return in_run(read_model(cloud.parent, reading), path, cloud)
+            whole = cloud.parent if cloud.name == CLOUD else cloud
+            return in_run(read_model(whole, reading), path, cloud)
+        if is_png_folder(path):
+            return read_file(path, reading)
         layers = layer_files(path)
         if not layers:
             raise BadFile(nothing_to_show(path))

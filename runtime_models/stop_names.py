@@ -20,6 +20,7 @@ LIGHT_WORDS = {
     "zoom", "eo",
 }  # fmt: skip
 LETTERS = re.compile(r"[^\W\d_]+")
+DIGITS = re.compile(r"\d+")
 NEAR = re.compile(r"near[\W_]*infra[\W_]*red", re.IGNORECASE)  # light: a lamp's, no heat
 # The words of "thermalCam", "leftIR" and "IRcam".
 CAMEL = re.compile(r"(?:LW|MW|T)?IR(?![A-Z])|RGB(?![A-Z])|[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -44,7 +45,13 @@ def is_thermal_word(word: str) -> bool:
 
 def sort_of_name(name: str) -> str:
     """The kind "thermal" or "rgb" that a name says, by its words; "": neither, or both."""
-    words = words_of(name)
+    return _sort_of_shape(DIGITS.sub("0", name))
+
+
+@lru_cache(maxsize=4096)
+def _sort_of_shape(shape: str) -> str:
+    """Of a name whose numbers are all 0: thousands of photos have one."""
+    words = words_of(shape)
     thermal, light = any(map(is_thermal_word, words)), not LIGHT_WORDS.isdisjoint(words)
     thermal |= light and "t" in words  # "RGB-T"
     return "" if thermal == light else "thermal" if thermal else "rgb"

@@ -53,12 +53,13 @@ def find_file(folder: Path, name: str, endings: Sequence[str] = ENDINGS) -> Name
 
 def is_strange(name: str) -> bool:
     """Whether a name begins at another machine's root, or goes up."""
-    return name.startswith("/") or ".." in parts_of(name) or bool(DRIVE.match(name))
+    up = ".." in name and ".." in parts_of(name)
+    return name.startswith("/") or up or bool(DRIVE.match(name))
 
 
 def alike_named(folder: Path, parts: Sequence[str], endings: Sequence[str]) -> Path | None:
     """A file below `folder` whose name is the same but for capitals and composed letters."""
-    if ".." in parts or not folder.is_dir():
+    if not parts or ".." in parts or not folder.is_dir():  # none of the name "."
         return None
     for part in parts[:-1]:
         name = entries_of(folder, folder.stat().st_mtime_ns).get(folded(part))
@@ -118,7 +119,9 @@ def photo_key(name: str) -> str:
 
 def parts_of(name: str) -> list[str]:
     """Of a path as Windows or others write it, without its root."""
-    windows = "\\" in name and ("/" not in name or DRIVE.match(name))
+    if "\\" not in name:
+        return [part for part in name.split("/") if part not in ("", ".")] or [name]
+    windows = "/" not in name or DRIVE.match(name)
     path = PureWindowsPath(name) if windows else PurePosixPath(name.replace("\\", "/"))
     return [part for part in path.parts if part != path.anchor] or [name]
 

@@ -59,7 +59,13 @@ def run(options: Options) -> int:
 def write(options: Options, out: Path, cameras: "CameraList") -> None:
     """Writes the views in the wished form, beside what is there, never over the input."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.scene.cameras.write_cameras import paths_of, stale_paths, write_cameras
+    from shapeshift.scene.cameras.write_cameras import (
+        COLMAP_FORMS,
+        paths_of,
+        stale_paths,
+        write_cameras,
+    )
+    from shapeshift.scene.captures.colmap_tables import find_model
 
     form = options.to or ("ours" if out.suffix else "colmap-bin")
     stale = stale_paths(out, form)
@@ -75,6 +81,11 @@ def write(options: Options, out: Path, cameras: "CameraList") -> None:
             "--out, or add --overwrite to remove it."
         )
     written = write_cameras(cameras, out, form)
+    if form in COLMAP_FORMS and (found := find_model(out)) and found[0] != written[0].parent:
+        say(
+            f"{full(found[0])} has more images: who names {out.name} reads that; remove it, or "
+            f"name {out.name}/sparse/0."
+        )
     if stale:
         say(f"Removed, as of an older model: {', '.join(path.name for path in stale)}.")
     count = len(cameras.views)

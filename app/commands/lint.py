@@ -51,7 +51,7 @@ def examine(options: Options) -> dict:
 
     with progress_after(PATIENCE_S) as progress:
         model = read_model(options.scene, replace(options.reading(), progress=progress))
-        moves = uneven(model, options.scene.name)
+        moves = (*uneven(model, options.scene.name), *for_others(model, options.scene.name))
     facts = describe(model, options.scene)
     splats = splats_of(model)
     sample = sample_of(splats.means, splats.scales, splats.opacity)
@@ -68,6 +68,14 @@ def examine(options: Options) -> dict:
         "splats_over_a_pixel": round(fill_ratio(sample), 2),
         "findings": [asdict(finding) for finding in (*model.findings, *moves)],
     }
+
+
+def for_others(model, file: str) -> tuple:
+    """What other programs would make of plain splats that are right here."""
+    from shapeshift.runtime_models.lint.lint_readers import other_readers
+    from shapeshift.runtime_models.model import SplatLayers
+
+    return other_readers(model, file) if isinstance(model, SplatLayers) else ()
 
 
 def uneven(model, file: str) -> tuple:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shapeshift.decomposition.poses.pose_report import PoseReport
 
 FRAMES = "frames"  # of a video, below --out, as long as the search is not done
-OURS = {"images", "masks", "sparse", "poses.json", "poses.work", FRAMES}
+OURS = {"images", "masks", "sparse", "poses.json", "capture.json", "poses.work", FRAMES}
 MOST_NAMED = 10  # photos in a sentence
 
 
@@ -28,9 +28,11 @@ class Options:
     """Find where photos were taken from: structure from motion, upright, into a COLMAP folder."""
 
     photos: Annotated[Path, POSITIONAL]
-    """A folder of photos (sub-folders are modalities), or a video."""
+    """A folder of photos, or a video.  Photos of heat (docs/capture.md, "What a photo shows") get
+    the poses of those of light that were taken with them: by name, number or time of exposure."""
     out: Path
-    """The folder that gets images/, sparse/0 and poses.json."""
+    """The folder that gets images/, sparse/0, poses.json and, of several modalities,
+    capture.json."""
     masks: Path | None = None
     """A folder of masks, NAME.jpg.png or NAME.png, as large as the photos; white counts.  Default:
     no masks."""

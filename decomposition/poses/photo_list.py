@@ -1,25 +1,25 @@
 """The photos that poses are found for: which files, which of one camera, which come in pairs."""
 
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from shapeshift.runtime_models.files.plain_text import path_end
-from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.stop_names import is_thermal_name
+from shapeshift.decomposition.poses.pairs import PhotoFile, camera_letter, find_pairs
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.stop_names import sort_of_name
+from shapeshift.scene.captures.capture_rules import stops_from
+from shapeshift.scene.captures.modalities.frame_modalities import said_beside
+from shapeshift.scene.captures.modalities.photo_modality import HEAT, modalities_of
+from shapeshift.scene.captures.modalities.said_modalities import said_modality_of
+from shapeshift.scene.captures.modalities.two_sorts import Opened, refuse_two_sorts
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_capture import PICTURES, has_poses
 
+TIFFS = {".tif", ".tiff"}  # of heat alone: what else is a TIFF is the twin of a JPEG as a rule
 FEWEST = 3  # photos; two give a pair, and no third that says whether it is right
 ORIENTATION = 0x0112  # of EXIF: which side of the photo was up
 ALIKE = 16  # pixels a side of the thumbnails by which copies of one photo are found
-
-
-@dataclass(frozen=True)
-class PhotoFile:
-    name: str  # path below the folder of photos, with /
-    size: tuple[int, int]  # width, height in pixels, as stored
-    orientation: int  # EXIF, 1 to 8
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,17 @@ class PhotoList:
     root: Path
     photos: tuple[PhotoFile, ...]
     paired: dict[PhotoFile, str]  # a thermal photo -> the name of the photo taken with it
+    stops: tuple[Stop, ...] = ()
+    stop_of: tuple[tuple[str, str], ...] = ()  # name of a photo, name of its stop
+    said: tuple[dict, ...] = ()  # 'modalities' of the capture.json that lay with them
 
     @property
     def groups(self) -> list[list[str]]:
-        """Names by camera: photos of one folder and one size."""
+        """Names by camera: photos of one folder, of one size and with one of a drone's letters."""
         found: dict[tuple, list[str]] = defaultdict(list)
         for photo in self.photos:
-            found[Path(photo.name).parent, photo.size].append(photo.name)
+            about = Path(photo.name).parent, photo.size, camera_letter(photo.name)
+            found[about].append(photo.name)
         return list(found.values())
 
 
@@ -47,14 +51,19 @@ def list_photos(root: Path, every: int = 1) -> PhotoList:
         raise BadFile(f"{root} {found}; give a folder of photos, or a video.")
     if has_poses(root):
         raise BadFile(f"{root} has poses already; give it to train.")
-    paths = sorted(p for p in root.rglob("*") if p.suffix.lower() in PICTURES and p.is_file())
+    above = root
+    paths = sorted(path for path in root.rglob("*") if is_taken(path, root) and path.is_file())
     if len({path.parent for path in paths}) == 1:
         root = paths[0].parent  # one folder, however deep: its name says nothing
     folders: dict[Path, list[Path]] = defaultdict(list)
     for path in paths:
         folders[path.parent].append(path)
     chosen = [read_photo(path, root) for group in folders.values() for path in group[::every]]
-    paired = find_pairs(chosen)
+    stops, of, said = stops_of_photos(chosen, root, above)
+    hot = {stop.name for stop in stops if stop.kind == HEAT}
+    heat = [photo for photo, stop in zip(chosen, of, strict=True) if stop in hot]
+    light = [photo for photo, stop in zip(chosen, of, strict=True) if stop not in hot]
+    paired = find_pairs(root, heat, light)
     photos = tuple(photo for photo in chosen if photo not in paired)
     if len(photos) < FEWEST:
         raise BadFile(
@@ -62,7 +71,8 @@ def list_photos(root: Path, every: int = 1) -> PhotoList:
             f"at least {FEWEST} that overlap are needed, better 30."
         )
     refuse_copies(root, photos)
-    return PhotoList(root, photos, paired)
+    names = [photo.name for photo in chosen]
+    return PhotoList(root, photos, paired, stops, tuple(zip(names, of, strict=True)), said)
 
 
 def read_photo(path: Path, root: Path) -> PhotoFile:
@@ -71,28 +81,41 @@ def read_photo(path: Path, root: Path) -> PhotoFile:
             orientation = int(image.getexif().get(ORIENTATION, 1))
         except (ValueError, TypeError, OSError, SyntaxError):  # damaged EXIF is none
             orientation = 1
-        return PhotoFile(path.relative_to(root).as_posix(), image.size, orientation)
+        return PhotoFile(path.relative_to(root).as_posix(), image.size, orientation, image.mode)
 
 
-def find_pairs(photos: list[PhotoFile]) -> dict[PhotoFile, str]:
-    """Thermal photos that have one of visible light of the same name in another folder.
+def is_taken(path: Path, root: Path) -> bool:
+    """Whether a file is a photo for poses: a picture, or a TIFF of heat without a picture of it."""
+    if path.suffix.lower() in PICTURES:
+        return True
+    name = path.relative_to(root).as_posix()
+    hot = sort_of_name(name) == HEAT or camera_letter(name) == "T"
+    twins = [path.with_suffix(e) for ending in PICTURES for e in (ending, ending.upper())]
+    return path.suffix.lower() in TIFFS and hot and not any(twin.is_file() for twin in twins)
 
-    Heat has too few features to find poses by; a rig's second camera has those of the first.
+
+def stops_of_photos(
+    photos: Sequence[PhotoFile], root: Path, above: Path
+) -> tuple[tuple[Stop, ...], list[str], tuple[dict, ...]]:
+    """Stops, of each photo the name of its stop, and the entries of a capture.json that says so,
+    which lies in `root` or in the folder that was given.  Raises BadFile.
     """
-    folder = {photo: Path(photo.name).parent for photo in photos}
-    visible: dict[str, str] = {}
-    for photo in photos:
-        if not is_thermal_name(str(folder[photo])):
-            visible.setdefault(Path(photo.name).stem, photo.name)
-    thermal = [photo for photo in photos if is_thermal_name(str(folder[photo]))]
-    found = {p: visible[Path(p.name).stem] for p in thermal if Path(p.name).stem in visible}
-    alone = [photo for photo in thermal if photo not in found]
-    if visible and alone:
-        raise BadFile(
-            f"{len(alone)} thermal photos, for example {path_end(alone[0].name)}, have no photo "
-            "of visible light with the same name; name the two of a pair alike, or leave them out."
-        )
-    return found
+    names = [photo.name for photo in photos]
+    folder = root if (root / "capture.json").is_file() else above
+    if said := said_beside(folder).get("modalities"):
+        where = f"{folder}/capture.json"
+        stops = stops_from(said, where)
+
+        def cameras_of(row: int) -> set[str]:
+            return {"{}x{}".format(*photos[row].size)}
+
+        of = said_modality_of(said, stops, names, where, cameras_of)
+        return tuple(sorted(stops, key=lambda stop: stop.x)), of, tuple(said)
+    stops, of = modalities_of(names, root)
+    rows = zip(photos, of, strict=True)
+    opened = [Opened(photo.name, stop, photo.mode, photo.size) for photo, stop in rows]
+    refuse_two_sorts(opened, stops, root)
+    return stops, of, ()
 
 
 def refuse_copies(root: Path, photos: tuple[PhotoFile, ...]) -> None:

@@ -12,8 +12,11 @@ from pathlib import Path
 from shapeshift.decomposition.poses.photo_list import PhotoList
 from shapeshift.decomposition.poses.pose_report import PoseReport
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
+from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.scene.cameras.write_colmap_cameras import camera_bytes, image_bytes
+from shapeshift.scene.captures.capture_rules import is_grey
 from shapeshift.scene.captures.colmap_tables import COUNT, ColmapCamera, Posed, read_tables
+from shapeshift.scene.captures.modalities.said_modalities import CHOICES, Group, entries_of
 
 REPORT = "poses.json"
 PAIRED_LENS = "SIMPLE_PINHOLE"
@@ -47,10 +50,38 @@ def write_posed(
     tables = {name: (model / name).read_bytes() for name in TABLES}
     tables |= with_pairs(photos, model, tables)
     write_whole(out / REPORT, json.dumps(asdict(report), indent=1).encode())
+    if said := modalities_said(photos, placed, out / "images"):
+        text = json.dumps({"modalities": said}, indent=1, ensure_ascii=False)
+        write_whole(out / "capture.json", text.encode())
     target = make_folders(out, "sparse/0")
     for name, data in sorted(tables.items(), reverse=True):  # readers look for images.bin
         write_whole(target / name, data)
     shutil.rmtree(work)
+
+
+def modalities_said(photos: PhotoList, placed: set[str], images: Path) -> list[dict]:
+    """The entries of capture.json: which photos are of which stop; [] where they are of one.
+
+    images: where the written photos lie.
+    """
+    hot = {photo.name for photo, visible in photos.paired.items() if visible in placed}
+    rows = [(name, stop) for name, stop in photos.stop_of if name in placed or name in hot]
+    names = [name for name, _ in rows]
+    groups, told = [], []
+    own = {entry["name"]: entry for entry in photos.said}
+    for stop in photos.stops:
+        mine = [row for row, (_, name) in enumerate(rows) if name == stop.name]
+        if not mine:
+            continue
+        usual = "" if photos.said else USUAL_PALETTE.get(stop.kind, "")
+        grey = usual and is_grey(images / names[mine[0]])
+        palette = stop.palette or (usual if grey else "")
+        groups.append(Group(stop.name, stop.kind, palette, mine))
+        kept = own.get(stop.name, {}).items()
+        told.append({key: value for key, value in kept if key not in CHOICES})
+    if len(groups) < 2 and not photos.said:
+        return []
+    return [entry | each for each, entry in zip(told, entries_of(groups, names), strict=True)]
 
 
 def copy_into(source: Path, out: Path, name: Path) -> None:

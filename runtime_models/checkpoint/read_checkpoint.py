@@ -14,12 +14,18 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.checkpoint.read_torch import INDEX, read_tensors
+from shapeshift.runtime_models.checkpoint.run_settings import with_settings
 from shapeshift.runtime_models.colors.spherical_harmonics import C0, COEFFICIENTS
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.npy import read_array
 from shapeshift.runtime_models.files.zip_files import member_names, opened_zip
 from shapeshift.runtime_models.model import BadFile, Finding
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
+from shapeshift.runtime_models.splats.plain_splats import (
+    RawSplats,
+    Reading,
+    empty_splats,
+    fourth_degree,
+)
 from shapeshift.runtime_models.splats.ply.read_points_ply import splats_of_points
 
 PARTS = {  # what each array is called, by gsplat, by nerfstudio, by others
@@ -86,7 +92,7 @@ def read_raw_checkpoint(path: Path, reading: Reading) -> RawSplats:
         else:
             raw.scales[:] = shaped(scales, (count, 3), "scales", path)
         fill_colors(raw.sh)
-    return raw
+    return with_settings(raw, path)
 
 
 def arrays_of(path: Path, memory: Account) -> dict[str, np.ndarray]:
@@ -130,19 +136,26 @@ def colors_of(
         first = shaped(first, (count, 3), "the first harmonics", path)
         more = 0 if rest is None or rest.ndim != 3 else rest.shape[1]
         kept = min(more, COEFFICIENTS[-1] - 1)
-        if 1 + kept not in COEFFICIENTS:
-            raise BadFile(f"{path.name} has {more} further harmonics; 0, 3, 8 or 15 are known.")
+        if 1 + kept not in COEFFICIENTS or more not in (*(n - 1 for n in COEFFICIENTS), 24):
+            raise BadFile(f"{path.name} has {more} further harmonics; 0, 3, 8, 15 or 24 are known.")
         if rest is not None and more:
             rest = shaped(rest, (count, more, 3), "further harmonics", path)
         # nerfstudio without harmonics keeps logits of colours
         by_logits = more == 0 and rest is not None
+
+        found: tuple[Finding, ...] = ()
+        if more > kept and rest is not None:  # SH degree 4
+            with np.errstate(over="ignore", invalid="ignore"):
+                squares = np.square(rest, dtype=np.float64)
+                left_out, whole = float(squares[:, kept:].sum()), float(squares.sum())
+            found = (fourth_degree(more - kept, left_out, whole, path.name),)
 
         def fill_harmonics(sh: np.ndarray) -> None:
             sh[:, 0] = (sigmoid(first) - 0.5) / C0 if by_logits else first
             if kept and rest is not None:
                 sh[:, 1:] = rest[:, :kept]
 
-        return 1 + kept, fill_harmonics, ()
+        return 1 + kept, fill_harmonics, found
     if colors is None:
         raise BadFile(f"{path.name} has splats without colours; {WANTED}.")
     what = "colours of which a network makes others, for each photo"

@@ -43,6 +43,8 @@ FOREIGN = (
     Foreign("a file of tensors (.safetensors)", "export the splats in it as a PLY from its trainer",
             endings=(".safetensors",)),
     Foreign("a project of Postshot", "in Postshot: Export, Splat PLY", endings=(".psht",)),
+    Foreign("a moving scene of fourdgs (.4dgs)",
+            "write it as glTF or USD with its own to_gltf or to_usd", endings=(".4dgs",)),
     Foreign("a file of Reall3DViewer (.spx)", EXPORT, endings=(".spx",)),
     Foreign("a project of vk_gaussian_splatting", "open the file of splats that it names",
             endings=(".vkgs",)),

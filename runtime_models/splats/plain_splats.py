@@ -101,6 +101,14 @@ class RawSplats:
         return 32 + self.means.itemsize * 3 + 12 * self.sh.shape[1]
 
 
+def fourth_degree(count: int, left_out: float, whole: float, file: str) -> Finding:
+    """That SH degree 4 is not drawn; what it has, and all that varies with direction, squared."""
+    share = 100 * left_out / whole if whole > 0 else 0.0
+    what = f"{count} coefficients of SH degree 4 a splat"
+    done = f"left out, degree 3 is drawn: {share:.2g} % of what varies with direction goes"
+    return Finding(what, 0, done, file=file, repaired=False)
+
+
 def empty_splats(
     count: int, coefficients: int, memory: Account, exact: bool = False
 ) -> dict[str, Any]:

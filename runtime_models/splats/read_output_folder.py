@@ -3,7 +3,8 @@
 INRIA's 3DGS and what grew from it (2DGS, Mip-Splatting, Scaffold-GS, Gaussian Grouping) save
 point_cloud/iteration_N/point_cloud.ply; ThermalGaussian's MSMG and MFTG save point_cloud_color
 and point_cloud_thermal beside each other, its OMMG a second set of harmonics, t_dc_* and t_rest_*,
-in the one PLY; gsplat saves ply/point_cloud_N.ply.
+in the one PLY; gsplat saves ply/point_cloud_N.ply and ckpts/ckpt_N_rankR.pt, one for each card;
+nerfstudio nerfstudio_models/step-N.ckpt, in outputs/NAME/METHOD/TIME.
 """
 
 import re
@@ -19,11 +20,15 @@ from shapeshift.runtime_models.model import BadFile, Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import formats, read_plain, read_raw
 from shapeshift.runtime_models.splats.layers.read_layers import join_layers
 from shapeshift.runtime_models.splats.moving_splats import TIME_STOPS
+from shapeshift.runtime_models.splats.placed_splats import joined
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.stop_names import is_thermal_name
 
 CLOUD = "point_cloud.ply"
 NUMBER = re.compile(r"(?:iteration|point_cloud)_([0-9]{1,18})", re.ASCII)
+STEP = re.compile(r"ckpt_([0-9]{1,18})_rank[0-9]+\.pt|step-([0-9]{1,18})\.ckpt", re.ASCII)
+CHECKPOINTS = ("ckpts", "nerfstudio_models")  # folders of a run of gsplat and of nerfstudio
+RUN_DEPTH = 3  # outputs/NAME/METHOD/TIME
 PAIR = ("color", "thermal")
 NO_SPLATS = {"input.ply", "points3d.ply"}  # what a run started from: points
 
@@ -44,6 +49,38 @@ def newest_of(clouds: Iterable[Path]) -> Path | None:
         if (found := NUMBER.fullmatch(name)) and cloud.is_file():
             by_number[int(found[1])] = cloud
     return by_number[max(by_number)] if by_number else None
+
+
+def newest_checkpoints(folder: Path) -> list[Path]:
+    """Those of the last step in a run's folder of gsplat, where it is later than any cloud of it,
+    or of nerfstudio, which may lie up to three folders below.  [] without.  Raises BadFile.
+    """
+    found: dict[int, list[Path]] = {}
+    for place in (folder, *(folder / name for name in CHECKPOINTS)):
+        for file in sorted(place.glob("*")) if place.is_dir() else ():
+            if (step := STEP.fullmatch(file.name)) and file.is_file():
+                found.setdefault(int(step[1] or step[2]), []).append(file)
+        if found:
+            cloud = newest_of(folder.glob("ply/point_cloud_*.ply"))
+            named = NUMBER.fullmatch(cloud.stem) if cloud else None
+            last = int(named[1]) if named else -1
+            return found[max(found)] if max(found) > last else []
+    runs: list[Path] = []
+    for depth in range(1, RUN_DEPTH + 1):
+        runs += [run.parent for run in folder.glob("*/" * depth + CHECKPOINTS[1]) if run.is_dir()]
+    if len(runs) > 1:
+        names = ", ".join(str(run.relative_to(folder)) for run in sorted(runs)[-3:])
+        raise BadFile(f"{folder} holds {len(runs)} runs of nerfstudio ({names}); name one of them.")
+    return newest_checkpoints(runs[0]) if runs else []
+
+
+def read_checkpoints(files: list[Path], folder: Path, reading: Reading) -> SplatLayers:
+    """Checkpoints of one step, one for each card that trained, as one stop of the run's name."""
+    parts = [read_raw(file, reading) for file in files]
+    plain = judge(joined(parts, folder.name) if len(parts) > 1 else parts[0], reading)
+    names = [str(file.relative_to(folder)) for file in files]
+    stops = (Stop(folder.resolve().name or files[0].stem, 0.0, "layer"),)
+    return join_layers([plain], stops, reading.mode, names)
 
 
 def thermal_pair(folder: Path) -> tuple[Path, Path] | None:

@@ -28,6 +28,10 @@ def whole_formats() -> tuple[Format, ...]:
         is_checkpoint,
         read_raw_checkpoint,
     )
+    from shapeshift.runtime_models.checkpoint.read_png_folder import is_png_folder
+    from shapeshift.runtime_models.checkpoint.read_png_folder import (
+        read_raw_png_folder as read_raw_pngs,
+    )
     from shapeshift.runtime_models.splats.gltf.read_gltf import is_gltf, read_raw_gltf
     from shapeshift.runtime_models.splats.ply.read_compressed_ply import (
         has_chunks,
@@ -47,6 +51,7 @@ def whole_formats() -> tuple[Format, ...]:
         Format("3DGS PLY", (".ply",), lambda head, path: head[:3] == b"ply", read_raw_ply),
         Format("glTF", (".glb", ".gltf"), is_gltf, read_raw_gltf),
         Format("SOG", (".sog", "meta.json"), is_sog, read_raw_sog),
+        Format("gsplat's PNG folder", (), lambda head, path: is_png_folder(path), read_raw_pngs),
         Format("spz", (".spz",), has_spz_mark, read_raw_spz),
         Format("USD", (".usd", ".usda", ".usdc", ".usdz"), is_usd, read_raw_usd),
         Format("checkpoint", (".pt", ".ckpt", ".npz"), is_checkpoint, read_raw_checkpoint),

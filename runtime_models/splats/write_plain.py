@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
+from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import joined, moved, widened
@@ -17,6 +18,9 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.usd.read_usd import refuse_without
 
 FEW = 4  # columns that are named
+SPZ_SIZES = (float(np.exp(-10.0)), float(np.exp(255 / 16 - 10)))  # metres, ends of its codes
+COMPRESSED_SIZES = (float(np.exp(-20.0)), float(np.exp(20.0)))
+SPZ_HARMONICS, COMPRESSED_HARMONICS = 1.0, 4.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,56 @@ def describe_losses(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
         what = f"the scene lies far from zero, where float32 has steps of {step:.3g} m"
         done = f"{writer.name} rounds its places to that; .ply and .glb keep them"
         findings.append(Finding(what, 0, done, repaired=False))
-    return tuple(findings)
+    return (*findings, *held_codes(splats, writer))
+
+
+def held_codes(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
+    """Numbers beyond the ends of a format's codes, which hold them there."""
+    largest = splats.scales.max(axis=1)
+    ends = {"spz": SPZ_SIZES, "compressed PLY": COMPRESSED_SIZES}.get(writer.name)
+    beyond = {"spz": SPZ_HARMONICS, "compressed PLY": COMPRESSED_HARMONICS}.get(writer.name)
+    found = []
+    if ends is not None:
+        held = int(np.count_nonzero(largest > ends[1]) + np.count_nonzero(
+            (largest > 0) & (largest < ends[0])))  # fmt: skip
+        if held:
+            what = (
+                f"{held:,} splats are smaller than {ends[0]:.2g} m or larger than {ends[1]:.3g} m"
+            )
+            found.append((what, held, f"held there, {writer.name} has no codes beyond; .ply has"))
+    if beyond is not None:
+        rows = sum(
+            int((np.abs(splats.sh[first : first + BLOCK, 1:]) > beyond).any(axis=(1, 2)).sum())
+            for first in range(0, len(splats.sh), BLOCK)
+        )
+        if rows:
+            what = f"{rows:,} splats have harmonics beyond {beyond:g}"
+            found.append((what, rows, f"held there, {writer.name} has no codes beyond; .ply has"))
+    if writer.name == "compressed PLY" and (moved := moved_by_chunks(splats)) is not None:
+        count, farthest = moved
+        what = f"{count:,} splats move by up to {farthest:.2g} m, more than their size"
+        done = (
+            "written so: splats that lie far off stretch the steps of their chunk of 256; leave "
+            "those out (--only), or write .ply or .spz"
+        )
+        found.append((what, count, done))
+    return tuple(Finding(what, rows, done, repaired=False) for what, rows, done in found)
+
+
+def moved_by_chunks(splats: PlainSplats) -> tuple[int, float] | None:
+    """(splats whose place a compressed PLY may change by more than their largest sigma, the most in
+    metres); None where there are none."""
+    from shapeshift.runtime_models.splats.operations.morton import morton_order
+    from shapeshift.runtime_models.splats.ply.read_compressed_ply import CHUNK
+
+    order = morton_order(splats.means * np.array([1, -1, -1], np.float32))  # as it is written
+    starts = np.arange(0, len(order), CHUNK)
+    places = splats.means[order]
+    spans = np.maximum.reduceat(places, starts) - np.minimum.reduceat(places, starts)
+    steps = (spans / np.float32([2047, 1023, 2047]) / 2).max(axis=1)  # metres, half a code
+    each = np.repeat(steps, CHUNK)[: len(order)]
+    rows = each > splats.scales[order].max(axis=1)
+    return (int(rows.sum()), float(each[rows].max())) if rows.any() else None
 
 
 def truncate_harmonics(splats: PlainSplats, sh_degree: int) -> PlainSplats:

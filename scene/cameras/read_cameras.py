@@ -1,5 +1,6 @@
 """Views to draw from: whichever form a file or folder of cameras has, found from its content."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from shapeshift.runtime_models.files.json_fields import read_json
@@ -17,6 +18,7 @@ from shapeshift.scene.cameras.read_pose_list import MARK as POSE_MARK
 from shapeshift.scene.cameras.read_pose_list import read_pose_list
 from shapeshift.scene.cameras.read_transforms_cameras import MARK as TRANSFORMS_MARK
 from shapeshift.scene.cameras.read_transforms_cameras import read_transforms_cameras
+from shapeshift.scene.captures.colmap.colmap_files import said_of_models
 from shapeshift.scene.captures.colmap_tables import TABLES as COLMAP_TABLES
 from shapeshift.scene.captures.colmap_tables import find_model
 from shapeshift.scene.captures.foreign.foreign_cameras import read_foreign_cameras
@@ -83,7 +85,8 @@ def read_folder(folder: Path, reading: CameraReading) -> CameraList:
         return foreign
     if found is None:
         raise BadFile(f"{folder} holds no cameras; wanted is {KNOWN}.")
-    return read_colmap_cameras(*found, reading)
+    cameras = read_colmap_cameras(*found, reading)
+    return replace(cameras, notes=said_of_models(*found) + cameras.notes)
 
 
 def is_cameras(path: Path) -> bool:

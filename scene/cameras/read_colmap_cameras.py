@@ -15,7 +15,7 @@ from shapeshift.scene.cameras.camera_list import (
     pinhole_view,
     read_name,
 )
-from shapeshift.scene.captures.colmap.rig_frames import refused_poses
+from shapeshift.scene.captures.colmap.rig_frames import refused_poses, refused_text
 from shapeshift.scene.captures.colmap_tables import ColmapCamera, Posed, read_tables
 from shapeshift.scene.pose import View
 
@@ -33,6 +33,7 @@ def read_colmap_cameras(folder: Path, ending: str, reading: CameraReading) -> Ca
         )
         views.append(view.resized(reading.size) if reading.size else view)
     notes = other_lengths(posed) + refused_poses(folder, ending, posed)
+    notes += refused_text(folder, ending, posed)
     if any(lenses[image.lens].bends for image in posed):
         notes += (
             f"{folder}: the lenses' distortion is left out; the views are those of pinholes.",

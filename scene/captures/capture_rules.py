@@ -250,16 +250,22 @@ def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop,
 
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:
     """Stops of values get a palette where their photos are grey; false colours stay as they are."""
+    first = {photo.modality: photo for photo in reversed(photos)}
 
     def grey(name: str) -> bool:
-        photo = next(p for p in photos if p.modality == name)
-        image = decoded(photo.path, photo.counts, band=photo.band).image
-        return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
+        photo = first[name]
+        return is_grey(photo.path, photo.counts, photo.band)
 
     return tuple(
         replace(s, palette=USUAL_PALETTE[s.kind]) if s.is_measured and grey(s.name) else s
         for s in stops
     )
+
+
+def is_grey(path: Path, counts: tuple[float, float] | None = None, band: int = 0) -> bool:
+    """Whether no pixel of a photo has a colour.  counts, band: as of Photo."""
+    image = decoded(path, counts, band=band).image
+    return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
 
 def stops_from(listed: object, where: str) -> list[Stop]:

@@ -36,7 +36,7 @@ from shapeshift.scene.captures.colmap.colmap_files import (
     photos_folder,
     points_of,
 )
-from shapeshift.scene.captures.colmap.rig_frames import refused_poses
+from shapeshift.scene.captures.colmap.rig_frames import refused_poses, refused_text
 from shapeshift.scene.captures.colmap_tables import Posed, find_model, read_tables
 from shapeshift.scene.captures.modalities.frame_modalities import said_beside
 from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
@@ -71,7 +71,8 @@ def read_colmap(folder: Path) -> Capture:
     photos: list[Photo] = []
     rescaled: list[str] = []
     turned: list[str] = []
-    rows = zip(posed, paths, cameras, modality_of, splits_of(names), strict=True)
+    splits = splits_of(names)
+    rows = zip(posed, paths, cameras, modality_of, splits, strict=True)
     for image, path, world_from_camera, modality, split in compress(rows, there):
         lens = lenses[image.lens]
         matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
@@ -87,13 +88,14 @@ def read_colmap(folder: Path) -> Capture:
     if guessed := not said.get("modalities"):
         numbers = {path: str(image.lens) for path, image in zip(paths, posed, strict=True)}
         refuse_two_sorts(opened_photos(photos, root, numbers), stops, folder)
-    photos = listed_split(photos, folder, root, table, by_folder=any(splits_of(names)))
+    photos = listed_split(photos, folder, root, table, by_folder=any(splits))
     photos = of_each_band(photos, sharing_folders(said.get("modalities") or (), str(folder)))
     photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
     background = background_from(said, f"{folder}/capture.json")
     photos, unsure = meant_by_masks(photos)
     doubts = doubts_of(len(posed), missing, photos, rescaled, turned=turned) + unsure + more
     doubts += unpaired + other_lengths(images) + refused_poses(model, ending, images)
+    doubts += refused_text(model, ending, images)
     table.photos(photos, missing)
     table.partners("masks", photos)
     left_beside(base, model, ending, table)

@@ -26,6 +26,7 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 FLOAT, BYTE = 5126, 5121
 POINTS = 0
+ARRAY_BUFFER = 34962  # of a buffer view: vertex attributes
 MOST_BYTES = (1 << 32) - (1 << 20)  # lengths are 32 bits, and the JSON wants a place
 
 
@@ -42,7 +43,8 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
     place = 0
     for name, array in arrays.items():
         size = array.size * (1 if array.dtype == np.uint8 else 4)
-        views.append({"buffer": 0, "byteOffset": place, "byteLength": size})
+        views.append({"buffer": 0, "byteOffset": place, "byteLength": size,
+                      "target": ARRAY_BUFFER})  # fmt: skip
         accessor: dict[str, object] = {
             "bufferView": len(accessors),
             "componentType": BYTE if array.dtype == np.uint8 else FLOAT,

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import column_names
+from shapeshift.runtime_models.splats.plain_splats import COLMAP_UP, RawSplats
 
 TYPES = {"float": "f4", "float32": "f4", "double": "f8", "float64": "f8", "uchar": "u1",
          "uint8": "u1", "char": "i1", "int8": "i1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -15,6 +16,7 @@ TYPES = {"float": "f4", "float32": "f4", "double": "f8", "float64": "f8", "uchar
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 DIGITS = re.compile(r"\d{1,15}", re.ASCII)
 LARGEST_HEADER = 1 << 16  # bytes
+VERTICAL = re.compile(r"vertical axis\s*[:=]?\s*([+-]?[xyz])", re.IGNORECASE)  # of nerfstudio
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,19 @@ class PlyHeader:
                 f"file holds {max(room, 0) // least}; it is cut off or its header is wrong."
             )
         return element
+
+
+def put_vertical_axis(raw: RawSplats, header: PlyHeader) -> None:
+    """Sets what is up as a comment says, `Vertical Axis: z`; nothing where none does."""
+    for comment in header.comments:
+        if (found := VERTICAL.fullmatch(comment)) is not None:
+            axis = found[1].upper()
+            raw.up = axis if len(axis) == 2 else f"+{axis}"
+            what = f"its comment says that {raw.up} is up"
+            done = f"read so; --up={COLMAP_UP} reads it as 3DGS writes its files"
+            said = Finding(what, 0, done, file=raw.file, repaired=False)
+            raw.findings = (*raw.findings, said)
+            return
 
 
 def read_header(path: Path) -> PlyHeader:

@@ -10,7 +10,11 @@ from shapeshift.runtime_models.files.blocks import each_block
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import column_names
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
-from shapeshift.runtime_models.splats.ply.ply_file import PlyHeader, read_header
+from shapeshift.runtime_models.splats.ply.ply_file import (
+    PlyHeader,
+    put_vertical_axis,
+    read_header,
+)
 from shapeshift.runtime_models.splats.ply.read_ply import progress_of
 
 CHUNK = 256  # splats that share one row of ranges
@@ -65,6 +69,7 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
 
     with np.errstate(invalid="ignore", over="ignore"):  # ranges of NaN or Inf are for the judge
         each_block(len(packed), decode, progress_of(path, reading))
+    put_vertical_axis(raw, header)
     return raw
 
 

@@ -14,8 +14,19 @@ from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import column_names, column_offset
 from shapeshift.runtime_models.splats.moving_splats import with_motion_columns
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
-from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
+from shapeshift.runtime_models.splats.operations.mip_filter import take_filter_3d
+from shapeshift.runtime_models.splats.plain_splats import (
+    RawSplats,
+    Reading,
+    empty_splats,
+    fourth_degree,
+)
+from shapeshift.runtime_models.splats.ply.ply_file import (
+    Element,
+    PlyHeader,
+    put_vertical_axis,
+    read_header,
+)
 
 PLACE = ("x", "y", "z")
 SCALES = ("scale_0", "scale_1", "scale_2")
@@ -26,11 +37,12 @@ SHAPES = (*PLACE, "opacity", *SCALES[:2], *QUATERNION)  # without scale_2: discs
 GEOMETRY = (*SHAPES, *DIRECT)
 NORMAL = ("nx", "ny", "nz")  # written by habit, all zero
 FLAT = 1e-3  # a disc's third scale, of the smaller of its two: thinner than any pixel shows
+FOURTH = 25  # coefficients of SH degree 4
 TEXT = 1 << 20  # bytes of an ASCII file read at a time
 
 
 def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
-    """Splats of a 3DGS PLY of SH degree 0 to 3, binary or ASCII.  Raises BadFile."""
+    """Splats of a 3DGS PLY of SH degree 0 to 4, binary or ASCII; of 4, 3 is drawn.  BadFile."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
     shades = shades_in(column_names(vertex.layout))
@@ -44,6 +56,9 @@ def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
         read_text(path, begins, splats, reading)
     else:
         read_records(path, begins, splats, reading)
+    splats.tell_left_out()
+    put_vertical_axis(splats.raw, header)
+    take_filter_3d(splats.raw)
     return with_motion_columns(splats.raw)
 
 
@@ -63,13 +78,23 @@ def harmonics_of(names: tuple[str, ...], file: str) -> list[str]:
     """The columns of M x 3 coefficients, all channels of one coefficient together."""
     rest = [name for name in names if name.startswith("f_rest_")]
     count = len(rest) // 3 + 1
-    if len(rest) % 3 or count not in COEFFICIENTS:
-        raise BadFile(f"{file} has {len(rest)} f_rest columns, expected 0, 9, 24 or 45.")
+    if len(rest) % 3 or count not in (*COEFFICIENTS, FOURTH):
+        raise BadFile(f"{file} has {len(rest)} f_rest columns, expected 0, 9, 24, 45 or 72.")
     if set(rest) != {f"f_rest_{i}" for i in range(len(rest))}:
         raise BadFile(f"{file}: its {len(rest)} f_rest columns are not numbered from 0 on.")
     # channel-major in the file: all of red, then green, then blue
-    order = [f"f_rest_{c * (count - 1) + j}" for j in range(count - 1) for c in range(3)]
+    kept = min(count, COEFFICIENTS[-1])
+    order = [f"f_rest_{c * (count - 1) + j}" for j in range(kept - 1) for c in range(3)]
     return [*DIRECT, *order]
+
+
+def left_out_of(names: tuple[str, ...]) -> list[str]:
+    """The columns of SH degree 4, where there are such."""
+    rest = FOURTH - 1
+    if f"f_rest_{3 * rest - 1}" not in names:
+        return []
+    least = COEFFICIENTS[-1] - 1
+    return [f"f_rest_{c * rest + j}" for j in range(least, rest) for c in range(3)]
 
 
 class Columns:
@@ -110,7 +135,10 @@ class Columns:
             np.array([column_offset(kinds, name) // 4 for name in columns])
             for columns, _ in self.targets
         ]
+        self.left_out = left_out_of(names)  # of SH degree 4
+        self.shares = np.zeros(2)  # squares of what they have, and of all harmonics that vary
         used = {n for columns, _ in self.targets for n in columns} | {SCALES[2], *self.shades}
+        used |= set(self.left_out)
         self.kept = [name for name in names if name not in used]
         memory.charge(n * sum(kinds[name].itemsize for name in self.kept), "its other columns")
 
@@ -125,6 +153,8 @@ class Columns:
             else:
                 # 3 times as fast as assigning strided columns; "raise" would go by a copy
                 np.take(floats, places, axis=1, out=into, mode="clip")
+        if self.left_out:
+            self.count_left_out(table, self.raw.sh[rows, 1:])
         if self.flat:
             scales = self.raw.scales[rows]
             scales[:, 2] = scales[:, :2].min(axis=1) + np.float32(np.log(FLAT))
@@ -134,6 +164,18 @@ class Columns:
             self.raw.sh[rows, 0, channel] = (table[name] / np.float32(most) - 0.5) / C0
         for name in self.kept:
             self.keep(name, rows, table[name])
+
+    def count_left_out(self, table: np.ndarray, kept: np.ndarray) -> None:
+        with np.errstate(over="ignore", invalid="ignore"):
+            parts = [np.square(table[name].astype(np.float64)) for name in self.left_out]
+            fourth = float(sum(np.nansum(part) for part in parts))
+            self.shares += fourth, fourth + float(np.nansum(np.square(kept, dtype=np.float64)))
+
+    def tell_left_out(self) -> None:
+        """A finding about SH degree 4, with its part of all that varies with direction."""
+        if self.left_out:
+            found = fourth_degree(len(self.left_out) // 3, *self.shares, self.raw.file)
+            self.raw.findings = (*self.raw.findings, found)
 
     def keep(self, name: str, rows: slice, column: np.ndarray) -> None:
         """A column that is not of the splats; normals only when one of them is not zero."""

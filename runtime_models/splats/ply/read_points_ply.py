@@ -10,7 +10,12 @@ from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import column_names
 from shapeshift.runtime_models.splats.operations.knn_distance import knn_distance
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
-from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
+from shapeshift.runtime_models.splats.ply.ply_file import (
+    Element,
+    PlyHeader,
+    put_vertical_axis,
+    read_header,
+)
 from shapeshift.runtime_models.splats.ply.read_ply import (
     DIRECT,
     GEOMETRY,
@@ -56,6 +61,7 @@ def read_raw_points_ply(path: Path, reading: Reading) -> RawSplats:
     table = read_records(path, header, vertex, begins)
     places = np.stack([table[axis] for axis in PLACE], 1)  # (N, 3)
     raw = splats_of_points(places, None, path.name, reading, what)
+    put_vertical_axis(raw, header)
     return replace(raw, sh=colors_of(table), extra=others_of(table), format="PLY of points")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.checkpoint.read_png_folder import is_png_folder
 from shapeshift.runtime_models.files.blocks import each_block
 from shapeshift.runtime_models.files.json_fields import Fields, shown
 from shapeshift.runtime_models.files.memory import Account
@@ -36,7 +37,7 @@ def is_sog(head: bytes, path: Path) -> bool:
         with meta.open("rb") as file:
             return is_sog(file.read(HEAD), meta)
     if path.name == META:
-        return b'"means"' in head[:HEAD]
+        return b'"means"' in head[:HEAD] and not is_png_folder(path)
     names = member_names(path) if head[:2] == b"PK" else []
     packaged = any(name.rpartition("/")[2] == MANIFEST for name in names)
     return any(is_meta(name) for name in names) and not packaged
@@ -118,8 +119,14 @@ class Sog:
         found = found if isinstance(found, list) else [found]
         if key == "codebook" and len(found) == 256 and found[0] is None:
             found = [extrapolated(found), *found[1:]]
+        if key in ("mins", "maxs") and len(found) == most and None in found:
+            raise self.bad(
+                f"the {key} of {part} has a null: its writer met an infinite number (null is what "
+                "JSON makes of that), and the whole axis is lost; leave such splats out before it"
+            )
         if not least <= len(found) <= most or not set(map(type, found)) <= {int, float}:
-            raise self.bad(f"{part} needs {least} to {most} numbers as its {key}")
+            wanted = f"{least}" if least == most else f"{least} to {most}"
+            raise self.bad(f"{part} needs {wanted} numbers as its {key}")
         try:
             numbers = np.array(found, np.float64)
         except OverflowError:  # a whole number beyond 1e308

@@ -7,7 +7,12 @@ import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.model import Finding
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
+from shapeshift.runtime_models.splats.plain_splats import (
+    RawSplats,
+    Reading,
+    empty_splats,
+    fourth_degree,
+)
 from shapeshift.runtime_models.splats.ply.read_compressed_ply import from_smallest_three
 from shapeshift.runtime_models.splats.spz.spz_axes import (
     AXES_EXTENSION,
@@ -60,7 +65,8 @@ def read_spz_bytes(
         antialiased=bool(header.flags & ANTIALIASED),
         memory=memory,
     )
-    streams = zip(header.widths, decoders(raw, header), strict=True)
+    shares = np.zeros(2)  # squares of harmonics of degree 4, and of all that vary
+    streams = zip(header.widths, decoders(raw, header, shares), strict=True)
     for number, (width, decode) in enumerate(streams):
         reading.report(f"reading {file}", number / len(header.widths))
         for first in range(0, count if width else 0, BLOCK):  # one after the other, as they lie
@@ -73,9 +79,7 @@ def read_spz_bytes(
         what = f"extensions {', '.join(others)}"
         findings.append(Finding(what, 0, "not looked at", file=file, repaired=False))
     if kept < there:
-        what = f"{there - kept} coefficients of SH degree 4 a splat"
-        done = "left out, degree 3 is drawn"
-        findings.append(Finding(what, 0, done, file=file, repaired=False))
+        findings.append(fourth_degree(there - kept, *shares, file))
     raw.findings = tuple(findings)
     if axes and not axes_said(extensions):
         found = Axes(axes, "as what it lies in says", True)
@@ -85,7 +89,9 @@ def read_spz_bytes(
     return raw
 
 
-def decoders(raw: RawSplats, header: SpzHeader) -> tuple[Callable[[slice, np.ndarray], None], ...]:
+def decoders(
+    raw: RawSplats, header: SpzHeader, shares: np.ndarray
+) -> tuple[Callable[[slice, np.ndarray], None], ...]:
     """For each of the streams, what fills in some rows from their codes (n, width) uint8."""
 
     def places(rows: slice, codes: np.ndarray) -> None:
@@ -111,6 +117,10 @@ def decoders(raw: RawSplats, header: SpzHeader) -> tuple[Callable[[slice, np.nda
         values -= np.float32(128)
         values *= np.float32(1 / 128)
         raw.sh[rows].reshape(len(codes), -1)[:, 3:] = values
+        if codes.shape[1] > kept:
+            fourth = (codes[:, kept:].astype(np.float64) - 128) / 128
+            left_out = float(np.square(fourth).sum())
+            shares[:] += left_out, left_out + float(np.square(values, dtype=np.float64).sum())
 
     return places, alphas, colors, scales, rotations, harmonics
 

@@ -6,7 +6,7 @@ after another; version 4 is a plain header of 32 bytes, extensions, a table, and
 
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.model import BadFile
@@ -70,9 +70,29 @@ class Spz:
     def extensions(self) -> dict[int, bytes]:
         """{type: content}; to be asked when all streams have been taken."""
         data: bytes | bytearray | None = self._extensions
+        if data is None and not self.header.flags & EXTENSIONS:
+            self._refuse_another_body()
+            return {}
         if data is None:  # after the streams
             data = self._source.read(MOST_EXTENSION_BYTES)
         return read_extensions(data) if self.header.flags & EXTENSIONS else {}
+
+    def _refuse_another_body(self) -> None:
+        """BadFile where as many bytes follow as a later version's splats have more.
+
+        The format's own writer puts the version that it is asked for over the body of another one.
+        """
+        header, more = self.header, 0
+        most = sum(replace(header, version=3).sizes) - sum(header.sizes)
+        while more <= most and (part := self._source.read(min(PIECE, most + 1 - more))):
+            more += len(part)
+        for version in range(header.version + 1, 4):
+            if more and more == sum(replace(header, version=version).sizes) - sum(header.sizes):
+                raise BadFile(
+                    f"{header.file} says version {header.version} and has as many bytes as "
+                    f"{header.count:,} splats of version {version} take; its header is wrong, "
+                    "export it again."
+                )
 
 
 def count_in(head: bytes, file: str) -> int:

@@ -21,7 +21,12 @@ from shapeshift.runtime_models.files.npy import read_array
 from shapeshift.runtime_models.files.zip_files import member_names, opened_zip
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.splats.placed_splats import joined, moved
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
+from shapeshift.runtime_models.splats.plain_splats import (
+    COLMAP_UP,
+    RawSplats,
+    Reading,
+    empty_splats,
+)
 from shapeshift.runtime_models.splats.usd.usd_run import (
     HARMONICS,
     KIND,
@@ -36,6 +41,7 @@ ENDINGS = (".usd", ".usda", ".usdc")
 WAIT = 20  # times the processor time of the reading process, where it cannot be limited itself
 CENTIMETRE = 0.01  # metres a unit, where a stage does not say, by USD's own rule
 GRAY = 0.0  # of a first harmonic that is not there: 0.5
+LEAVES_AXES = "gsplat2USD"  # NVIDIA's: up to 0.1.5, in the layer's comment, whatever its upAxis
 MOST_DEGREE = 3  # of the harmonics that are drawn
 Read = Callable[[str], np.ndarray | None]
 
@@ -120,14 +126,17 @@ def part_of(
     if places is None or not len(places):
         return None
     count, degree = len(places), field["degree"]
-    sh, findings = harmonics_of(read(f"{number}/{HARMONICS}"), count, degree, path)
+    coefficients = read(f"{number}/{HARMONICS}")
+    sh, findings = harmonics_of(coefficients, count, degree, path, field["states degree"])
+    up, said = up_of(facts, path)
+    findings += said if number == 0 else []
     raw = RawSplats(
         **empty_splats(count, 1 if sh is None else sh.shape[1], memory),
         file=path.name,
         format="USD",
         log_scales=False,
         logits=False,
-        up=facts["up"],
+        up=up,
         memory=memory,
     )
     raw.means[:] = shaped(places, (count, 3), "positions", path)
@@ -139,7 +148,10 @@ def part_of(
         array = read(f"{number}/{name}")
         if array is None or len(array) < count:
             into[:] = unset
-            what = f"{count:,} splats without {name}"
+            there = 0 if array is None else len(array)
+            what = f"{name} has {there:,} entries for {count:,} splats" if there else (
+                f"{count:,} splats without {name}"
+            )  # fmt: skip
             findings.append(Finding(what, count, "each has the usual ones", file=path.name))
         else:
             into[:] = shaped(array[:count], into.shape, name, path)
@@ -150,6 +162,15 @@ def part_of(
     return moved(raw, metres @ read(f"{number}/matrix"))
 
 
+def up_of(facts: dict, path: Path) -> tuple[str, list[Finding]]:
+    """The stage's up axis, or that of a writer which is known not to turn what it says it does."""
+    if LEAVES_AXES not in facts["comment"]:
+        return facts["up"], []
+    what = f"{LEAVES_AXES} made it, which says {facts['up']} is up and leaves a PLY's axes"
+    done = f"read with {COLMAP_UP} up; --up={facts['up']} reads it as it says"
+    return COLMAP_UP, [Finding(what, 0, done, file=path.name, repaired=False)]
+
+
 def shaped(array: np.ndarray, shape: tuple[int, ...], name: str, path: Path) -> np.ndarray:
     if array.shape != shape:
         raise BadFile(f"{path.name}: {name} is of shape {array.shape!s:.40}, expected {shape}.")
@@ -157,7 +178,7 @@ def shaped(array: np.ndarray, shape: tuple[int, ...], name: str, path: Path) -> 
 
 
 def harmonics_of(
-    array: np.ndarray | None, count: int, degree: int, path: Path
+    array: np.ndarray | None, count: int, degree: int, path: Path, said: bool = True
 ) -> tuple[np.ndarray | None, list[Finding]]:
     """(N, M, 3) of the flat array, coefficients of a splat together, M at most 16; None for gray.
 
@@ -168,6 +189,9 @@ def harmonics_of(
     size = (degree + 1) ** 2
     if array is None or len(array) < count * size:
         what = f"{count:,} splats without colours"
+        if array is not None and len(array):
+            by = f"degree {degree}" + ("" if said else ", which is meant where none is authored,")
+            what = f"{HARMONICS} has {len(array):,} entries; {by} wants {count * size:,}"
         return None, [Finding(what, count, "shown in gray", file=path.name)]
     sh = shaped(array[: count * size], (count * size, 3), "harmonics", path)
     sh = sh.reshape(count, size, 3)

@@ -17,6 +17,7 @@ REFUSED = 2  # exit code where the last line of standard error says what is wron
 SECONDS, SECONDS_A_BYTE = 20, 2e-6  # of processor time
 UNKNOWN = 2 << 30  # bytes that a process has taken, where the system does not say
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
+MOST_COMMENT = 1000  # letters
 MOST_LAYERS, MOST_PRIMS, MOST_FIELDS = 256, 100_000, 1000
 KIND = "ParticleField3DGaussianSplat"
 # attribute: its numbers a splat; of each there may be one of half floats, called with an h
@@ -92,6 +93,7 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
         "up": f"+{UsdGeom.GetStageUpAxis(stage)}",
         "metres": UsdGeom.GetStageMetersPerUnit(stage),
         "states metres": UsdGeom.StageHasAuthoredMetersPerUnit(stage),
+        "comment": stage.GetRootLayer().comment[:MOST_COMMENT],
         "fields": [],
     }
     arrays: dict[str, np.ndarray] = {}
@@ -131,6 +133,7 @@ def field_of(prim, number: int, arrays: dict[str, np.ndarray]) -> dict:
     degree = prim.GetAttribute(DEGREE).Get(time)
     return {
         "degree": 3 if degree is None else int(degree),
+        "states degree": prim.GetAttribute(DEGREE).HasAuthoredValue(),
         "moves": len(times) > 1,
         "projection": str(prim.GetAttribute("projectionModeHint").Get() or "perspective"),
     }

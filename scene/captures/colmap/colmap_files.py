@@ -94,17 +94,24 @@ def left_beside(base: Path, model: Path, ending: str, table: FileTable) -> None:
 def other_models(model: Path, ending: str, table: FileTable) -> None:
     """Says which of several was taken, and what the others have."""
     others = [found for found in models_in(model.parent) if found[0] != model]
+    if said := said_of_models(model, ending):
+        mine = images_in(model, ending)
+        table.used("models", 1, f"sparse/{model.name}, {mine} images")
+        why = f"not joined to sparse/{model.name}, which has {mine} images"
+        table.left_out("models", [path for path, _ in others], why, said=True)
+        table.sentences += said
+
+
+def said_of_models(model: Path, ending: str) -> tuple[str, ...]:
+    """A sentence where a model is one of several."""
+    others = [found for found in models_in(model.parent) if found[0] != model]
     if model.parent.name != "sparse" or not others:
-        return
-    mine, counts = images_in(model, ending), [images_in(*found) for found in others]
-    table.used("models", 1, f"sparse/{model.name}, {mine} images")
-    few = [f"sparse/{path.name} ({count})" for (path, _), count in zip(others, counts, strict=True)]
-    why = f"not joined to sparse/{model.name}, which has {mine} images"
-    table.left_out("models", [path for path, _ in others], why, said=True)
-    table.sentences.append(
-        f"Of {len(others) + 1} models that are not joined, sparse/{model.name} with {mine} images "
-        f"is used, not {', '.join(few[:FEW])}{' ...' if len(few) > FEW else ''}; name the folder "
-        "of another one to use that."
+        return ()
+    few = [f"sparse/{path.name} ({images_in(path, kind)})" for path, kind in others[:FEW]]
+    return (
+        f"Of {len(others) + 1} models that are not joined, sparse/{model.name} with "
+        f"{images_in(model, ending)} images is used, not {', '.join(few)}"
+        f"{' ...' if len(others) > FEW else ''}; name the folder of another one to use that.",
     )
 
 

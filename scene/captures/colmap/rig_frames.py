@@ -1,4 +1,4 @@
-"""COLMAP's rigs and frames, from 3.12 on: a second place for poses, which COLMAP itself prefers."""
+"""Poses that stand in a second place: COLMAP's frames (3.12 on), and text beside binary tables."""
 
 import mmap
 import struct
@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.colmap.text_lines import AGAIN, numbers_of, rows_of_table
+from shapeshift.scene.captures.colmap.text_lines import AGAIN, image_rows, numbers_of, rows_of_table
 from shapeshift.scene.captures.colmap_tables import COUNT, Posed, count_of, mapped, short_of
 from shapeshift.scene.pose import Pose
 
@@ -17,6 +17,7 @@ CAMERA = 0  # the sensor type of a photo; 1 is an accelerometer
 RIG, FRAME = struct.Struct("<II"), struct.Struct("<II7dI")
 SENSOR, DATUM, POSE = struct.Struct("<iI"), struct.Struct("<iIQ"), struct.Struct("<7d")
 TURN = 1e-3  # of a rotation's entries, and of the distance from the eyes' middle: more is another
+MOST_TEXT = 1 << 26  # bytes of a table of text that is read to be compared
 Sensors = dict[tuple[int, int], np.ndarray]  # (rig, camera) -> (4, 4) camera from rig
 
 
@@ -32,20 +33,48 @@ def refused_poses(folder: Path, ending: str, posed: list[Posed]) -> tuple[str, .
         found = frame_poses(rigs, frames)
     except BadFile as error:
         return (f"What its frames say is not known, and not needed: {error}",)
+    other = with_other_pose(posed, found)
+    if not other:
+        return ()
+    return (
+        f"{len(other)} of {len(posed)} images have another pose in images{ending} than in "
+        f"frames{ending} beside it, for example {path_end(other[0].name)}; that of images{ending} "
+        f"is taken, COLMAP takes the other: remove rigs{ending} and frames{ending} if they are "
+        "older.",
+    )
+
+
+def refused_text(folder: Path, ending: str, posed: list[Posed]) -> tuple[str, ...]:
+    """A sentence where tables of text beside binary ones, which are read, are of other images."""
+    path = folder / "images.txt"
+    if ending != ".bin" or not path.is_file() or path.stat().st_size > MOST_TEXT:
+        return ()
+    try:
+        found = {int(v[0]): (v, name) for v, name in image_rows(path)}
+    except BadFile as error:
+        return (f"images.bin is read, and what lies beside it is not: {error}",)
+    as_text = {n: Posed(n, "", tuple(v[1:5]), tuple(v[5:8]), 0) for n, (v, _) in found.items()}
+    poses = {n: p.camera_from_world() for n, p in as_text.items() if p.length > 0}
+    other = with_other_pose(posed, poses)
+    more = len(found.keys() - {image.number for image in posed})
+    if not (other or more):
+        return ()
+    return (
+        f"images.bin is read, as COLMAP does, and images.txt beside it is not, which has {more} "
+        f"images more and {len(other)} that are missing or have another pose; remove the tables "
+        "that are older.",
+    )
+
+
+def with_other_pose(posed: list[Posed], found: dict[int, np.ndarray]) -> list[Posed]:
+    """Those whose pose is another in `found`, (4, 4) camera from world by number, or not there."""
     ours = np.array([image.camera_from_world() for image in posed])
     theirs = np.array([found.get(image.number, np.full((4, 4), np.nan)) for image in posed])
     eyes = [-np.einsum("nji,nj->ni", m[:, :3, :3], m[:, :3, 3]) for m in (ours, theirs)]
     spread = float(np.linalg.norm(eyes[0] - np.median(eyes[0], axis=0), axis=1).max())
     same = np.abs(ours[:, :3, :3] - theirs[:, :3, :3]).max(axis=(1, 2)) <= TURN
     same &= np.linalg.norm(eyes[0] - eyes[1], axis=1) <= TURN * max(spread, TURN)
-    if same.all():
-        return ()
-    first = posed[int(np.argmin(same))].name
-    return (
-        f"{(~same).sum()} of {len(posed)} images have another pose in images{ending} than in "
-        f"frames{ending} beside it, for example {path_end(first)}; that of images{ending} is "
-        f"taken, COLMAP takes the other: remove rigs{ending} and frames{ending} if they are older.",
-    )
+    return [image for image, alike in zip(posed, same, strict=True) if not alike]
 
 
 def frame_poses(rigs: Path, frames: Path) -> dict[int, np.ndarray]:

@@ -11,7 +11,7 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import is_number
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.capture_files import SMALLER, find_file, folded, parts_of
+from shapeshift.scene.capture_files import SMALLER, folded, parts_of
 from shapeshift.scene.capture_photos import image_size
 from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 from shapeshift.scene.captures.colmap_tables import BROWN, ColmapCamera
@@ -21,7 +21,15 @@ from shapeshift.scene.pose import OPENCV_FROM_EYE
 MOST_ENTRIES = 50_000  # files below a folder among which photos are looked for
 DEEPEST = 6  # folders in folders
 ENDINGS = {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp"}
-NO_PHOTOS = ("mask", "depth", "normal", ".", "__macosx")  # how folders of other pictures begin
+NO_PHOTOS = (
+    "mask",
+    "depth",
+    "normal",
+    "thumb",
+    ".",
+    "__macosx",
+)  # how folders of other pictures begin
+STRAIGHT = "undistort"  # in names of folders
 SEVERAL = "have names that several photos have, in folders that it does not tell"
 Z_UP = (0.0, 0.0, 1.0)
 EARTH = (6.2e6, 6.6e6)  # metres from its middle: places of the geocentric system
@@ -37,7 +45,8 @@ class PhotoIndex:
         self.folder = folder
         self.by_name: dict[str, list[str]] = {}  # folded name -> paths from the folder, with /
         self.by_stem: dict[str, list[str]] = {}
-        for path in pictures_below(folder, deepest):
+        self.paths = set(pictures_below(folder, deepest))
+        for path in sorted(self.paths):
             name = path.rpartition("/")[2]
             self.by_name.setdefault(folded(name), []).append(path)
             self.by_stem.setdefault(folded(name.rpartition(".")[0]), []).append(path)
@@ -47,19 +56,20 @@ class PhotoIndex:
 
         size: pixels that it has; hint: words that its folder may have in its name.
         """
-        if "/" in name or "\\" in name:
-            found = find_file(self.folder, name, ("",))
-            inside = not os.path.isabs(name) and ".." not in parts_of(name)
-            if inside and os.path.isfile(found.path) and not found.elsewhere:
-                return [found.path.relative_to(self.folder).as_posix()]
-        parts = parts_of(name)
+        parts = [part for part in parts_of(name) if part != "."] or [name]
+        if (path := "/".join(parts)) in self.paths:
+            return [path]
         last = folded(parts[-1])
         alike = self.by_name.get(last) or self.by_stem.get(last)
         if alike is None and "." in last:  # the photo may have been converted since
             alike = self.by_stem.get(last.rpartition(".")[0])
+        if not alike and ".." not in parts and os.path.isfile(self.folder / path):
+            return [path]  # in a folder that is called as those of masks are
         alike = best([ends_alike(path, parts) for path in alike or ()], alike or [])
         if len(alike) > 1 and hint:
             alike = best([folded(hint) in folded(path) for path in alike], alike)
+        if len(alike) > 1:  # copies that OpenSfM makes; what it writes of them names them itself
+            alike = best([STRAIGHT not in folded(path) for path in alike], alike)
         if len(alike) > 1 and size is not None:
             alike = best([image_size(self.folder / p, None) == size for p in alike], alike)
         return alike

@@ -57,7 +57,8 @@ def metashape_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
             f"The file has {len(with_cameras)} chunks; the one with most cameras is used, "
             f"{chunk.get('label', 'without a name')!r:.60}."
         )
-    lenses = {s.get("id"): lens_of(s, str(path)) for s in chunk.iterfind("sensors/sensor")}
+    sensors = {s.get("id"): s for s in chunk.iterfind("sensors/sensor")}
+    lenses: dict[str | None, ColmapCamera | None] = {}  # of those that are used
     worlds = transforms_of(chunk, str(path))
     poses = []
     for camera, group in cameras_of(chunk):
@@ -69,8 +70,10 @@ def metashape_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
         if not text or camera.get("enabled") in ("false", "0"):
             out.leave(label, why_not(camera, text))
             continue
-        lens = lenses.get(camera.get("sensor_id"))
-        if lens is None:
+        number = camera.get("sensor_id")
+        if number in sensors and number not in lenses:
+            lenses[number] = lens_of(sensors[number], str(path))
+        if (lens := lenses.get(number)) is None:
             out.leave(label, NO_LENS)
             continue
         matrix = np.array(numbers_in(text, 16, where)).reshape(4, 4)

@@ -47,6 +47,7 @@ def realityscan_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
             f"{path}: its table lacks {', '.join(lacks)}; in RealityScan: Alignment, Export, "
             "Registration, Internal/External camera parameters"
         )
+    places: list[np.ndarray] = []
     for number, row in enumerate(rows[1:], 2):
         if not any(word.strip() for word in row) or row[0].startswith("#"):
             continue
@@ -61,8 +62,22 @@ def realityscan_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
         pose[:3, 3] = [values[key] for key in ("x", "y", "alt")]
         size = out.size_of(name)
         lens = None if size is None else lens_of(values, size, where)
+        places.append(pose[:3, 3])
         out.add(name, pose @ OPENCV_FROM_EYE, lens)
+    if look_like_degrees(np.array(places)):
+        raise BadFile(
+            f"{path}: x and y look like degrees beside an altitude in metres; export in a system "
+            "of metres (local, or UTM)"
+        )
     return out.finished()
+
+
+def look_like_degrees(places: np.ndarray) -> bool:
+    """Whether places (N, 3) hardly differ in x and y, far from zero, and much in height."""
+    if len(places) < 3 or (np.abs(places[:, :2]) > (180, 90)).any():
+        return False
+    across, high = np.ptp(places[:, :2], axis=0).max(), np.ptp(places[:, 2])
+    return bool(100 * across < min(high, np.abs(places[:, :2].mean(axis=0)).max()))
 
 
 def rows_of(path: Path) -> list[list[str]]:

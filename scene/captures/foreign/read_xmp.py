@@ -31,7 +31,9 @@ def xmp_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     """All such files in the folder of one, and below it.  Raises BadFile."""
     out = Gathered(path, "RealityScan", photos, Z_UP)
     for file in sorted(path.parent.rglob("*.xmp"))[:MOST_FILES]:
-        name = file.with_suffix("").as_posix()
+        inside = file.is_relative_to(photos.folder)
+        own = file.relative_to(photos.folder) if inside else file
+        name = own.with_suffix("").as_posix()
         words = words_of(read_xml(file))
         if "Rotation" not in words or "Position" not in words:
             out.leave(name, "have no pose")

@@ -4,11 +4,13 @@ Evidence is every folder of its name (with either slash), the words and letters 
 and the keys of its frame.  What its pixels are is asked in two_sorts.py, when files are open.
 """
 
+import os
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from functools import lru_cache
+from pathlib import Path
 
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
@@ -50,6 +52,7 @@ CAMERA_KEYS = (
 LETTER = re.compile(r"(?:^|(?<=[_. -]))([TVWZ])(?=$|[_. -])", re.IGNORECASE)
 DRONE = re.compile(r"DJI_(?:\d{14}_)?\d{4}_T(?![a-z0-9])", re.IGNORECASE)
 KEY_WORDS = {"is", "image", "photo", "frame", "camera"}  # beside the one of heat in a key
+PARTNERS = {"MAX", "DC"}  # before the numbers of Autel's and FLIR's visible photos
 FEWEST_PAIRS = 2  # one pair may be two letters of an alphabet
 FLAGS = {"true": True, "false": False, "1": True, "0": False, "yes": True, "no": False}
 
@@ -101,11 +104,13 @@ def modalities_of(
     them, as in a COLMAP model's images.  Raises BadFile, with the line of capture.json that settles
     it, where evidence disagrees.
     """
+    if not names:
+        return (), []
     seen = seen_of(names, keys or [{}] * len(names))
     refuse_contradictions(seen, names, folder)
     if len({photo.sort == HEAT for photo in seen}) == 2:
         return of_two_sorts(seen, names, folder, folders_are_stops)
-    if seen and all(photo.by_key == HEAT for photo in seen):
+    if all(photo.by_key == HEAT for photo in seen):
         return spread_stops(["Thermal"]), ["Thermal"] * len(names)
     if not folders_are_stops:
         return spread_stops(["RGB"]), ["RGB"] * len(names)
@@ -144,7 +149,7 @@ def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[Seen]:
     folders = folders_of(names)
     shared = shared_folders(folders) if len(names) > 1 else 0
     folders = [part[shared:] for part in folders]
-    files = [PurePosixPath(parts_of(name)[-1]).stem for name in names]
+    files = [os.path.splitext(parts_of(name)[-1])[0] for name in names]
     by_folder = [sort_of_folders(part) for part in folders]
     letters = {part.upper() for found in folders for part in found if len(part) == 1}
     if "T" in letters and letters & set("VWZ"):
@@ -174,6 +179,8 @@ def by_letters(files: Sequence[str]) -> list[str]:
     A T behind DJI's own number needs no partner.
     """
     letters = [LETTER.findall(name) for name in files]
+    if not any("T" in found or "t" in found for found in letters):
+        return [""] * len(files)
     stems = [stem_of(name) for name in files]
     kinds: dict[str, set[str]] = defaultdict(set)
     for stem, found in zip(stems, letters, strict=True):
@@ -193,7 +200,8 @@ def by_letters(files: Sequence[str]) -> list[str]:
 def stem_of(file: str) -> str:
     """What two photos of a pair have in common: the name without words and letters of a sort."""
     parts = re.split(r"[_. -]+", LETTER.sub("", file))
-    return "_".join(part for part in parts if part and not sort_of_name(part)).lower()
+    kept = [part for part in parts if part and not sort_of_name(part)]
+    return "_".join(part for part in kept if part.upper() not in PARTNERS).lower()
 
 
 def sort_of_letter(letters: Sequence[str]) -> str:
@@ -203,15 +211,22 @@ def sort_of_letter(letters: Sequence[str]) -> str:
 def sort_of_keys(frame: Mapping) -> str:
     """By a frame's own keys: is_thermal, sensor ..., not by what its file says for all frames."""
     for key, value in frame.items():
-        if not isinstance(value, str | bool | int | float):
-            continue
-        flag = FLAGS.get(str(value).strip().lower().removesuffix(".0"))
-        words = set(words_of(key)) - KEY_WORDS
-        if flag is not None and words and all(map(is_thermal_word, words)):
-            return HEAT if flag else LIGHT
-        if key in CAMERA_KEYS and isinstance(value, str) and sort_of_name(value):
-            return sort_of_name(value)
+        if (what := use_of_key(key)) and isinstance(value, str | bool | int | float):
+            flag = FLAGS.get(str(value).strip().lower().removesuffix(".0"))
+            if what == "flag" and flag is not None:
+                return HEAT if flag else LIGHT
+            if what == "camera" and isinstance(value, str) and sort_of_name(value):
+                return sort_of_name(value)
     return ""
+
+
+@lru_cache(maxsize=1024)
+def use_of_key(key: str) -> str:
+    """Whether a key of a frame says yes or no of heat ("flag"), names its camera, or neither."""
+    if key in CAMERA_KEYS:
+        return "camera"
+    words = set(words_of(key)) - KEY_WORDS
+    return "flag" if words and all(map(is_thermal_word, words)) else ""
 
 
 def refuse_contradictions(seen: Sequence[Seen], names: Sequence[str], folder: Path) -> None:
@@ -225,6 +240,8 @@ def refuse_contradictions(seen: Sequence[Seen], names: Sequence[str], folder: Pa
     if photo.by_folder == "both":
         words = "its folders say both"
     heat = [p.by_key == HEAT or (not p.by_key and is_hot(p)) for p in seen]
+    if len(set(heat)) == 1:  # then keys tell none from another
+        heat = [is_hot(p) for p in seen]
     groups = [Group("RGB", LIGHT), Group("Thermal", HEAT)]
     for i, hot in enumerate(heat):
         groups[hot].rows.append(i)

@@ -15,6 +15,7 @@ from shapeshift.scene.capture_files import SMALLER, is_strange, parts_of
 from shapeshift.scene.captures.radiometric.stated_bands import only_bands, sharing_folders
 
 IMAGES = {"images", *(f"images_{factor}" for factor in SMALLER)}
+CHOICES = ("folder", "photos", "camera")  # keys of an entry that say which photos it has
 MOST_LISTED = 20  # photos in a line that is proposed
 FEW = 4  # folders that a line lists before it looks for a pattern
 DEEPEST = 1000  # a pattern has fewer folders; what names photos or cameras goes before
@@ -102,7 +103,7 @@ def choice_of(entry: Fields, name: str) -> Choice:
 
     Raises BadFile.
     """
-    said = {key: texts_of(entry, key) for key in ("folder", "photos", "camera")}
+    said = {key: texts_of(entry, key) for key in CHOICES}
     if not any(said.values()):
         said["folder"] = (name,)
     return Choice(said["folder"], said["photos"], said["camera"])
@@ -159,8 +160,9 @@ def folder_depth(pattern: str, parts: Sequence[str]) -> int:
     wanted = split_pattern(pattern)
     if not wanted:
         return int(len(parts) == 1)
-    depths = [n for n in range(len(parts)) if matches(wanted, parts[:n])]
-    return 1 + len(wanted) if depths else 0
+    if any(matches(wanted, parts[:count]) for count in range(len(parts))):
+        return 1 + len(wanted)
+    return folder_depth("/".join(wanted[1:]), parts) if wanted[0] in IMAGES else 0
 
 
 def names_photo(pattern: str, parts: Sequence[str]) -> bool:

@@ -35,10 +35,10 @@ def opened_photos(
     photos: Iterable[Photo], root: Path, cameras: Mapping[Path, str] | None = None
 ) -> list[Opened]:
     """Of a reader's photos, below `root`; cameras: as the capture numbers them."""
-    cameras = cameras or {}
+    cameras, above = cameras or {}, f"{root}{os.sep}"
     return [
         Opened(
-            os.path.relpath(path, root).replace(os.sep, "/"),
+            str(path).removeprefix(above).replace(os.sep, "/"),
             photo.modality,
             photo.mode,
             photo.file_size,

@@ -131,22 +131,32 @@ def test_pycolmap_reads_the_model(capture):
 
 
 def test_a_thermal_camera_gets_the_poses_of_its_pairs(room, tmp_path):
-    root = tmp_path / "rig"
-    for i in (0, 2, 4, 6, 7):
-        for name, size in (("RGB", SIZE), ("Thermal", (80, 60))):
-            (root / name).mkdir(parents=True, exist_ok=True)
+    """A drone's pairs in one folder below another: heat is not searched, and the capture says in
+    its capture.json which photos are of which stop, so that a reader has to guess nothing."""
+    root, taken = tmp_path / "flight", (0, 2, 4, 6, 7)
+    for i in taken:
+        for letter, size in (("V", SIZE), ("T", (80, 60))):
+            (root / "hall").mkdir(parents=True, exist_ok=True)
             picture = Image.open(room[0] / f"{i:02d}.png").resize(size)
-            picture.save(root / name / f"{i:02d}.png")
+            picture.save(root / f"hall/DJI_000{i}_{letter}.png")
+    Image.new("RGB", (8, 8)).save(root / "note.png")
     photos = list_photos(root)
-    assert len(photos.photos) == len(photos.paired) == 5
+    assert (len(photos.photos), len(photos.paired)) == (6, 5)
     out = tmp_path / "capture"
     report = find_poses(photos, out, PoseSettings(threads=2), quiet)
-    assert report.paired == report.placed == 5
+    assert report.paired == report.placed == 5 and report.left_out == ["note.png"]
+    said = json.loads((out / "capture.json").read_text())["modalities"]
+    assert [(row["name"], row["photos"]) for row in said] == [
+        ("RGB", "DJI_*_V.*"), ("Thermal", "DJI_*_T.*")]  # fmt: skip
     read = read_capture(out)
-    assert [stop.name for stop in read.stops] == ["RGB", "Thermal"]
+    assert [(stop.name, stop.kind) for stop in read.stops] == [
+        ("RGB", "rgb"),
+        ("Thermal", "thermal"),
+    ]
     by_name = {(p.modality, p.path.name): p.view for p in read.photos}
-    for i in (0, 2, 4, 6, 7):
-        one, other = by_name["RGB", f"{i:02d}.png"], by_name["Thermal", f"{i:02d}.png"]
+    for i in taken:
+        one = by_name["RGB", f"DJI_000{i}_V.png"]
+        other = by_name["Thermal", f"DJI_000{i}_T.png"]
         np.testing.assert_allclose(one.world_from_eye.matrix(), other.world_from_eye.matrix())
         assert other.pinhole()[1] * 4 == pytest.approx(one.pinhole()[1], rel=1e-6)
 

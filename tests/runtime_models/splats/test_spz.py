@@ -99,6 +99,22 @@ def header(version=3, count=4, degree=0, bits=12, magic=b"NGSP") -> bytes:
     return struct.pack("<4sIIBBBB", magic, version, count, degree, bits, 0, 0)
 
 
+@pytest.mark.parametrize("said, body", [(1, 2), (1, 3), (2, 3)])
+@pytest.mark.parametrize("degree", [0, 3])
+def test_a_body_of_another_version_than_the_header_s_is_refused(said, body, degree):
+    """The format's own writer makes such: version 1 over the body of version 2."""
+    streams = random_streams(50, body, degree)
+    with pytest.raises(BadFile, match=f"says version {said} .* version {body} take"):
+        read(legacy(50, said, degree, streams))
+    assert len(read(legacy(50, body, degree, streams)).means) == 50
+
+
+@pytest.mark.parametrize("more", [1, 49, 51, 149, 151, 100_000])
+def test_what_follows_the_splats_is_passed_over(more):
+    data = legacy(50, 1, 0, random_streams(50, 1, 0), extensions=bytes(more))
+    assert len(read(data).means) == 50
+
+
 BODY = b"".join(random_streams(4, 3, 0))
 WHOLE = modern(4, 0, random_streams(4, 4, 0))
 

@@ -23,9 +23,10 @@ from tests.support.splats.ply_files import some_splats
 pytest.importorskip("pxr", reason="usd-core is not installed (an optional extra)")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdVol, Vt
 
+from tests.support.splats.usd_stages import add_field, stage_with
+
 HUGE = Reading(allow_huge=True)
 ENDINGS = ("usda", "usdc", "usd", "usdz")
-SH = "radiance:sphericalHarmonicsCoefficients"
 
 
 def same(ours, theirs, atol: float = 1e-6) -> None:
@@ -59,34 +60,6 @@ def test_a_far_origin_is_kept(tmp_path):
     )
 
 
-def stage_with(path: Path, splats, up: str = "Y", metres: float | None = 1.0) -> Usd.Stage:
-    """A stage as others write it: usd-core alone, attribute by attribute."""
-    stage = Usd.Stage.CreateNew(str(path))
-    UsdGeom.SetStageUpAxis(stage, up)
-    if metres is not None:
-        UsdGeom.SetStageMetersPerUnit(stage, metres)
-    add_field(stage, "/World/A", splats)
-    stage.Save()
-    return stage
-
-
-def add_field(stage: Usd.Stage, at: str, splats, half: bool = False) -> Usd.Prim:
-    prim = UsdVol.ParticleField3DGaussianSplat.Define(stage, at).GetPrim()
-    arrays = {
-        "positions": splats.means, "scales": splats.scales,
-        "orientations": splats.wxyz[:, [1, 2, 3, 0]], "opacities": splats.opacity,
-        SH: splats.sh.reshape(-1, 3),
-    }  # fmt: skip
-    kinds = {1: (Vt.FloatArray, Vt.HalfArray), 3: (Vt.Vec3fArray, Vt.Vec3hArray),
-             4: (Vt.QuatfArray, Vt.QuathArray)}  # fmt: skip
-    for name, array in arrays.items():
-        kind = kinds[1 if array.ndim == 1 else array.shape[1]][half]
-        array = np.ascontiguousarray(array, np.float16 if half else np.float32)
-        prim.GetAttribute(name + "h" * half).Set(kind.FromNumpy(array))
-    prim.GetAttribute("radiance:sphericalHarmonicsDegree").Set(round(splats.sh.shape[1] ** 0.5) - 1)
-    return prim
-
-
 @pytest.mark.parametrize("up", ["Y", "Z"])
 @pytest.mark.parametrize("metres", [1.0, 0.01, None])
 def test_a_stage_says_its_up_and_its_units(tmp_path, up, metres):
@@ -99,6 +72,34 @@ def test_a_stage_says_its_up_and_its_units(tmp_path, up, metres):
     np.testing.assert_allclose(back.sh, wanted.sh, atol=1e-5)
     told = [finding.what for finding in back.findings]
     assert told == ([] if metres else ["it does not state metersPerUnit"])
+
+
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_a_writer_that_leaves_axes_as_they_are_is_known_by_its_comment(tmp_path, up):
+    """NVIDIA's gsplat2USD 0.1.5: a PLY's numbers under whatever upAxis it was asked for."""
+    splats = some_splats(20, 4)
+    stage = stage_with(tmp_path / "a.usda", splats, up)
+    stage.GetRootLayer().comment = "Converted from PLY/SPZ to USD using gsplat2USD\nSource file: a"
+    stage.Save()
+    back = read_plain(tmp_path / "a.usda", HUGE)
+    np.testing.assert_allclose(back.means, splats.means * (1, -1, -1), atol=1e-6)
+    assert back.findings[0].done == f"read with -Y up; --up=+{up} reads it as it says"
+    asked = read_plain(tmp_path / "a.usda", replace(HUGE, up=f"+{up}"))
+    wanted = rotate_splats(splats, ours_from_file(f"+{up}"))
+    np.testing.assert_allclose(asked.means, wanted.means, atol=1e-6)
+
+
+def test_arrays_that_are_too_short_are_told_with_both_counts(tmp_path):
+    splats = some_splats(200, 1)
+    stage = stage_with(tmp_path / "a.usda", splats)
+    prim = stage.GetPrimAtPath("/World/A")
+    prim.GetAttribute("scales").Set(Vt.Vec3fArray.FromNumpy(splats.scales[:100].copy()))
+    prim.RemoveProperty("radiance:sphericalHarmonicsDegree")
+    stage.Save()
+    told = [finding.what for finding in read_plain(tmp_path / "a.usda", HUGE).findings]
+    assert "scales has 100 entries for 200 splats" in told
+    assert any("has 200 entries; degree 3, which is meant" in what for what in told)
+    assert any(what.endswith("wants 3,200") for what in told)
 
 
 def full_covariance(scales, wxyz):

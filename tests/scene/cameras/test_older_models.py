@@ -135,3 +135,35 @@ def test_what_is_read_is_never_removed(model, tmp_path, capsys, source):
         assert cameras(tmp_path / source.format(ending), *words) == 2
         assert "belongs to what is read" in capsys.readouterr().err
     assert sorted(path.name for path in folder.iterdir()) == before
+
+
+def test_text_beside_binary_tables_is_said_where_it_differs(tmp_path):
+    """COLMAP's binary tables go before text, ours as well; the same in both is no word."""
+    made = well_formed(tmp_path)
+    made.write_binary(tmp_path)
+    said = [note for note in read_camera_list(tmp_path).notes if "images.txt" in note]
+    assert not said
+    path = tmp_path / "images.txt"
+    rows = path.read_text().splitlines()
+    words = rows[4].split()
+    rows[4] = " ".join([*words[:5], "9", "9", "9", *words[8:]])
+    extra = f"99 {' '.join(words[1:9])} new.png"
+    path.write_text("\n".join([*rows[:6], *rows[8:], extra]) + "\n\n")
+    cameras = read_camera_list(tmp_path)
+    (said,) = [note for note in cameras.notes if "images.txt" in note]
+    assert "has 1 images more and 2 that are missing or have another pose" in said
+    theirs = pycolmap.Reconstruction(tmp_path)
+    ours = cameras.views[0].pinhole()[0] @ HALF
+    np.testing.assert_allclose(ours[:3], theirs.images[1].cam_from_world().matrix(), atol=1e-9)
+    path.write_text("no table")
+    assert any("no table" not in n and "images.txt" in n for n in read_camera_list(tmp_path).notes)
+
+
+def test_a_larger_model_beside_what_is_written_is_said(tmp_path, capsys):
+    well_formed(tmp_path / "out/sparse/1")
+    assert cameras(other_views(tmp_path), "--out", tmp_path / "out") == 0
+    assert "sparse/1 has more images" in capsys.readouterr().err
+    assert cameras(tmp_path / "out") == 0
+    assert "Of 2 models that are not joined, sparse/1 with 6 images is used" in (
+        capsys.readouterr().err
+    )

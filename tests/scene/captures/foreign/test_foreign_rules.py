@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +120,42 @@ def test_two_photos_of_one_name_are_told_by_the_group_or_by_their_size(photos):
     text = file.read_text().replace("<cameras>", '<cameras><group id="0" label="thermal">')
     file.write_text(text.replace("</cameras>", "</group></cameras>"))
     assert {p.path.parent for p in read_capture(photos).photos} == {heat}
+
+
+def test_copies_that_opensfm_makes_are_not_taken_for_photos(photos):
+    save_photos(photos / "undistorted/images", SHOTS)
+    write.opensfm(photos, SHOTS, CAMERA)
+    assert {p.path.parent for p in read_capture(photos).photos} == {photos}
+    write.opensfm(photos / "undistorted", SHOTS, CAMERA)
+    found = read_capture(photos / "undistorted").photos
+    assert {p.path.parent for p in found} == {photos / "undistorted/images"}
+
+
+@pytest.mark.parametrize("name", [".", "..", "/", "a\\u0000b.png", "../" * 40 + "etc/x.png", "C:"])
+def test_names_that_are_none_are_photos_that_are_not_there(photos, name):
+    file = write.openmvg(photos, SHOTS, (38.0, 20.0, 15.0), "pinhole", {})
+    file.write_text(file.read_text().replace(SHOTS[0].name, name))
+    capture = read_capture(photos)
+    assert names(capture) == ALL - {SHOTS[0].name}
+    assert "1 of 5 photos that the capture names are not there" in said(capture)
+
+
+def test_degrees_are_refused(photos):
+    """11.6 E, 48.1 N: 100 m are 0.001 degrees."""
+    lens = dict.fromkeys(("px", "py", "k1", "k2", "k3", "k4", "t1", "t2"), 0.0) | {"f": 36.0}
+    flown = [replace(s, centre=s.centre * (1e-4, 1e-4, 20) + (11.6, 48.1, 500)) for s in SHOTS]
+    write.realityscan(photos, flown, lens)
+    with pytest.raises(BadFile, match="look like degrees"):
+        read_capture(photos)
+
+
+def test_a_lens_that_no_used_camera_has_may_be_broken(photos):
+    file = write.metashape(photos, SHOTS, PLAIN)
+    text = file.read_text()
+    start, end = text.index('<sensor id="0"'), text.index("</sensors>")
+    other = text[start:end].replace('id="0"', 'id="5"').replace("<f>38.0</f>", "<f>0</f>")
+    file.write_text(text[:end] + other + text[end:])
+    assert names(read_capture(photos)) == ALL
 
 
 def test_the_largest_of_several_reconstructions_is_used(photos):
