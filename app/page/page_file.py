@@ -8,6 +8,7 @@ import zlib
 from pathlib import Path
 
 from shapeshift.app.page.squeeze import squeeze
+from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.web.limits import LARGEST_FILE
 
@@ -71,7 +72,7 @@ def page_text(title: str, scene: bytes | None) -> str:
     for old, new in (
         (style[1], small),
         ("<!--policy-->", meta),
-        ("<title>Shapeshift</title>", f"<title>{html.escape(title)}</title>"),
+        ("<title>Shapeshift</title>", f"<title>{html.escape(one_line(title))}</title>"),
         (SCRIPT, f'{data}<script type="module">{START}</script>'),
     ):
         text = text.replace(old, new, 1)

@@ -8,6 +8,7 @@ import errno
 import http.server
 import os
 import secrets
+import sys
 import threading
 from urllib.parse import urlsplit
 
@@ -56,7 +57,11 @@ class PageServer:
         """Name and bytes of what is asked for; None: nothing, or nothing for who asks."""
         if host not in (f"{HERE}:{self.port}", f"localhost:{self.port}"):
             return None
-        token, _, name = urlsplit(path).path.removeprefix("/").partition("/")
+        try:
+            asked = urlsplit(path).path
+        except ValueError:  # no address at all
+            return None
+        token, _, name = asked.removeprefix("/").partition("/")
         if not secrets.compare_digest(token.encode(), self._token.encode()):
             return None
         name = name or PAGE
@@ -101,12 +106,23 @@ class Answering(http.server.BaseHTTPRequestHandler):
         """Nobody needs a line for every request."""
 
 
-def bound(port: int) -> http.server.ThreadingHTTPServer:
+class LocalServer(http.server.ThreadingHTTPServer):
+    """One that says nothing of connections that browsers break off."""
+
+    daemon_threads = True
+    request_queue_size = 128  # connections that wait: a browser opens six for each page
+
+    def handle_error(self, request, client_address) -> None:
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
+
+
+def bound(port: int) -> LocalServer:
     """A server that listens on this computer alone.  Raises UsageError."""
     if not 0 <= port <= 65535:
         raise UsageError(f"--port is {port}, expected 0 (any that is free) to 65535.")
     try:
-        server = http.server.ThreadingHTTPServer((HERE, port), Answering)
+        return LocalServer((HERE, port), Answering)
     except OSError as error:
         if error.errno in (errno.EADDRINUSE, getattr(errno, "WSAEADDRINUSE", -1)):
             raise UsageError(
@@ -117,5 +133,3 @@ def bound(port: int) -> http.server.ThreadingHTTPServer:
                 f"port {port} is not for every program; --port 0 takes one that is free."
             ) from None
         raise
-    server.daemon_threads = True
-    return server

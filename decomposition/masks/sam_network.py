@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.runtime_models.gate.network import StrangeNetwork
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.session import load_onnxruntime, open_session
 
 A_BYTE = 3  # of memory for each byte of a network: read, opened, optimised
 TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16, "tensor(int64)": np.int64,
@@ -16,16 +16,13 @@ TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16, "tensor(int
 
 
 class Network:
-    """Opened on the CPU.  Raises BadFile for what is no ONNX file."""
+    """Opened on the CPU, behind the gate.  Raises BadFile for what is no ONNX file."""
 
     def __init__(self, path: Path, threads: int) -> None:
         self.path = path
         Memory().of(path).charge(A_BYTE * path.stat().st_size, "its weights")
-        try:
-            # By its path: weights of large networks lie in a file beside it.
-            self.session = open_session(str(path), threads)
-        except errors() as error:
-            raise BadFile(f"{path}: not a network that opens ({brief(error)}).") from None
+        # By its path: weights of large networks lie in a file beside it.
+        self.session = StrangeNetwork(path, threads)
         self.inputs: dict[str, Any] = {entry.name: entry for entry in self.session.get_inputs()}
         self.outputs = [out.name for out in self.session.get_outputs()]
 
@@ -42,10 +39,7 @@ class Network:
             if entry.type not in TYPES:
                 raise BadFile(f"{self.path}: its input '{name}' is {entry.type}, which is unknown.")
             fed[name] = np.asarray(given[name]).astype(TYPES[entry.type], copy=False)
-        try:
-            found = self.session.run(None, fed)
-        except errors() as error:
-            raise BadFile(f"{self.path}: it does not run on a photo ({brief(error)}).") from None
+        found = self.session.run(None, fed)
         return dict(zip(self.outputs, found, strict=True))
 
     def floats(self, found: dict[str, np.ndarray], name: str, rank: int) -> np.ndarray:
@@ -62,20 +56,6 @@ class Network:
         if not np.isfinite(array).all():
             raise BadFile(f"{self.path}: its '{name}' holds NaN or Inf; export it again.")
         return array
-
-
-def errors() -> tuple[type[Exception], ...]:
-    """Of onnxruntime: they have no class in common."""
-    kinds = load_onnxruntime().capi.onnxruntime_pybind11_state
-    return (
-        kinds.Fail, kinds.InvalidArgument, kinds.InvalidGraph, kinds.InvalidProtobuf,
-        kinds.NotImplemented, kinds.RuntimeException, kinds.NoSuchFile, kinds.EPFail,
-    )  # fmt: skip
-
-
-def brief(error: Exception) -> str:
-    """Of an error of onnxruntime, which may have a hundred lines."""
-    return " ".join(str(error).split())[:120]
 
 
 def list_of(names: list[str]) -> str:

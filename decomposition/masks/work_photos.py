@@ -19,7 +19,7 @@ from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lenses.brown import brown_tangents, is_brown
 from shapeshift.scene.captures.lenses.panorama import is_panorama
 from shapeshift.scene.captures.photo import load_photo
-from shapeshift.scene.captures.undistort import pinhole_of
+from shapeshift.scene.captures.undistort import by_pycolmap, pinhole_of
 from shapeshift.scene.pose import View
 
 MOST_SIDE = 1024  # pixels: what segmenters look at
@@ -60,11 +60,7 @@ def straight_points(lens: ColmapCamera, points: np.ndarray) -> np.ndarray:
     straight = pinhole_of(lens)
     if is_brown(lens):
         return brown_tangents(lens, points) * straight.focal + straight.centre
-    import pycolmap
-
-    width, height = lens.size
-    camera = pycolmap.Camera(model=lens.model, width=width, height=height, params=lens.params)
-    return np.asarray(camera.cam_from_img(points)) * straight.focal + straight.centre
+    return by_pycolmap(lens, points, back=True) * straight.focal + straight.centre
 
 
 def work_photos(capture: Capture, stops: Sequence[Stop]) -> list[WorkPhoto]:

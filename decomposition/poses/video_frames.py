@@ -1,17 +1,13 @@
 """The sharpest frames of a video, spread over its length, as photos (PyAV, optional)."""
 
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
+from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
 
 VIDEOS = {".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi"}
-LOOK_SIDE = 480  # pixels of the longer side on which sharpness is measured
-QUALITY = 95  # of the JPEG
-LOOKS_A_FRAME = 12  # frames looked at for each that is kept, at most: decoding is what takes long
 
 
 def take_frames(
@@ -19,75 +15,17 @@ def take_frames(
 ) -> int:
     """Writes at most `count` frames into `folder`, the sharpest of equal parts of the video.
 
-    Gives how many.  Raises BadFile where it is no video that can be read, or PyAV is missing.
+    Gives how many.  Read behind the gate, video_run.py.  Raises BadFile where it is no video that
+    can be read, or PyAV is missing.
     """
-    try:
-        import av
-    except ImportError:
+    if find_spec("av") is None:
         raise BadFile(
             f"{video} is a video, and PyAV, which reads them, is not installed; install the extra "
             "'film', or give a folder of photos."
-        ) from None
+        )
     if not video.is_file():
         raise BadFile(f"{video} does not exist; give a folder of photos, or a video.")
-    try:
-        with av.open(str(video)) as container:
-            stream = next(iter(container.streams.video), None)
-            if stream is None:
-                raise BadFile(f"{video} holds no pictures; give a video.")
-            stream.thread_type = "AUTO"
-            second = stream.time_base
-            times = [float(p.pts * second) for p in container.demux(stream)
-                     if p.pts is not None and second is not None]  # fmt: skip
-        if len(times) < 2:
-            raise BadFile(f"{video} holds {len(times)} frames; a video of a walk is wanted.")
-        return write_sharpest(av, video, folder, count, sorted(times), progress)
-    except (av.error.FFmpegError, OSError) as error:
-        raise BadFile(f"{video}: no video that can be read ({error}); copy it again.") from None
-
-
-def write_sharpest(
-    av, video: Path, folder: Path, count: int, times: list[float],
-    progress: Callable[[str, int, int], None],
-) -> int:  # fmt: skip
-    from shapeshift.runtime_models.files.whole_file import whole_file
-
-    count = min(count, len(times))
-    part_of = np.minimum(np.arange(len(times)) * count // len(times), count - 1)
-    every = max(len(times) // (count * LOOKS_A_FRAME), 1)
-    best: tuple[float, Any] | None = None
-    part = written = 0
-
-    def write() -> None:
-        nonlocal written
-        if best is not None:
-            with whole_file(folder / f"{written:05d}.jpg") as file:
-                best[1].to_image().save(file, "JPEG", quality=QUALITY)
-            written += 1
-
-    with av.open(str(video)) as container:
-        container.streams.video[0].thread_type = "AUTO"
-        for i, frame in enumerate(container.decode(video=0)):
-            here = int(part_of[min(i, len(times) - 1)])
-            if here != part:
-                write()
-                progress("sharpest frames", written, count)
-                best, part = None, here
-            if i % every and best is not None:
-                continue
-            sharp = sharpness(frame)
-            if best is None or sharp > best[0]:
-                best = sharp, frame
-    write()
-    return written
-
-
-def sharpness(frame) -> float:
-    """Variance of the Laplacian of the grey picture, made small; blur takes it away."""
-    scale = LOOK_SIDE / max(frame.width, frame.height)
-    size = (max(round(frame.width * scale), 3), max(round(frame.height * scale), 3))
-    grey = frame.reformat(*size, format="gray").to_ndarray().astype(np.float32)
-    grey = grey[:, : size[0]]
-    inner = grey[1:-1, 1:-1]
-    around = grey[:-2, 1:-1] + grey[2:, 1:-1] + grey[1:-1, :-2] + grey[1:-1, 2:]
-    return float((around - 4 * inner).var())
+    return ask(
+        "video", video, [str(video.absolute()), str(folder.absolute()), count],
+        tell=lambda said: progress("sharpest frames", said["done"], said["of"]),
+    )  # fmt: skip

@@ -17,6 +17,8 @@ from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lens_resampling import LARGEST, resampled
 from shapeshift.scene.captures.lenses.panorama import is_panorama
+from shapeshift.scene.captures.pictures.rare_photo import is_rare, rare_photo, refuse_scans
+from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
 from shapeshift.scene.captures.radiometric.no_value import (
     FLOATS,
     GREY_16,
@@ -60,14 +62,17 @@ def open_image(path: Path, band: int = 0) -> Image.Image:
         if path.suffix.lower() in GRIDS:
             return open_grid(path)
         with quiet():
-            return Image.open(path)
+            image = Image.open(path, formats=USUAL)
+        if not is_rare(image):
+            return image
+        image.close()
     except FileNotFoundError:
         raise BadFile(
             f"{path}: the image file is missing; put it there or drop the frame"
         ) from None
     except BadFile:  # of a grid, in its own words
         raise
-    except UnidentifiedImageError as error:
+    except UnidentifiedImageError:  # perhaps one of the rarer formats
         if not band and (header := band_header(path)) is not None:
             return header
         if path.stat().st_size == 0:
@@ -77,9 +82,13 @@ def open_image(path: Path, band: int = 0) -> Image.Image:
                 f"{path}: HEIC photos are not read; save them as JPEG or PNG (a phone does so by "
                 "its setting 'most compatible')"
             ) from None
-        raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
     except (Image.DecompressionBombError, *BROKEN) as error:
         raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
+    rare, size = rare_photo(path, MOST_PIXELS if Memory().asked else usual_pixels(path))
+    if rare is None:
+        charge_pixels(path, size)
+    assert rare is not None, "more pixels than are usual are refused"
+    return rare
 
 
 @contextmanager
@@ -283,7 +292,10 @@ def loaded(
             with quiet():
                 if divisor > 1 and image.format == "JPEG":
                     image.draft(None, (width // divisor, height // divisor))
+                refuse_scans(image, path)
                 image.load()
+        except BadFile:
+            raise
         except BROKEN as error:
             raise BadFile(f"{path}: the image is cut off ({error}); copy it again") from None
         yield image, (width, height)
@@ -323,7 +335,7 @@ def numbers_of(photo: Photo) -> np.ndarray:
 def charge_pixels(path: Path, size: tuple[int, int], most: int = 0) -> None:
     """BadFile where a picture has more pixels than its bytes can mean, or than there is memory."""
     bytes_there, pixels, whole = path.stat().st_size, size[0] * size[1], Memory()
-    usual = min(MOST_PIXELS, max(FREE_PIXELS, PIXELS_A_BYTE * bytes_there, most))
+    usual = usual_pixels(path, most)
     if pixels > (MOST_PIXELS if whole.asked else usual):
         allow = math.ceil(PIXEL * pixels / GB)
         more = f", or set {VARIABLE}={allow} (GB)" if pixels <= MOST_PIXELS else ""
@@ -333,6 +345,11 @@ def charge_pixels(path: Path, size: tuple[int, int], most: int = 0) -> None:
         )
     # What it may have is given in pixels: of the account only the machine's bound counts.
     whole.of(path, PIXEL * MOST_PIXELS).charge(PIXEL * pixels, f"{pixels:,} pixels")
+
+
+def usual_pixels(path: Path, most: int = 0) -> int:
+    """How many pixels a picture of so few bytes may have; most: of what it goes with."""
+    return min(MOST_PIXELS, max(FREE_PIXELS, PIXELS_A_BYTE * path.stat().st_size, most))
 
 
 def floats(image: Image.Image, mode: str) -> np.ndarray:

@@ -1,15 +1,17 @@
 """Photos of a bent lens as a pinhole camera would have taken them, and what of them is lost.
 
-The distortion models are COLMAP's (pycolmap) and nerfstudio's: a ColmapCamera maps tangents x/z,
-y/z of its axes (OpenCV: x right, y down) to pixels of the photo.
+The distortion models are COLMAP's (pycolmap, behind the gate) and nerfstudio's: a ColmapCamera maps
+tangents x/z, y/z of its axes (OpenCV: x right, y down) to pixels of the photo.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lenses.brown import brown_pixels, is_brown
@@ -60,12 +62,14 @@ def pixels_of(lens: ColmapCamera, tangents: np.ndarray) -> np.ndarray:
         return panorama_pixels(lens, tangents)
     if is_brown(lens):
         return brown_pixels(lens, tangents)
-    import pycolmap
+    return by_pycolmap(lens, tangents, back=False)
 
-    width, height = lens.size
-    camera = pycolmap.Camera(model=lens.model, width=width, height=height, params=lens.params)
-    with np.errstate(all="ignore"):
-        return camera.img_from_cam(np.column_stack([tangents, np.ones(len(tangents))]))
+
+def by_pycolmap(lens: ColmapCamera, given: np.ndarray, back: bool) -> np.ndarray:
+    """(N, 2) pixels at tangents, or back: tangents at pixels, of a lens of COLMAP's."""
+    given = np.ascontiguousarray(given, np.float64)
+    words = [lens.model, list(lens.size), list(lens.params), given, back]
+    return ask("lens", Path(lens.model), words, size=given.nbytes)
 
 
 def is_straight(lens: ColmapCamera, where: str) -> bool:

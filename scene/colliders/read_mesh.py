@@ -1,10 +1,10 @@
 """A triangle mesh from a file: .glb and .gltf by our own reader, .obj, .ply and .stl by trimesh.
 
-Sizes are checked first: a header that promises more than the file holds is refused, and nothing
-but the file itself is opened (no materials, no textures).
+trimesh works behind the gate, mesh_run.py.  Sizes are checked first: a header that promises more
+than the file holds is refused, and nothing but the file itself is opened (no materials, no
+textures).
 """
 
-import io
 import re
 import struct
 from collections.abc import Collection
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import Account, Memory, refuse_empty
+from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.gltf.gltf_files import Asset
 from shapeshift.runtime_models.splats.gltf.gltf_nodes import placed_meshes
@@ -85,25 +86,9 @@ def clean(vertices: np.ndarray, faces: np.ndarray, name: str) -> TriangleMesh:
 
 def read_by_trimesh(path: Path, kind: str, memory: Account) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (V, 3) and faces (F, 3) of an .obj, .ply or .stl.  Raises BadFile."""
-    import trimesh
-
-    data = prepared(path, kind, memory)
-    try:
-        with np.errstate(all="ignore"):
-            mesh = trimesh.load_mesh(
-                io.BytesIO(data), file_type=kind, process=False, maintain_order=True,
-                **({"skip_materials": True} if kind == "obj" else {}),
-            )  # fmt: skip
-            if isinstance(mesh, trimesh.Scene):
-                mesh = mesh.to_mesh()
-            vertices = np.asarray(mesh.vertices)
-            faces = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-    except Exception as error:  # on damaged bytes its parsers raise whatever comes up
-        reason = " ".join(str(error).split())[:80] or type(error).__name__
-        raise BadFile(f"{path.name} cannot be read as a mesh ({reason}); it is damaged.") from None
-    if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise BadFile(f"{path.name} has vertices of {vertices.shape[-1]} numbers; 3 are wanted.")
-    return vertices, faces
+    left = memory.left
+    found = ask("mesh", path, [prepared(path, kind, memory), kind], memory=left)
+    return found["vertices"], found["faces"]
 
 
 def prepared(path: Path, kind: str, memory: Account) -> bytes:

@@ -49,6 +49,30 @@ def test_windows_has_its_place(tmp_path, monkeypatch):
 
 
 @posix
+@pytest.mark.parametrize("mode", [0o777, 0o770, 0o702, 0o755, 0o700])
+@pytest.mark.parametrize("name", ["", "pocl"])
+def test_folders_that_others_may_write_are_not_used(tmp_path, capsys, mode, name):
+    """Kernels in it are run: who could have put them there matters, who may read them does not."""
+    ours = tmp_path / "home" / ".cache" / "shapeshift"
+    (ours / "pocl").mkdir(parents=True)
+    (ours / name).chmod(mode)
+    caches.settle_caches()
+    said, usable = capsys.readouterr().err, not mode & 0o022
+    assert usable == Path(os.environ["POCL_CACHE_DIR"]).is_relative_to(ours)
+    assert ("others may write in it" in said) != usable
+    assert len(said.splitlines()) <= 1 or not usable
+
+
+@posix
+def test_folders_of_another_user_are_not_used(tmp_path, capsys, monkeypatch):
+    (tmp_path / "home" / ".cache" / "shapeshift" / "pocl").mkdir(parents=True)
+    user = os.getuid()
+    monkeypatch.setattr("shapeshift.runtime_models.files.user_cache.os.getuid", lambda: user + 1)
+    with pytest.raises(OSError, match="another user's"):
+        cache_folder("pocl")
+
+
+@posix
 def test_libraries_are_told_and_nothing_is_said(tmp_path, capsys):
     caches.settle_caches()
     ours = tmp_path / "home" / ".cache" / "shapeshift"

@@ -96,6 +96,20 @@ def test_the_kept_evaluator_colours_what_is_seen_and_each_anchor_at_its_own_x(fo
     assert np.allclose(colors[seen[rows]], every[seen[rows]], atol=2e-6)
 
 
+def test_colours_along_a_direction_are_each_block_s_own(folder):
+    """What baking asks for: a direction for each anchor, decoded by its own block, to the bit."""
+    whole, parts = read_model(folder), [read_package(folder / f"{n}.shift") for n in range(2)]
+    along = np.random.default_rng(3).normal(size=(len(whole.anchors), 3)).astype(np.float32)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    cut = len(parts[0].anchors)
+    wanted = [
+        Evaluator(part).color_along(0.4, rows)
+        for part, rows in zip(parts, (along[:cut], along[cut:]), strict=True)
+    ]
+    np.testing.assert_array_equal(Evaluator(whole).color_along(0.4, along), np.concatenate(wanted))
+    assert np.ptp(np.concatenate(wanted), axis=0).min() > 0.01  # else any direction would do
+
+
 @pytest.mark.parametrize("order", ["as they are", "backwards", "one by one", "none"])
 def test_any_rows_keep_their_networks(folder, order):
     model = read_blocks(folder)

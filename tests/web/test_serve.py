@@ -1,7 +1,10 @@
 """`launch.py serve`: this computer alone, a token, a page that follows its file."""
 
 import http.client
+import socket
+import struct
 import threading
+import time
 
 import pytest
 
@@ -46,6 +49,57 @@ def test_who_has_the_address_gets_the_page_and_nobody_else(server):
         assert ask(server, token, host)[0] == 404, host  # a name that leads here by DNS
     assert ask(server, token, method="POST")[0] == 501
     assert ask(server, token, method="HEAD")[2] == b""
+
+
+def test_every_answer_has_the_same_headers(server):
+    """Found or not: nothing is kept, guessed, told to other pages or shown in their frames."""
+    token = server.address.removeprefix(f"http://{HERE}:{server.port}")
+    for path in (token, token + "scene.bin", "/x/"):
+        headers = ask(server, path)[1]
+        assert headers["Cache-Control"] == "no-store"
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Referrer-Policy"] == "no-referrer"  # the address holds the token
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+
+
+def raw(server: PageServer, words: bytes, reset: bool = False) -> bytes:
+    """What comes back for bytes of one's own; reset: the connection is thrown away at once."""
+    with socket.create_connection((HERE, server.port), timeout=10) as held:
+        held.sendall(words)
+        if reset:
+            held.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            return b""
+        return held.recv(65536)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [b"http://[::1", b"//[", b"http://[x]/", b"*", b"x", b"/%", b"http://a:b:c/", b"/\xff"],
+)
+def test_an_address_that_is_none_is_nowhere(server, address):
+    host = f"{HERE}:{server.port}".encode()
+    answer = raw(server, b"GET " + address + b" HTTP/1.1\r\nHost: " + host + b"\r\n\r\n")
+    assert answer.startswith(b"HTTP/1.1 404 ")
+
+
+def test_connections_that_browsers_break_off_are_no_news(server, capfd):
+    """Reset before, within and after a request; a line that is no request; then all goes on."""
+    token = server.address.removeprefix(f"http://{HERE}:{server.port}")
+    server.files = {"index.html": b"<html>", "scene.bin": bytes(8 << 20)}
+    whole = f"GET {token}scene.bin HTTP/1.1\r\nHost: {HERE}:{server.port}\r\n\r\n".encode()
+    for words in (b"", whole[:20], whole):
+        for _ in range(4):
+            raw(server, words, reset=True)
+    assert raw(server, b"\x00\xff\r\n\r\n").startswith((b"HTTP/1.1 400 ", b"<!DOCTYPE", b""))
+    assert ask(server, token)[0] == 200
+    time.sleep(0.2)  # for threads of those that were reset
+    assert capfd.readouterr().err == ""
+
+
+def test_many_connections_wait_in_line(server):
+    """socketserver's own line of 5 makes the sixth wait a second for each try."""
+    assert server._server.request_queue_size >= 100
 
 
 def test_new_files_are_another_version(server):

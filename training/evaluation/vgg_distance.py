@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.gate.network import StrangeNetwork
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.session import load_onnxruntime, open_session
 
 LAYERS = ("relu1_2", "relu2_2", "relu3_3", "relu4_3")
 MEAN_BGR = np.array([103.939, 116.779, 123.68], np.float32)  # of ImageNet, as the file wants it off
 LEAST_SIDE = 16  # pixels: three halvings leave two
 LARGEST_FILE = 1 << 30  # bytes
+DISTANCE = f"{__name__}:distance_of"  # in the process that has the features
 TINY = 1e-10  # added to a length before dividing by it
 
 
@@ -55,7 +56,7 @@ class VggDistance:
             image = photo + weight[..., None] * (image - photo)
         pair = 255 * np.stack([image, photo])[..., ::-1] - MEAN_BGR
         pair = np.ascontiguousarray(pair.transpose(0, 3, 1, 2), np.float32)
-        return distance_of(self.session.run(list(LAYERS), {self.input: pair}))
+        return self.session.run(list(LAYERS), {self.input: pair}, then=DISTANCE)
 
 
 def check_size(width: int, height: int) -> None:
@@ -67,19 +68,12 @@ def check_size(width: int, height: int) -> None:
         )
 
 
-def opened(data: bytes, path: Path):
-    """The session of a network's bytes on all cores.  Raises BadFile."""
+def opened(data: bytes, path: Path) -> StrangeNetwork:
+    """A network's bytes, opened behind the gate on all cores.  Raises BadFile."""
     from shapeshift.training.gradients.check_network import check_network
 
     check_network(data, path)
-    errors = load_onnxruntime().capi.onnxruntime_pybind11_state
-    try:
-        return open_session(data, threads=0)
-    except (
-        errors.Fail, errors.InvalidArgument, errors.InvalidGraph, errors.InvalidProtobuf,
-        errors.NotImplemented, errors.RuntimeException,
-    ) as error:  # fmt: skip
-        raise BadFile(f"{path} is not a network that onnxruntime can open: {error}.") from None
+    return StrangeNetwork(path, 0, data)
 
 
 def distance_of(layers: list[np.ndarray]) -> float:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
+from shapeshift.runtime_models.gate.network import StrangeNetwork
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.gradients.check_network import check_network
-from shapeshift.training.gradients.fold_constants import open_checked, quiet_options, run_checked
 from shapeshift.training.gradients.gradient_session import GradientSession, open_graph
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
 from shapeshift.training.gradients.read_network import read_bytes, read_network
@@ -91,7 +91,7 @@ class ClipModel:
             given = {WORDS: np.array([padded], np.int64)}
             if self.masked:
                 given[MASK] = np.array([[int(i < len(ids)) for i in range(len(padded))]], np.int64)
-            (row,) = run_checked(self.text, [READ], given, "text_model.onnx")
+            (row,) = self.text.run([READ], given)
             rows.append(refuse_unusual(np.atleast_2d(row), Path("text_model.onnx"))[0])
         mean = np.mean([row / (np.linalg.norm(row) + 1e-12) for row in rows], axis=0)
         return (mean / (np.linalg.norm(mean) + 1e-12)).astype(np.float32)
@@ -151,7 +151,7 @@ def open_text(path: Path):
     """
     data = read_bytes(path)
     check_network(data, path)
-    session = open_checked(data, path.name, quiet_options())
+    session = StrangeNetwork(path, 0, data)
     inputs = {node.name: node.shape for node in session.get_inputs()}
     outputs = [node.name for node in session.get_outputs()]
     if WORDS not in inputs or set(inputs) - {WORDS, MASK} or READ not in outputs:

@@ -69,7 +69,7 @@ class ImageNetwork:
         planes = layout_of(self.picture.shape) == "planes"
         given = (image.transpose(2, 0, 1) if planes else image)[None] * np.float32(scale)
         inputs = {self.picture.name: np.ascontiguousarray(given, np.float32)} | self.given
-        found = run_network(self.session, [self.shown.name], inputs, self.path)[0]
+        found = self.session.run([self.shown.name], inputs)[0]
         if found.ndim != 4 or len(found) != 1:
             raise BadFile(f"{self.path} gives {found.shape} for a picture; one picture is wanted.")
         planes = layout_of(self.shown.shape) == "planes"
@@ -85,7 +85,7 @@ def encode_style(path: Path, picture: np.ndarray) -> np.ndarray:
     image = resized(picture, fixed_size(inputs[0].shape) or (USUAL_SIDE, USUAL_SIDE))
     given = image.transpose(2, 0, 1) if layout_of(inputs[0].shape) == "planes" else image
     rows = {inputs[0].name: np.ascontiguousarray(given[None], np.float32)}
-    return run_network(session, [outputs[0].name], rows, path)[0]
+    return session.run([outputs[0].name], rows)[0]
 
 
 def open_network(path: Path):
@@ -98,17 +98,6 @@ def open_network(path: Path):
             f"{path} has {path.stat().st_size:,} bytes, at most {LARGEST_FILE:,} are read."
         )
     return opened(path.read_bytes(), path)
-
-
-def run_network(session, outputs: list[str], inputs: dict, path: Path) -> list[np.ndarray]:
-    """What a network gives.  Raises BadFile where it refuses its inputs."""
-    from onnxruntime.capi import onnxruntime_pybind11_state as errors
-
-    try:
-        return session.run(outputs, inputs)
-    except (errors.Fail, errors.InvalidArgument, errors.RuntimeException) as error:
-        shapes = {name: array.shape for name, array in inputs.items()}
-        raise BadFile(f"{path} does not run on {shapes}: {error}") from None
 
 
 def layout_of(shape: list) -> str:

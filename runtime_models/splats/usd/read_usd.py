@@ -1,15 +1,11 @@
 """USD scenes (.usd, .usda, .usdc, .usdz) with ParticleField3DGaussianSplat, of OpenUSD 26.03 on.
 
-Read by the package usd-core, an optional one, in a process of its own (usd_run.py): its C++ ends
-the process on some damaged files.
+Read by the package usd-core, an optional one, behind the gate (usd_run.py): its C++ ends the
+process on some damaged files.
 """
 
 import importlib.util
-import json
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,8 +13,8 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
 from shapeshift.runtime_models.files.memory import Account
-from shapeshift.runtime_models.files.npy import read_array
-from shapeshift.runtime_models.files.zip_files import member_names, opened_zip
+from shapeshift.runtime_models.files.zip_files import member_names
+from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.splats.placed_splats import joined, moved
 from shapeshift.runtime_models.splats.plain_splats import (
@@ -27,18 +23,11 @@ from shapeshift.runtime_models.splats.plain_splats import (
     Reading,
     empty_splats,
 )
-from shapeshift.runtime_models.splats.usd.usd_run import (
-    HARMONICS,
-    KIND,
-    REFUSED,
-    SECONDS,
-    SECONDS_A_BYTE,
-)
+from shapeshift.runtime_models.splats.usd.usd_run import HARMONICS, KIND
 
 PACKAGE = "usd-core"
 MARKS = (b"#usda", b"PXR-USDC")
 ENDINGS = (".usd", ".usda", ".usdc")
-WAIT = 20  # times the processor time of the reading process, where it cannot be limited itself
 CENTIMETRE = 0.01  # metres a unit, where a stage does not say, by USD's own rule
 GRAY = 0.0  # of a first harmonic that is not there: 0.5
 LEAVES_AXES = "gsplat2USD"  # NVIDIA's: up to 0.1.5, in the layer's comment, whatever its upAxis
@@ -69,53 +58,18 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
     reading = reading.within(path)
     memory = reading.account
     reading.report(f"reading {path.name}", 0.0)
-    with tempfile.TemporaryDirectory(prefix="shapeshift-", ignore_cleanup_errors=True) as folder:
-        made = Path(folder, "splats.npz")
-        run(path, made, memory)
-        with opened_zip(made, path.name, memory) as archive:
-
-            def read(name: str) -> np.ndarray | None:
-                return read_array(archive, name, path.name, memory)
-
-            stored = read("facts")
-            assert stored is not None, "usd_run writes it always"
-            facts = json.loads(stored.tobytes())
-            found = [
-                part_of(read, number, field, facts, path, memory)
-                for number, field in enumerate(facts["fields"])
-            ]
+    read_by_usd = ask("USD", path, [str(path.resolve())], memory=memory.left)
+    arrays, facts = read_by_usd["arrays"], read_by_usd["facts"]
+    memory.charge(sum(array.nbytes for array in arrays.values()), "its arrays")
+    found = [
+        part_of(arrays.get, number, field, facts, path, memory)
+        for number, field in enumerate(facts["fields"])
+    ]
     parts = [part for part in found if part is not None]
     if not parts:
         held = f" (it has {', '.join(facts['others'])})" if facts["others"] else ""
         raise BadFile(f"{path.name} has no visible {KIND}{held}; export splats of that kind.")
     return joined(parts, path.name)
-
-
-def run(path: Path, made: Path, memory: Account) -> None:
-    """The process that reads the scene and writes its arrays.  Raises BadFile, whatever becomes of
-    it."""
-    script, size = str(Path(__file__).with_name("usd_run.py")), path.stat().st_size
-    said = made.with_name("said")
-    command = [sys.executable, "-P", script, str(path.resolve()), str(made), str(memory.left)]
-    # Neither plugins nor search paths of the user, and no threads that reserve memory.
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("PXR_", "USD_", "TF_"))}
-    kept |= {"PXR_WORK_THREAD_LIMIT": "1", "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}
-    with open(said, "wb") as errors:
-        try:
-            done = subprocess.run(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors,
-                timeout=WAIT * (SECONDS + SECONDS_A_BYTE * size), env=kept, cwd=made.parent,
-            )  # fmt: skip
-        except subprocess.TimeoutExpired:
-            raise BadFile(f"{path.name} takes longer to read than a scene of its size.") from None
-    if done.returncode == REFUSED:
-        words = said.read_text(errors="replace").strip().splitlines()
-        raise BadFile(f"{path.name}: {words[-1] if words else 'no USD that can be read'}.")
-    if done.returncode or not made.is_file():
-        raise BadFile(
-            f"{path.name}: no USD that can be read, or one that takes more memory than its "
-            f"{size:,} bytes may; --memory allows more."
-        )
 
 
 def part_of(

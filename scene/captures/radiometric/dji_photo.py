@@ -99,7 +99,7 @@ def _read(file: Path, photo: Path) -> np.ndarray:
     """The converter's TIFF of floating-point numbers, charged to the photo."""
     where = path_end(photo)
     try:
-        with Image.open(file) as image:
+        with Image.open(file, formats=["TIFF"]) as image:
             pixels = image.width * image.height
             if image.mode != "F" or not 0 < pixels <= MOST_NUMBERS:
                 raise ValueError(f"{image.mode} of {image.width}x{image.height}")

@@ -2,15 +2,15 @@
 
 A radiometric JPEG (R-JPEG) is a picture for people with the camera's own numbers in APP1 segments
 that begin with "FLIR": records of a directory "FFF", one with the raw numbers, one with what makes
-temperatures of them by Planck's law.  flyr (EUPL 1.2, an optional extra) knows them.
+temperatures of them by Planck's law.  flyr (EUPL 1.2, an optional extra) knows them; it works
+behind the gate, flir_run.py.
 """
 
-import io
 import math
 import re
 import struct
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
@@ -18,12 +18,10 @@ from PIL import Image
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.radiometric.dji_photo import ADVICE, converter, dji_celsius, is_dji
 from shapeshift.scene.captures.radiometric.no_value import resized_numbers
-
-if TYPE_CHECKING:
-    from flyr.thermogram import FlyrThermogram
 
 GRIDS = (".npy", ".csv")
 JPEGS = (".jpg", ".jpeg", ".jfif")
@@ -148,8 +146,6 @@ def _is_flir(path: Path) -> bool:
 
 def cannot_read_radiometric(path: Path) -> str:
     """What is to be installed for the temperatures of such a photo; "": nothing."""
-    from importlib.util import find_spec
-
     if is_dji(path):
         return "" if converter() else ADVICE
     return "" if find_spec("flyr") is not None else "for degrees: pip install flyr"
@@ -162,6 +158,8 @@ def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
     """
     celsius = dji_celsius(path) if is_dji(path) else read_radiometric(path)[0]
     height, width = celsius.shape
+    if not celsius.size:
+        raise BadFile(f"{path_end(path)}: it has {width}x{height} thermal numbers; copy it again")
     if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
         raise BadFile(
             f"{path_end(path)}: {width}x{height} numbers in a picture of {size[0]}x{size[1]}; both "
@@ -178,12 +176,10 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
     where = path_end(path)
     if is_dji(path):
         raise BadFile(f"{where}: a DJI camera's settings are not read; say them")
-    try:
-        import flyr
-    except ImportError:
+    if find_spec("flyr") is None:
         raise BadFile(
             f"{where}: a radiometric JPEG; its temperatures want the package flyr: pip install flyr"
-        ) from None
+        )
     data = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b""
     sides = [
         [int.from_bytes(side, "big") for side in found.groups()]
@@ -193,32 +189,9 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
         raise BadFile(f"{where}: more numbers than a thermal camera has; copy it again")
     most = max([len(data) // 2, *(width * height for width, height in sides)])
     Memory().of(path).charge(RAW * most, f"{most:,} numbers")
-    try:
-        opened = flyr.unpack(io.BytesIO(data))
-        with np.errstate(all="ignore"):  # of a camera set to nonsense: NaN stays
-            celsius = np.asarray(opened.celsius, np.float32)
-            if (gone := _saturated(opened, data)) is not None:
-                celsius = np.where(gone, np.float32(np.nan), celsius)
-            return celsius, dict(opened.metadata)
-    except Exception as error:  # of a parser that checks nothing: any
-        raise BadFile(
-            f"{where}: its thermal numbers cannot be read ({error}); copy it again"
-        ) from None
-
-
-def _saturated(opened: "FlyrThermogram", data: bytes) -> np.ndarray | None:
-    """(H, W) bool where a FLIR camera says that it measured nothing: at its limits or beyond; None
-    where its file states none.
-
-    The limits are of a black body without air before it, whatever the camera is set to.
-    """
     low, high = saturation_kelvin(data)
-    if high == math.inf:
-        return None
-    apparent = opened.adjust_metadata(
-        emissivity=1.0, object_distance=0.0, ir_window_transmission=1.0
-    ).kelvin
-    return ~((apparent > low) & (apparent < high))
+    found = ask("thermal photo", path, [str(path.absolute()), low, high])
+    return found["celsius"], found["settings"]
 
 
 def saturation_kelvin(jpeg: bytes) -> tuple[float, float]:

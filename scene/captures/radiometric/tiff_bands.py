@@ -16,6 +16,8 @@ from PIL.TiffImagePlugin import TiffImageFile
 
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.pictures.rare_photo import is_rare, rare_photo
+from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
 from shapeshift.scene.captures.radiometric.no_value import GDAL_NODATA
 
 HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
@@ -187,7 +189,10 @@ def open_band(path: Path, band: int) -> Image.Image:
             raise BadFile(f"{where}: band {band} holds numbers of bits that are not read")
         if page.dtype(sample) is not None and page.one(PACKING, 1) not in (6, 7):
             return _opened(path, order, page, sample, band)
-    with Image.open(path) as image:
+    with Image.open(path, formats=USUAL) as opened:
+        image = rare_photo(path, MOST_NUMBERS)[0] if is_rare(opened) else opened
+        if image is None:
+            raise BadFile(f"{where}: {opened.width}x{opened.height} pixels; scale it down")
         image.load()
         shown = image.convert("RGB") if image.mode in ("P", "CMYK", "YCbCr", "LAB") else image
         refuse_band(where, band, len(shown.getbands()))

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures import las_run
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.las_run import las_points
 from shapeshift.scene.captures.read_capture import read_capture
@@ -211,7 +210,9 @@ def test_laser_clouds_are_read_and_thinned(tmp_path, ending):
     np.testing.assert_allclose(found, points, atol=6e-5)
     np.testing.assert_allclose(read_las(path, 300)[0], points[::4], atol=6e-5)
     for chunk in (64, 100, 1000, 1001, 1002):  # whatever the pieces, every 4th
-        np.testing.assert_allclose(las_points(path, 300, chunk)[0], points[::4], atol=6e-5)
+        np.testing.assert_allclose(
+            las_points(str(path), 300, chunk)["points"], points[::4], atol=6e-5
+        )
 
 
 @pytest.mark.parametrize("ending", ["las", "laz"])
@@ -219,7 +220,7 @@ def test_cut_and_mangled_laser_clouds_are_one_sentence(tmp_path, ending):
     path = tmp_path / f"a.{ending}"
     write_las(path, RNG(0).uniform(-2, 2, (300, 3)))
     whole, random = path.read_bytes(), RNG(1)
-    for number in range(80 if ending == "las" else 12):  # each LAZ takes a process
+    for number in range(40):
         data = bytearray(whole)
         if number % 2:
             data = data[: int(random.integers(len(whole)))]
@@ -232,21 +233,6 @@ def test_cut_and_mangled_laser_clouds_are_one_sentence(tmp_path, ending):
             assert found.ndim == 2
         except BadFile as error:
             assert "\n" not in str(error)
-
-
-@pytest.mark.parametrize(
-    "end", ["os.abort()", "[0] * 10**11", "while True: pass", "raise SystemExit"]
-)
-def test_a_decoder_that_ends_its_process_is_one_sentence(tmp_path, end, monkeypatch):
-    path, script = tmp_path / "a.laz", tmp_path / "las_run.py"
-    write_las(path, RNG(0).uniform(-2, 2, (300, 3)))
-    text = Path(las_run.__file__).read_text().replace("A_BYTE = 5,", "A_BYTE = 1,")
-    script.write_text(text.replace("    import laspy\n", f"    {end}\n", 1))
-    monkeypatch.setattr(
-        "shapeshift.scene.captures.read_las.__file__", str(tmp_path / "read_las.py")
-    )
-    with pytest.raises(BadFile, match="no LAZ that can be unpacked; copy it again"):
-        read_las(path, 1000)
 
 
 def test_a_chunk_table_of_nonsense_is_one_sentence(tmp_path):
