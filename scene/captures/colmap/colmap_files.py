@@ -50,7 +50,7 @@ def photos_folder(base: Path) -> Path:
 
 def masks_of(base: Path, root: Path, paths: Sequence[Path], table: FileTable) -> dict[Path, Path]:
     """The masks of photos; what else lies among these and these masks is left out."""
-    name_of = {path: Path(os.path.relpath(path, root)).as_posix() for path in paths}
+    name_of = {path: name_below(root, path) for path in paths}
     names = list(name_of.values())
     if root == base:  # beside the model: only folders that have photos of it
         places = sorted({name.rpartition("/")[0] for name in names})
@@ -69,6 +69,14 @@ def masks_of(base: Path, root: Path, paths: Sequence[Path], table: FileTable) ->
     table.left_out("masks", found.others, NO_NAME)
     table.left_out("masks", found.unread, OTHER_MASKS)
     return {path: found.of[key] for path in paths if (key := photo_key(name_of[path])) in found.of}
+
+
+def name_below(root: Path, path: Path) -> str:
+    """A path as a name in `root`, with /; names may go up and down again."""
+    text, start = str(path), f"{root}{os.sep}"
+    if os.sep == "/" and text.startswith(start) and "/../" not in text:
+        return text[len(start) :]  # nearly all; relpath asks for the working folder each time
+    return Path(os.path.relpath(path, root)).as_posix()
 
 
 def points_of(
@@ -146,7 +154,7 @@ def listed_split(
         return photos if by_folder else split_every_8th(photos)
     used, left, taken = [], [], set()
     for photo in photos:
-        key = photo_key(Path(os.path.relpath(photo.path, root)).as_posix())
+        key = photo_key(name_below(root, photo.path))
         key = key if key in splits else os.path.splitext(key)[0]  # lists may leave out endings
         if key in splits:
             used.append(replace(photo, split=splits[key][2]))
