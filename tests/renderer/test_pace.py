@@ -21,6 +21,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.stop_weights import Pace
 from tests.support.models import make_random_model
 from tests.support.splat_scenes import random_layers
 
@@ -117,3 +118,12 @@ def test_export_measures_a_pace_and_lint_finds_where_one_lacks(switch, tmp_path,
     export = ["export", str(tmp_path / "a.shift"), "--out", str(plain), "--no-pace"]
     assert cli.main(export) == 0 and read_package(plain).pace == ()
     assert Path(plain).read_bytes() == Path(tmp_path / "a.shift").read_bytes()
+
+
+def test_a_way_that_jumps_has_a_pace_too():
+    """Nearly all of the change within a hundred-thousandth of the way, as between two palettes."""
+    for shares in ([0, 1 - 1e-5, 1], [0, 1e-5, 1], [0, 0.5, 0.50001, 1]):
+        steps = np.zeros(len(shares) - 1)
+        steps[int(np.argmin(np.diff(shares)))] = 1.0
+        curve = even_curve(np.array(shares), steps)
+        assert Pace("a", "b", tuple(curve.tolist())).blend[1] > 0  # it rises: nothing is raised

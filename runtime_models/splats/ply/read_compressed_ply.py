@@ -165,11 +165,25 @@ def unpack_smallest_three(packed: np.ndarray, out: np.ndarray) -> None:
     from_smallest_three(small, packed >> 30, out)
 
 
-def from_smallest_three(small: list[np.ndarray], largest: np.ndarray, out: np.ndarray) -> None:
-    """out (N, 4): quaternions of three entries in order, (N,) each, and which one is left out."""
+def from_smallest_three(
+    small: list[np.ndarray],
+    largest: np.ndarray,
+    out: np.ndarray,
+    columns: tuple[int, int, int, int] = (0, 1, 2, 3),
+) -> None:
+    """out (N, 4): quaternions of three entries in order, (N,) each, and which one is left out.
+
+    columns: where in `out` each of the four entries belongs.
+    """
     a, b, c = small
-    rest = np.sqrt(np.maximum(0, 1 - (a * a + b * b + c * c)))
-    out[:, 0] = np.where(largest == 0, rest, a)
-    out[:, 1] = np.where(largest == 0, a, np.where(largest == 1, rest, b))
-    out[:, 2] = np.where(largest == 3, c, np.where(largest == 2, rest, b))
-    out[:, 3] = np.where(largest == 3, rest, c)
+    rest = a * a
+    rest += b * b
+    rest += c * c
+    np.subtract(np.float32(1), rest, out=rest)
+    np.maximum(rest, 0, out=rest)
+    np.sqrt(rest, out=rest)
+    first, second, third, last = (largest == entry for entry in range(4))
+    out[:, columns[0]] = np.where(first, rest, a)
+    out[:, columns[1]] = np.where(first, a, np.where(second, rest, b))
+    out[:, columns[2]] = np.where(last, c, np.where(third, rest, b))
+    out[:, columns[3]] = np.where(last, rest, c)

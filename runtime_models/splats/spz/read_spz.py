@@ -31,6 +31,7 @@ from shapeshift.runtime_models.splats.spz.spz_file import (
 
 COLOR_SCALE = 0.15  # of the first coefficient: code / 255 = 0.5 + 0.15 f
 SMALL = np.float32(0.5**0.5 / 511)  # of a code of the smallest three
+SIGNED = np.outer((1, -1), np.arange(512, dtype=np.float32) * SMALL).astype(np.float32).ravel()
 
 
 def has_spz_mark(head: bytes, path: Path) -> bool:
@@ -101,11 +102,17 @@ def decoders(
         raw.opacity[rows] = codes[:, 0] / np.float32(255)
 
     def colors(rows: slice, codes: np.ndarray) -> None:
-        shades = codes / np.float32(255) - np.float32(0.5)
-        np.divide(shades, np.float32(COLOR_SCALE), out=raw.sh[rows, 0])
+        shades = codes.ravel().astype(np.float32)
+        shades /= np.float32(255)
+        shades -= np.float32(0.5)
+        shades /= np.float32(COLOR_SCALE)
+        for channel in range(3):  # a long run each: numpy is slow at runs of three
+            raw.sh[rows, 0, channel] = shades[channel::3]
 
     def scales(rows: slice, codes: np.ndarray) -> None:
-        raw.scales[rows] = codes / np.float32(16) - np.float32(10)
+        sizes = raw.scales[rows]
+        np.multiply(codes, np.float32(1 / 16), out=sizes)
+        sizes -= np.float32(10)
 
     def rotations(rows: slice, codes: np.ndarray) -> None:
         unpack = unpack_first_three if header.version < 3 else unpack_smallest_three
@@ -129,12 +136,11 @@ def unpack_places(codes: np.ndarray, header: SpzHeader) -> np.ndarray:
     """(n, 3) float32, exact: 24 bits each, or half floats in version 1."""
     if header.version == 1:
         return codes.view("<f2").astype(np.float32)
-    words = np.zeros((len(codes), 3, 4), np.uint8)
-    words[:, :, 1:] = codes.reshape(-1, 3, 3)
-    # The code is on top of its word, with its sign.
-    out = (words.view("<i4")[:, :, 0] >> 8).astype(np.float32)
-    out *= np.float32(0.5**header.fractional_bits)
-    return out
+    # The code is on top of its word, with its sign; the byte below belongs to the code before.
+    data = np.zeros(codes.size + 1, np.uint8)
+    data[1:] = codes.ravel()
+    words = np.ndarray((len(codes), 3), "<i4", data, strides=(9, 3)) & np.int32(-256)
+    return np.multiply(words, np.float32(0.5 ** (header.fractional_bits + 8)), dtype=np.float32)
 
 
 def unpack_first_three(codes: np.ndarray, out: np.ndarray) -> None:
@@ -149,9 +155,6 @@ def unpack_smallest_three(codes: np.ndarray, out: np.ndarray) -> None:
     words = codes.view("<u4")[:, 0]
     small = []
     for shift in (20, 10, 0):
-        code = words >> np.uint32(shift)
-        value = (code & 511).astype(np.float32) * SMALL
-        small.append(np.where(code & 512, -value, value))
-    xyzw = np.empty_like(out)
-    from_smallest_three(small, words >> 30, xyzw)
-    out[:] = xyzw[:, (3, 0, 1, 2)]
+        code = (words >> np.uint32(shift)) & np.uint32(1023)
+        small.append(np.take(SIGNED, code.astype(np.intp), mode="clip"))
+    from_smallest_three(small, words >> np.uint32(30), out, columns=(1, 2, 3, 0))

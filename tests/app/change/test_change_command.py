@@ -2,6 +2,8 @@
 
 import csv
 import json
+import shutil
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,7 @@ from PIL import Image
 
 import shapeshift as ss
 from shapeshift.app import cli
+from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
 from shapeshift.scene.change.similarity import Similarity, rotation_of
@@ -272,3 +275,25 @@ def test_what_cannot_be_compared_is_refused_in_a_sentence(visits, tmp_path, caps
 
 def test_what_was_written_is_replaced_only_where_that_is_asked(visits, written, capsys):
     assert "--overwrite" in refused(capsys, visits / "before", visits / "after", "--out", written)
+
+
+def test_other_values_than_heat_are_higher_and_lower(visits, tmp_path):
+    """The same numbers as shares of one: a twentieth of the range counts, as 5 degrees of 100."""
+    for name in ("before", "after"):
+        shutil.copytree(visits / name, tmp_path / name)
+        said = json.loads((tmp_path / name / LIST).read_text(encoding="utf-8"))
+        said["stops"][1] |= {"name": "Moisture", "kind": "values", "value_range": [0, 1]}
+        said["stops"][1]["unit"] = "m³/m³"
+        (tmp_path / name / LIST).write_text(json.dumps(said), encoding="utf-8")
+    out = tmp_path / "out"
+    found = ss.change(tmp_path / "before", tmp_path / "after", size=SIZE, out=out, context="none")
+    kinds = Counter(place.kind for place in found.places)
+    assert kinds["higher"] == 2 and kinds["lower"] == 1 and not {"hotter", "colder"} & set(kinds)
+    assert found.compared == ("shape", "colour", "values")
+    assert found.settings.least_value == pytest.approx(0.05)
+    green = next(p for p in found.places if p.kind == "higher" and abs(p.centre[0] - 0.3) < 0.1)
+    assert green.amount == pytest.approx(0.15, abs=0.005) and green.unit == "m³/m³"
+    change = next(s for s in ss.load(out / "layers").stops if s.name == "Change of values")
+    assert (change.kind, change.unit) == ("values", "m³/m³")
+    with pytest.raises(ss.UsageError, match="no stop 'Heat' of values"):
+        ss.change(tmp_path / "before", tmp_path / "after", values="Heat", context="none")

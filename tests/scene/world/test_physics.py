@@ -168,18 +168,6 @@ def test_flight_is_the_parabola(gravity, velocity):
     assert np.allclose(physics.velocity(body)[0], np.array(velocity) - (0, gravity, 0), atol=1e-3)
 
 
-@pytest.mark.parametrize(("speed", "way"), [(0.0099, 0.5), (0.0101, 1.0), (0.05, 1.0)])
-def test_where_nothing_pulls_only_the_slowest_come_to_rest(speed, way):
-    """Half a second below the engine's 1 cm/s, as docs/scene.md says of gravity 0."""
-    physics = Physics(gravity_m_s2=0)
-    body = physics.add_body([box(0.1, 0.1, 0.1)], at(0, 1, 0), 1.0)
-    physics.set_velocity(body, (speed, 0, 0))
-    for _ in range(90):
-        physics.step()
-    assert physics.pose(body).position[0] == pytest.approx(way * speed, rel=0.01)
-    assert physics.sleeps(body) == (way < 1)
-
-
 @pytest.mark.parametrize("friction", [0.1, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("kind", ["floor", "slab"])
 def test_sliding_stops_where_friction_says(friction, kind):

@@ -257,3 +257,15 @@ def test_the_floor_has_an_id_and_carries():
     run(physics, 2)
     assert physics.pose(body).position[1] == pytest.approx(-1.4, abs=1 * MM)
     assert physics.ids() == (FLOOR, body) and physics.bodies() == (body,)
+
+
+@pytest.mark.parametrize(("speed", "way"), [(0.0099, 0.5), (0.0101, 1.0), (0.05, 1.0)])
+def test_where_nothing_pulls_only_the_slowest_come_to_rest(speed, way):
+    """Half a second below the engine's 1 cm/s, as docs/scene.md says of gravity 0."""
+    physics = Physics(gravity_m_s2=0)
+    body = physics.add_body([box(0.1, 0.1, 0.1)], at(0, 1, 0), 1.0)
+    physics.set_velocity(body, (speed, 0, 0))
+    for _ in range(90):
+        physics.step()
+    assert physics.pose(body).position[0] == pytest.approx(way * speed, rel=0.01)
+    assert physics.sleeps(body) == (way < 1)
