@@ -14,7 +14,7 @@ POINTER = "KHR_animation_pointer"
 MOST_INSTANCES = 10_000  # of meshes in a scene
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Placed:
     """A node's mesh: once, or once for each of its instances."""
 
@@ -40,7 +40,8 @@ def placed_nodes(asset: Asset) -> list[Placed]:
     moving = animated_nodes(asset)
     found: list[Placed] = []
     seen: set[int] = set()
-    waiting = [(r, np.eye(4), False, False) for r in reversed(scene_roots(asset, len(nodes)))]
+    more, still = 0, np.eye(4)
+    waiting = [(root, still, False, False) for root in reversed(scene_roots(asset, len(nodes)))]
     while waiting:
         index, world_from_parent, hidden, animated = waiting.pop()
         node = asset.entry("nodes", index)
@@ -56,9 +57,12 @@ def placed_nodes(asset: Asset) -> list[Placed]:
         hidden |= not asset.item(extension(asset, node, VISIBILITY), "visible", bool, True)
         animated |= index in moving
         if "mesh" in node:
-            worlds = world_from_node @ instance_matrices(asset, node, index)
+            worlds = world_from_node[None]
+            if INSTANCES in asset.item(node, "extensions", dict, {}):
+                worlds = worlds @ instance_matrices(asset, node, index)
             found.append(Placed(node["mesh"], worlds, hidden, animated))
-            if sum(len(placed.worlds) for placed in found) > max(MOST_INSTANCES, len(nodes)):
+            more += max(len(worlds) - 1, 0)
+            if more > MOST_INSTANCES:
                 raise asset.refuse(f"it has over {MOST_INSTANCES:,} instances of meshes.")
         children = asset.item(node, "children", list, [])
         waiting += [(c, world_from_node, hidden, animated) for c in reversed(children)]
@@ -70,7 +74,7 @@ def extension(asset: Asset, owner: dict, name: str) -> dict:
 
 
 def instance_matrices(asset: Asset, node: dict, index: int) -> np.ndarray:
-    """(K, 4, 4) node_from_instance by EXT_mesh_gpu_instancing; one identity without."""
+    """(K, 4, 4) node_from_instance by EXT_mesh_gpu_instancing; one identity without attributes."""
     attributes = asset.item(extension(asset, node, INSTANCES), "attributes", dict, {})
     parts = {
         name: asset.read(attributes[name], f"{INSTANCES} {name}", width)

@@ -63,9 +63,7 @@ def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
 def no_splats(asset: Asset, hidden: int) -> BadFile:
     """Why a scene shows no splats: no such mesh, all of them hidden, or the extension lost."""
     if hidden:
-        return asset.refuse(
-            "all its Gaussian splats are on hidden nodes or on such of 0 instances; show some."
-        )
+        return asset.refuse("all its splats are on hidden nodes or on such without instances.")
     meshes = asset.item(asset.json, "meshes", list, [])
     rows = [row for i in range(len(meshes))
             for row in asset.item(asset.entry("meshes", i), "primitives", list, [])]  # fmt: skip

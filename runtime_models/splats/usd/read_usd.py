@@ -73,7 +73,7 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
         raise BadFile(f"{path.name} has no visible {KIND}{held}; export splats of that kind.")
     raw = joined(parts, path.name)
     told = (
-        (facts["unshown"], "of its fields of splats are shown later in time only"),
+        (facts["unshown"], "of its fields of splats show later in time only"),
         (facts["nested"], "instances of point instancers within point instancers"),
     )
     left = [
