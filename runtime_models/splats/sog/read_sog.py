@@ -25,6 +25,7 @@ GEOMETRY, DECODING = 44, 72  # bytes a splat of the arrays but for harmonics, an
 ROOM = 1 << 16  # pixels that a picture may have beyond four times its splats
 FIRST_MODE = 252  # the alpha of a quaternion says which entry is the largest: 252 is w
 LARGEST_NUMBER = 1e38  # of float32
+CODES = 1 << 16  # of a coordinate
 HEAD = 1 << 16  # bytes of a meta.json that tell what it is
 
 
@@ -181,9 +182,12 @@ def decode(sog: Sog, part: str, codes: np.ndarray) -> np.ndarray:
     """float32 of bytes (..., c): by a codebook (version 2) or between two ends (version 1)."""
     if sog.version == 2:
         codebook = sog.numbers(part, "codebook", 1, 256)
-        if codes.size and codes.max() >= len(codebook):
+        if len(codebook) < 256 and codes.size and codes.max() >= len(codebook):
             raise sog.bad(f"the codebook of {part} has {len(codebook)} numbers, some codes more")
-        return codebook[codes]
+        values = np.empty(codes.shape, np.float32)
+        for channel in range(codes.shape[-1]):
+            values[..., channel] = codebook.take(codes[..., channel].astype(np.intp))
+        return values
     width = 1 if part == "shN" else codes.shape[-1]
     low, high = (sog.numbers(part, end, width, max(width, 3))[:width] for end in ("mins", "maxs"))
     share = codes.astype(np.float32) / 255
@@ -193,16 +197,24 @@ def decode(sog: Sog, part: str, codes: np.ndarray) -> np.ndarray:
 def read_means(sog: Sog) -> np.ndarray:
     """(N, 3) float32: 16 bits between two ends of sign(x) log(1 + |x|), in two pictures."""
     low, high = (sog.numbers("means", end, 3, 3).astype(float) for end in ("mins", "maxs"))
-    codes = sog.pixels("means", 0)[:, :3].astype(np.uint16)
-    codes |= sog.pixels("means", 1)[:, :3].astype(np.uint16) << 8
+    fine, coarse = sog.pixels("means", 0)[:, :3], sog.pixels("means", 1)[:, :3]
     means = np.empty((sog.count, 3), np.float32)
 
-    def fill(rows: slice, _: object) -> None:
-        share = codes[rows] / 65535
-        bent = low * (1 - share) + high * share
-        means[rows] = np.sign(bent) * np.expm1(np.abs(bent))
+    def unbent(axis: int, codes: np.ndarray) -> np.ndarray:
+        share = codes / 65535
+        bent = low[axis] * (1 - share) + high[axis] * share
+        return (np.sign(bent) * np.expm1(np.abs(bent))).astype(np.float32)
 
     with np.errstate(over="ignore"):  # what is beyond float32 is for the judge
+        many = sog.count > CODES  # then each code's place is reckoned once
+        places = [unbent(axis, np.arange(CODES)) for axis in range(3)] if many else []
+
+        def fill(rows: slice, _: object) -> None:
+            for axis in range(3):
+                codes = coarse[rows, axis].astype(np.intp) << 8
+                codes |= fine[rows, axis]
+                means[rows, axis] = places[axis].take(codes) if many else unbent(axis, codes)
+
         each_block(sog.count, fill)
     return means
 
@@ -213,10 +225,12 @@ def read_quaternions(sog: Sog) -> np.ndarray:
     wxyz = np.empty((sog.count, 4), np.float32)
     unknown = pixels[:, 3] < FIRST_MODE
 
+    entries = (np.arange(256, dtype=np.float32) / 255 - 0.5) * np.float32(2**0.5)
+
     def fill(rows: slice, _: object) -> None:
-        small = (pixels[rows, :3].T.astype(np.float32, order="C") / 255 - 0.5) * np.float32(2**0.5)
+        small = [entries.take(pixels[rows, entry].astype(np.intp)) for entry in range(3)]
         mode = np.maximum(pixels[rows, 3], FIRST_MODE) - np.uint8(FIRST_MODE)
-        from_smallest_three(list(small), mode, wxyz[rows])
+        from_smallest_three(small, mode, wxyz[rows])
 
     each_block(sog.count, fill)
     if unknown.any():
