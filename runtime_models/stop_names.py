@@ -6,13 +6,19 @@ from functools import lru_cache
 COLOR_NAMES = {"rgb", "color", "colour", "visible", "images", "photo"}
 THERMAL_PARTS = (
     "thermal", "thermog", "thermic", "thermisch", "termic", "termogra", "warmebild", "wärmebild",
-    "waermebild", "lwir", "mwir", "infrared", "infrarot", "infrarouge",
+    "waermebild", "lwir", "mwir", "infrared", "infrarot", "infrarouge", "infrarroj", "thermique",
+    "红外", "紅外", "赤外", "热成像", "熱成像", "熱画像", "적외선", "열화상", "теплов", "инфракрас",
 )  # fmt: skip  # anywhere in a word
 # Words with such a part that are about something else: places, and light that is no heat.
-NOT_THERMAL = ("geothermal", "hydrothermal", "isothermal", "nearinfrared")
-# Whole words.  What cameras write: irx is Autel's, thrm an older one of DJI's.
+NOT_THERMAL = (
+    "geothermal", "hydrothermal", "isothermal", "nearinfrared", "nahinfrarot", "近红外", "近紅外",
+    "近赤外",
+)  # fmt: skip
+# Whole words.  What cameras write: irx is Autel's, thrm an older one of DJI's, boson and lepton
+# are FLIR's.
 THERMAL_WORDS = re.compile(
-    r"ir|tir|flir|irx|thrm|heat|therm|thermo(cam\w*|ima\w*|vision|s(can|hot)s?)?"
+    r"ir|tir|flir|irx|thrm|boson|lepton|heat|wärme|waerme|therm"
+    r"|thermo(cam\w*|ima\w*|vision|s(can|hot)s?)?"
     r"|ir(cam|camera|img|image|images|photo|photos)"
 )
 LIGHT_WORDS = {
@@ -22,6 +28,11 @@ LIGHT_WORDS = {
 LETTERS = re.compile(r"[^\W\d_]+")
 DIGITS = re.compile(r"\d+")
 NEAR = re.compile(r"near[\W_]*infra[\W_]*red", re.IGNORECASE)  # light: a lamp's, no heat
+# Two words of a thing or a place that is photographed, by whatever camera.
+HEAT_THING = re.compile(
+    r"(heat|thermal)[\W_]*(pump|exchanger|sink|gun|shield|bath|spring|spa|plant|insulation|paste)",
+    re.IGNORECASE,
+)
 # The words of "thermalCam", "leftIR" and "IRcam".
 CAMEL = re.compile(r"(?:LW|MW|T)?IR(?![A-Z])|RGB(?![A-Z])|[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
@@ -64,7 +75,7 @@ def words_of(name: str) -> tuple[str, ...]:
     Letters between digits are none ("a3ir9f"): such names are made up by a program.
     """
     words = []
-    for token in re.split(r"[\W_]+", NEAR.sub("nearinfrared", name)):
+    for token in re.split(r"[\W_]+", HEAT_THING.sub(r"\2", NEAR.sub("nearinfrared", name))):
         if len(found := LETTERS.findall(token)) == 1:
             inside = CAMEL.findall(found[0])
             whole = len("".join(inside)) < len(found[0])  # other letters than ASCII's

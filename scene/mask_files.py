@@ -11,12 +11,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from shapeshift.scene.capture_files import entries_of, files_below, is_picture, photo_key
+from shapeshift.scene.capture_files import (
+    SMALLER,
+    entries_of,
+    files_below,
+    is_picture,
+    photo_key,
+)
 
 # Folders of masks in which white counts, for photos of images/.
 FOLDERS = ("masks", "mask", "image_masks", "images_masks", "images_mask", "mask_images")
 INSIDE = (*FOLDERS, "_mask")  # within the folder of photos; RealityScan's layers
-OF_PHOTO = re.compile(r"(.+)(?:\.mask|_mask|-mask)$", re.DOTALL)  # before the ending
+OF_PHOTO = re.compile(r"(.+)[._-]mask$", re.DOTALL | re.IGNORECASE)  # before the ending
 # instant-ngp's hide what is white; others hold classes, in which white is one of many.
 INVERTED = re.compile(r"^dynamic_mask_")
 OTHER_FOLDERS = re.compile(r"(mask|segment|semantic)", re.IGNORECASE)
@@ -44,6 +50,8 @@ def find_masks(base: Path, photos: Path, names: Sequence[str], listed: Sequence[
     there = entries_of(base, base.stat().st_mtime_ns) if base.is_dir() else {}
     smaller = SMALLER_PHOTOS.match(photos.name)
     own = [f"{name}{smaller[1]}" for name in FOLDERS[:2]] if smaller else []
+    if not any(name in there for name in FOLDERS):  # then the smaller ones will do
+        own += [f"{name}_{factor}" for name in FOLDERS[:2] for factor in SMALLER]
     for name in (*own, *FOLDERS):
         folder = base / there.get(name, name)
         if folder.is_dir() and folder != photos:

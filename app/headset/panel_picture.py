@@ -5,10 +5,10 @@ from contextlib import contextmanager
 
 import moderngl
 from imgui_bundle import imgui
-from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import Box, clean_texts, listing_items
+from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer
 from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.vr.panel.plane import PanelPlane, Pointing
@@ -46,8 +46,8 @@ class PanelPicture:
             io.config_input_trickle_event_queue = False  # a place and a press in one frame
             io.display_size = imgui.ImVec2(*PANEL.size)
             io.display_framebuffer_scale = imgui.ImVec2(density, density)
-            theme.apply(UI_SCALE, density, keys=False)
-            self._renderer = ModernGLRenderer(wnd=None, ctx=ctx, display_size=PANEL.size)
+            theme.apply(UI_SCALE, keys=False)
+            self._renderer = OverlayRenderer(ctx)
         self.textures = Textures(ctx, self._renderer)
 
     @contextmanager

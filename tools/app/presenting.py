@@ -30,9 +30,9 @@ sys.path[:0] = [str(ROOT)]
 
 import moderngl  # noqa: E402
 import numpy as np  # noqa: E402
-from moderngl_window.integrations.imgui_bundle import ModernGLRenderer  # noqa: E402
 
 from shapeshift.app.editor.options import Options  # noqa: E402
+from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer  # noqa: E402
 from shapeshift.app.editor.state.editor_state import EditorState  # noqa: E402
 from shapeshift.app.editor.state.files.refine import Refiner  # noqa: E402
 from shapeshift.app.editor.window.overlay.presented import Presented  # noqa: E402
@@ -70,7 +70,7 @@ class Watch:
 
 def way_of_a_gpu(kept: Presented) -> Presented:
     """The same window, its overlay drawn in every frame."""
-    plain, other = object.__new__(ModernGLRenderer), copy(kept)
+    plain, other = object.__new__(OverlayRenderer), copy(kept)
     plain.__dict__.update(kept.renderer.__dict__)  # its program, buffers, and textures
     other.kept, other.renderer = None, plain
     return other

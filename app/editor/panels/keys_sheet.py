@@ -97,6 +97,7 @@ def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
             _group(name, groups[name], each, ui_scale)
         lowest = max(lowest, imgui.get_cursor_pos_y())
     imgui.set_cursor_pos(Vec(start.x, lowest))
+    imgui.dummy(Vec(0, 0))  # the window reaches down to here
     box = theme.window_box()
     imgui.end()
     return box, closed

@@ -41,7 +41,7 @@ def draw_mark(
     lines = outline_of(MarkReading(mark), through, int(CROSS * ui_scale))
     for color, width in ((ground, 4.0), (ink, 1.6)):
         for line in lines:
-            draw.add_polyline([Vec(*p) for p in line.tolist()], color, 0, width * ui_scale)
+            draw.add_polyline([Vec(*p) for p in line.tolist()], color, width * ui_scale, 0)
     if not seen:
         return
     corner = np.concatenate(lines).max(axis=0) + 3 * ui_scale
@@ -69,7 +69,7 @@ def draw_rubber(kind: str, start: tuple[float, float], end: tuple[float, float])
         radius = float(np.hypot(end[0] - start[0], end[1] - start[1]))
         draw.add_circle(Vec(*start), radius, ink, 0, 2.0)
     else:
-        draw.add_rect(Vec(*start), Vec(*end), ink, 0, 0, 2.0)
+        draw.add_rect(Vec(*start), Vec(*end), ink, 0, 2.0)
 
 
 def alarm_layer(picture: ValuePicture, isotherms: tuple[Isotherm, ...]) -> np.ndarray:

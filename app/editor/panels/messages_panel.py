@@ -74,7 +74,7 @@ def _problem(
         Vec(box[0] + STRIPE * ui_scale, box[3]),
         theme.color(theme.WARNING),
         8 * ui_scale,
-        imgui.ImDrawFlags_.round_corners_left,
+        imgui.ImDrawFlags_.round_left,
     )
     imgui.end()
     return box

@@ -100,6 +100,6 @@ def draw_recent_picture(
     if picture is None:
         draw.add_rect_filled(corner, end, theme.color(theme.RAISED))
     else:
-        draw.add_image(textures.number(f"recent {row}", picture), corner, end)
+        draw.add_image(textures.reference(f"recent {row}", picture), corner, end)
     imgui.dummy(Vec(end.x - corner.x, high))
     imgui.same_line()

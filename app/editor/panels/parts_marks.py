@@ -20,7 +20,7 @@ def draw_drag(
     ink, wide = theme.color(theme.TEXT if removes else theme.ACCENT, 0.9), 1.5 * ui_scale
     if drag == LASSO:
         points = [Vec(*start), *(Vec(x, y) for x, y in way)]
-        draw.add_polyline(points, ink, imgui.ImDrawFlags_.closed, wide)
+        draw.add_polyline(points, ink, wide, imgui.ImDrawFlags_.closed)
     elif drag == SPHERE:
         radius = float(np.hypot(way[-1][0] - start[0], way[-1][1] - start[1]))
         draw.add_circle(Vec(*start), radius, ink, 0, wide)
@@ -28,4 +28,4 @@ def draw_drag(
     else:
         corners = np.array([start, way[-1]])
         low, high = corners.min(axis=0), corners.max(axis=0)
-        draw.add_rect(Vec(*low), Vec(*high), ink, 0.0, 0, wide)
+        draw.add_rect(Vec(*low), Vec(*high), ink, 0.0, wide)

@@ -104,7 +104,7 @@ def _split_button(state: EditorState, index: int, on: bool, ui_scale: float) -> 
     high = Vec(corner.x + side - inset, corner.y + side - inset)
     middle = corner.x + side / 2
     ink = theme.color(theme.SECOND if on else theme.TEXT)
-    draw.add_rect(low, high, ink, 1.0, 0, max(1.0, side / 18))
+    draw.add_rect(low, high, ink, 1.0, max(1.0, side / 18))
     draw.add_rect_filled(Vec(middle, low.y), high, ink)
 
 

@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -79,21 +78,9 @@ def font_for(code: str) -> Path | None:
     return next((p for p in font_files(font_folders()) if has_letters(p, letters)), None)
 
 
-@dataclass(frozen=True)
-class MoreLetters:
-    """A font whose glyphs stand in for those that our own lacks."""
-
-    path: Path
-    ranges: list[int]  # pairs of first and last code point, and a 0, as ImGui wants them
-
-
-def more_letters() -> MoreLetters | None:
-    """What the language in use needs besides our own font; None: nothing."""
-    letters = missing_letters(language_in_use())
-    path = font_for(language_in_use().code) if letters else None
-    if path is None:
-        return None
-    return MoreLetters(path, [*(n for letter in letters for n in (letter, letter)), 0])
+def more_letters() -> Path | None:
+    """The font that the language in use needs besides our own; None: none."""
+    return font_for(language_in_use().code) if missing_letters(language_in_use()) else None
 
 
 def is_offered(code: str) -> bool:

@@ -113,9 +113,9 @@ class Window:
         imgui.get_io().set_ini_filename("")  # leaves no imgui.ini behind
         self._chosen_size = text_size  # None: by the monitor
         self._monitor_size = self._size_for_monitor()
-        theme.apply(self.ui_scale, self._window.pixel_ratio)
+        theme.apply(self.ui_scale)
         self._restyle = False  # the next frame's type has another size
-        self.presented = Presented(self.ctx, self.logical_size, lambda: self.size)
+        self.presented = Presented(self.ctx, lambda: self.size)
         self.textures = Textures(self.ctx, self.presented.renderer)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
         self.popup_open = False  # a list or a box is open, and the next click is for it
@@ -250,8 +250,7 @@ class Window:
         """Starts an overlay frame; returns the input since the last one that is for the scene."""
         if self._restyle:
             self._restyle = False
-            theme.apply(self.ui_scale, self._window.pixel_ratio)
-            self.presented.renderer.refresh_font_texture()
+            theme.apply(self.ui_scale)
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*self.logical_size)
         density = self._window.pixel_ratio

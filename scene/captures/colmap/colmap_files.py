@@ -21,7 +21,7 @@ from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.capture_rules import split_every_8th
 from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
 from shapeshift.scene.captures.colmap.text_lines import lines_of
-from shapeshift.scene.captures.colmap_tables import images_in, models_in
+from shapeshift.scene.captures.colmap_tables import ending_of, images_in, models_in
 from shapeshift.scene.mask_files import NO_NAME, find_masks
 
 BESIDE = {"depth photos": ("depth", "depths", "depth_maps"), "normal maps": ("normal", "normals")}
@@ -101,7 +101,7 @@ def left_beside(base: Path, model: Path, ending: str, table: FileTable) -> None:
 
 def other_models(model: Path, ending: str, table: FileTable) -> None:
     """Says which of several was taken, and what the others have."""
-    others = [found for found in models_in(model.parent) if found[0] != model]
+    others = others_of(model)
     if said := said_of_models(model, ending):
         mine = images_in(model, ending)
         table.used("models", 1, f"sparse/{model.name}, {mine} images")
@@ -110,12 +110,24 @@ def other_models(model: Path, ending: str, table: FileTable) -> None:
         table.sentences += said
 
 
+def others_of(model: Path) -> list[tuple[Path, str]]:
+    """The models in the folder sparse/ of one, and what lies in that folder itself."""
+    if model.parent.name != "sparse":
+        return []
+    found = [each for each in models_in(model.parent) if each[0] != model]
+    ending = ending_of(model.parent, ("images",))
+    return [*found, (model.parent, ending)] if ending is not None else found
+
+
 def said_of_models(model: Path, ending: str) -> tuple[str, ...]:
     """A sentence where a model is one of several."""
-    others = [found for found in models_in(model.parent) if found[0] != model]
-    if model.parent.name != "sparse" or not others:
+    others = others_of(model)
+    if not others:
         return ()
-    few = [f"sparse/{path.name} ({images_in(path, kind)})" for path, kind in others[:FEW]]
+    few = [
+        f"{'' if path == model.parent else 'sparse/'}{path.name} ({images_in(path, kind)})"
+        for path, kind in others[:FEW]
+    ]
     return (
         f"Of {len(others) + 1} models that are not joined, sparse/{model.name} with "
         f"{images_in(model, ending)} images is used, not {', '.join(few)}"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.capture_photos import image_size
 from shapeshift.scene.captures.capture_rules import spread_stops, stops_from
@@ -81,8 +82,17 @@ def stops_of_frames(
     ]
     if "" in said:
         raise BadFile(f"{where}: frame {said.index('')}: 'modality' is empty; give it a name")
-    stops = found if set(said) == {s.name for s in found} else spread_stops(dict.fromkeys(said))
+    stops = found if set(said) == {s.name for s in found} else spread_stops(light_first(said))
     return stops, said, []
+
+
+def light_first(names: Sequence[str]) -> list[str]:
+    """Each name once, as they come; where the first are heat, what shows visible light before."""
+    listed = list(dict.fromkeys(names))
+    order = {"rgb": 0, "thermal": 1, "layer": 2}
+    rank = {name: order[guess_kind(name, len(listed))] for name in listed}
+    places = [rank[name] for name in listed if rank[name] < 2]
+    return listed if places == sorted(places) else sorted(listed, key=rank.__getitem__)
 
 
 def of_days(

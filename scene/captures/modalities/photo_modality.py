@@ -45,13 +45,15 @@ PLACES = set(
 )
 # Keys of a frame that name its camera; and letters that drones put behind a photo's number, of
 # heat and of the cameras beside: visible, wide and zoom.
-CAMERA_KEYS = (
-    "sensor", "sensor_type", "sensor_name", "camera", "camera_name", "camera_type", "camera_label",
-    "spectrum", "band", "channel", "image_type", "type", "kind", "source",
-)  # fmt: skip
+CAMERA_KEYS = {
+    "sensor", "camera", "cam", "lens", "device", "imager", "spectrum", "spectral", "wavelength",
+    "band", "channel", "modality", "modalities", "type", "kind", "source", "stream", "label",
+}  # fmt: skip  # words of them
+NO_CAMERA = {"model", "path", "file"}  # a lens's form; where a file lies
 LETTER = re.compile(r"(?:^|(?<=[_. -]))([TVWZ])(?=$|[_. -])", re.IGNORECASE)
 DRONE = re.compile(r"DJI_(?:\d{14}_)?\d{4}_T(?![a-z0-9])", re.IGNORECASE)
-KEY_WORDS = {"is", "image", "photo", "frame", "camera"}  # beside the one of heat in a key
+RADIOMETRIC = re.compile(r"DJI_\d{4}_R(?![a-z0-9])", re.IGNORECASE)  # of its Zenmuse XT2
+KEY_WORDS = {"is", "image", "photo", "frame", "camera"}  # beside the one of a sort in a key
 PARTNERS = {"MAX", "DC"}  # before the numbers of Autel's and FLIR's visible photos
 FEWEST_PAIRS = 2  # one pair may be two letters of an alphabet
 FLAGS = {"true": True, "false": False, "1": True, "0": False, "yes": True, "no": False}
@@ -152,10 +154,15 @@ def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[Seen]:
     files = [os.path.splitext(parts_of(name)[-1])[0] for name in names]
     by_folder = [sort_of_folders(part) for part in folders]
     letters = {part.upper() for found in folders for part in found if len(part) == 1}
-    if "T" in letters and letters & set("VWZ"):
+    if "T" in letters and (letters & set("VWZ") or LIGHT in by_folder):
         by_letter = [sort_of_letter([p.upper() for p in part if len(p) == 1]) for part in folders]
         by_folder = [one or other for one, other in zip(by_folder, by_letter, strict=True)]
-    by_file = [one or other for one, other in zip(by_letters(files), by_words(files), strict=True)]
+    by_file = [
+        one or other or (HEAT if is_radiometric else "")
+        for one, other, is_radiometric in zip(
+            by_letters(files), by_words(files), radiometric(files), strict=True
+        )
+    ]
     by_key = [sort_of_keys(frame) for frame in keys]
     rows = zip(folders, files, by_key, by_folder, by_file, strict=True)
     return [Seen(*row) for row in rows]
@@ -197,6 +204,12 @@ def by_letters(files: Sequence[str]) -> list[str]:
     return found if len(set(found)) > 1 else [""] * len(files)
 
 
+def radiometric(files: Sequence[str]) -> list[bool]:
+    """Which DJI calls so; not where all are."""
+    found = [RADIOMETRIC.match(name) is not None for name in files]
+    return found if not all(found) else [False] * len(files)
+
+
 def stem_of(file: str) -> str:
     """What two photos of a pair have in common: the name without words and letters of a sort."""
     parts = re.split(r"[_. -]+", LETTER.sub("", file))
@@ -213,8 +226,8 @@ def sort_of_keys(frame: Mapping) -> str:
     for key, value in frame.items():
         if (what := use_of_key(key)) and isinstance(value, str | bool | int | float):
             flag = FLAGS.get(str(value).strip().lower().removesuffix(".0"))
-            if what == "flag" and flag is not None:
-                return HEAT if flag else LIGHT
+            if what in (HEAT, LIGHT) and flag is not None:
+                return what if flag else LIGHT if what == HEAT else HEAT
             if what == "camera" and isinstance(value, str) and sort_of_name(value):
                 return sort_of_name(value)
     return ""
@@ -222,11 +235,14 @@ def sort_of_keys(frame: Mapping) -> str:
 
 @lru_cache(maxsize=1024)
 def use_of_key(key: str) -> str:
-    """Whether a key of a frame says yes or no of heat ("flag"), names its camera, or neither."""
-    if key in CAMERA_KEYS:
-        return "camera"
-    words = set(words_of(key)) - KEY_WORDS
-    return "flag" if words and all(map(is_thermal_word, words)) else ""
+    """The sort of which a key of a frame says yes or no; "camera" of one that names its camera."""
+    said = words_of(key)
+    words = set(said) - KEY_WORDS
+    if words and all(map(is_thermal_word, words)):
+        return HEAT
+    if "is" in said and words and words <= LIGHT_WORDS:
+        return LIGHT
+    return "camera" if CAMERA_KEYS & set(said) and NO_CAMERA.isdisjoint(said) else ""
 
 
 def refuse_contradictions(seen: Sequence[Seen], names: Sequence[str], folder: Path) -> None:

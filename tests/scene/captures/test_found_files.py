@@ -49,6 +49,8 @@ NAMED = [
     "images_mask/rgb/1.png", "image_masks/rgb/1.png", "images/rgb/1.png.mask.png",
     "images/rgb/1_mask.png", "images/rgb/1.mask.PNG", "images/_mask/rgb/1.png",
     "images/rgb/_mask/1.png", "images/rgb/masks/1.png", "images/masks/rgb/1.png.png",
+    "MASKS/RGB/1_MASK.PNG", "masks/rgb/1.Mask.png", "images/rgb/1.PNG.MASK.png",
+    "masks_2/rgb/1.png", "mask_4/rgb/1.png",
 ]  # fmt: skip
 
 
@@ -176,6 +178,17 @@ def test_of_several_models_the_one_with_most_images_is_read(model):
     assert [photo.path.name for photo in chosen.photos] == ["0.png", "1.png"]
     assert rows_of(chosen, "photos")[0] == (2, 2, 0)
     assert cli.main(["cameras", str(model), "--json"]) == 0
+
+
+def test_a_model_in_sparse_itself_beside_others_is_said(model):
+    smaller_model(model / "old", model / "sparse/0", [0, 1])
+    for name in ("images.txt", "cameras.txt"):
+        shutil.move(model / "old" / name, model / "sparse")
+    capture = read_capture(model)
+    assert rows_of(capture, "models") == [(1, 1, 0), (1, 0, 1)]
+    (said,) = capture.doubts
+    assert "sparse/0 with 7 images is used, not sparse (2);" in said
+    assert len(read_capture(model / "sparse").photos) == 2  # as the sentence says
 
 
 @pytest.mark.parametrize("broken", [b"", b"\xff" * 8, b"\x07" + bytes(7)])

@@ -28,7 +28,7 @@ def draw_length(
         draw.add_concave_poly_filled(corners, theme.color(theme.ACCENT, 0.15))
     for color, width in ((ground, 4.0), (ink, 1.6)):
         flags = imgui.ImDrawFlags_.closed if closed else 0
-        draw.add_polyline(corners, color, flags, width * ui_scale)
+        draw.add_polyline(corners, color, width * ui_scale, flags)
     for corner in corners:
         draw.add_circle_filled(corner, (DOT + 1.5) * ui_scale, ground)
         draw.add_circle_filled(corner, DOT * ui_scale, ink)

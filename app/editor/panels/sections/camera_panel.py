@@ -46,7 +46,7 @@ def draw_edges(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> Non
     per_pixel = imgui.get_io().display_size.x / view.size[0]  # logical pixels
     left, top, right, low = np.array(box) * per_pixel
     imgui.get_background_draw_list().add_rect(
-        Vec(left, top), Vec(right, low), theme.color(theme.MUTED, 0.6), 0, 0, max(1.0, ui_scale)
+        Vec(left, top), Vec(right, low), theme.color(theme.MUTED, 0.6), 0, max(1.0, ui_scale)
     )
 
 

@@ -218,5 +218,5 @@ def draw_film_edge(state: EditorState, viewpoint: Viewpoint, ui_scale: float) ->
     per_pixel = imgui.get_io().display_size.x / view.size[0]  # logical pixels
     left, top, right, low = (c * per_pixel for c in picture_box(viewpoint.flown, view))
     imgui.get_background_draw_list().add_rect(
-        Vec(left, top), Vec(right, low), theme.color(theme.MUTED, 0.6), 0, 0, max(1.0, ui_scale)
+        Vec(left, top), Vec(right, low), theme.color(theme.MUTED, 0.6), 0, max(1.0, ui_scale)
     )

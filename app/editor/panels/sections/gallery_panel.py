@@ -127,11 +127,11 @@ def _picture(
         drawing.add_rect_filled(corner, end, theme.color(theme.RAISED))
     else:
         name = f"{gallery.thumbnails.version} {number}"
-        drawing.add_image(textures.number(name, picture), corner, end)
+        drawing.add_image(textures.reference(name, picture), corner, end)
     picked = stop.name in gallery.picked
     if picked or hovered:
         edge = theme.color(theme.ACCENT if picked else theme.MUTED)
-        drawing.add_rect(corner, end, edge, 0, 0, FRAME * ui_scale)
+        drawing.add_rect(corner, end, edge, 0, FRAME * ui_scale)
     imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width)
     ink = theme.ACCENT if picked else theme.TEXT
     imgui.text_colored(imgui.ImVec4(*ink, 1), stop.name)

@@ -11,8 +11,6 @@ Box = tuple[float, float, float, float]  # left, top, right, bottom in logical p
 
 FONT_SIZE = 15.0  # logical pixels
 FONT = Path(imgui_bundle.__file__).parent / "assets/fonts/Roboto/Roboto-Regular.ttf"
-# Latin, Greek, Cyrillic, dashes, arrows: what the font has
-GLYPHS = [0x20, 0x17F, 0x370, 0x3FF, 0x400, 0x4FF, 0x2000, 0x2027, 0x2190, 0x21FF, 0]
 
 BEYOND = (3.0, 3.0)  # logical pixels that items reach beyond their edges for a ray or a finger
 
@@ -45,23 +43,21 @@ def has_keys() -> bool:
     return not imgui.get_io().config_flags & imgui.ConfigFlags_.no_keyboard
 
 
-def apply(ui_scale: float, pixels_per_unit: float, keys: bool = True) -> None:
-    """Styles the current ImGui context; fonts are rastered at the density of the framebuffer.
+def apply(ui_scale: float, keys: bool = True) -> None:
+    """Styles the current ImGui context, between frames alone.  ImGui rasters the letters that it
+    needs at the density of the framebuffer.
 
-    Between frames alone, and the drawing needs the texture of the fonts anew.  Without `keys`
-    a ray or a finger points at it: all that can be hit is larger.
+    Without `keys` a ray or a finger points at it: all that can be hit is larger.
     """
     io = imgui.get_io()
     if not keys:
         io.config_flags |= imgui.ConfigFlags_.no_keyboard | imgui.ConfigFlags_.is_touch_screen
     io.fonts.clear()
-    size = round(FONT_SIZE * ui_scale * pixels_per_unit)
-    io.fonts.add_font_from_file_ttf(str(FONT), size, glyph_ranges_as_int_list=GLYPHS)
+    io.fonts.add_font_from_file_ttf(str(FONT), FONT_SIZE)
     if (more := more_letters()) is not None:
         config = imgui.ImFontConfig()
         config.merge_mode = True
-        io.fonts.add_font_from_file_ttf(str(more.path), size, config, more.ranges)
-    io.font_global_scale = 1 / pixels_per_unit
+        io.fonts.add_font_from_file_ttf(str(more), FONT_SIZE, config)
 
     style = imgui.get_style()
     _unscale(style)
@@ -83,6 +79,7 @@ def apply(ui_scale: float, pixels_per_unit: float, keys: bool = True) -> None:
     for where, (rgb, alpha) in _colors().items():
         style.set_color_(where, imgui.ImVec4(*rgb, alpha))
     style.scale_all_sizes(ui_scale)
+    style.font_size_base = FONT_SIZE * ui_scale
 
 
 def _unscale(style: imgui.Style) -> None:
@@ -116,6 +113,8 @@ def _colors() -> dict:
         col.scrollbar_bg: (SURFACE, 0),
         col.scrollbar_grab: (TRACK, 1),
         col.check_mark: (ACCENT, 1),
+        col.checkbox_selected_bg: (RAISED, 1),
+        col.input_text_cursor: (TEXT, 1),
         col.plot_histogram: (ACCENT, 0.75),
         col.separator: (TRACK, 0.5),
         col.title_bg_active: (RAISED, 1),

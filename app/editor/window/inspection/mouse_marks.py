@@ -280,7 +280,7 @@ class MouseMarks:
         assert picture is not None  # draw has seen to it
         if self._layer[0] is not picture or self._layer[1] != isotherms:
             self._layer = (picture, isotherms, alarm_layer(picture, isotherms))
-        number = self._window.textures.number("alarms", self._layer[2])
+        reference = self._window.textures.reference("alarms", self._layer[2])
         width, height = self._window.logical_size
         corner, end = imgui.ImVec2(0, 0), imgui.ImVec2(width, height)
-        imgui.get_background_draw_list().add_image(number, corner, end)
+        imgui.get_background_draw_list().add_image(reference, corner, end)

@@ -7,8 +7,8 @@ There a pixel that is drawn costs more than all that comes before it: at 1280x72
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
-from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
+from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer, scissor, write
 from shapeshift.app.editor.window.overlay.triangles import (
     INDEX,
     DrawList,
@@ -29,13 +29,13 @@ OVER = (  # colours as ImGui has them; alpha as what they hide, so that the laye
 )  # fmt: skip
 
 
-class KeptOverlay(ModernGLRenderer):
+class KeptOverlay(OverlayRenderer):
     """Draws ImGui into a layer and lays that over the window's picture."""
 
-    def __init__(self, ctx: moderngl.Context, logical_size: tuple[int, int]) -> None:
+    def __init__(self, ctx: moderngl.Context) -> None:
         self._lists: tuple[DrawList, ...] = ()
         self._anew = True  # nothing of the layer holds
-        super().__init__(wnd=None, ctx=ctx, display_size=logical_size)
+        super().__init__(ctx)
         self._gpu = Gpu(ctx)
         self._layer, self._layered = WindowBytes(self._gpu), Layered(self._gpu)
         self._bytes: np.ndarray | None = None  # the layer once more, as WindowOverlay has it
@@ -113,6 +113,7 @@ class KeptOverlay(ModernGLRenderer):
         if self._layer.size != size:
             self._layer.lay_out(size)
             self._anew, self._bytes = True, None
+        self.update_textures()
         lists = read_lists(data, self._lists)
         if self._anew:
             boxes = [(0, 0, *size)]
@@ -138,8 +139,7 @@ class KeptOverlay(ModernGLRenderer):
             ctx.enable_only(moderngl.BLEND)
             ctx.blend_equation, ctx.blend_func = moderngl.FUNC_ADD, OVER
             for each in lists:
-                across, down = 2 * each.scale[0] / width, 2 * each.scale[1] / height
-                self.projMat.value = (across, 0, 0, 0, 0, -down, 0, 0, 0, 0, -1, 0, -1, 1, 0, 1)
+                self._look_at((2 * each.scale[0] / width, 2 * each.scale[1] / height))
                 self._draw_list(each, boxes, height)
             layer.scissor = None
 
@@ -162,13 +162,9 @@ class KeptOverlay(ModernGLRenderer):
         for box, command, places in jobs:
             clip, texture, _ = drawn.commands[command]
             self._textures[texture].use(0)
-            self.ctx.scissor = scissor(clip, drawn.scale, box, height)
-            self._vao.render(moderngl.TRIANGLES, vertices=3 * len(places), first=first)
+            self.ctx.scissor = within(scissor(clip, drawn.scale, height), box, height)
+            self._vertices.render(moderngl.TRIANGLES, vertices=3 * len(places), first=first)
             first += 3 * len(places)
-
-    def refresh_font_texture(self) -> None:
-        self._anew = True
-        super().refresh_font_texture()
 
     def shutdown(self) -> None:
         self._layer.release()
@@ -177,20 +173,10 @@ class KeptOverlay(ModernGLRenderer):
         super().shutdown()
 
 
-def write(buffer: moderngl.Buffer, data: bytes) -> None:
-    """Fills a buffer, which grows where that is needed."""
-    if len(data) > buffer.size:
-        buffer.orphan(2 * len(data))
-    buffer.write(data)
-
-
-def scissor(
-    clip: tuple[float, ...], scale: tuple[float, float], box: PixelBox, height: int
+def within(
+    clip: tuple[int, int, int, int], box: PixelBox, height: int
 ) -> tuple[int, int, int, int]:
-    """GL's of a clip rectangle, rounded as moderngl-window does it, and a box."""
-    x, y, z, w = (side * scale[i % 2] for i, side in enumerate(clip))
-    left, below, right = int(x), int(height - w), int(x) + int(z - x)
-    above = below + int(w - y)
-    left, right = max(left, box[0]), min(right, box[2])
-    below, above = max(below, height - box[3]), min(above, height - box[1])
+    """What of GL's scissor lies in a box."""
+    left, below = max(clip[0], box[0]), max(clip[1], height - box[3])
+    right, above = min(clip[0] + clip[2], box[2]), min(clip[1] + clip[3], height - box[1])
     return left, below, max(right - left, 0), max(above - below, 0)

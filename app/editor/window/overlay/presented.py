@@ -6,8 +6,8 @@ import glfw
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
-from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
+from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer
 from shapeshift.app.editor.window.overlay.kept_overlay import KeptOverlay
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.resolve import MakeBytes
@@ -18,17 +18,14 @@ class Presented:
     and a layer with the overlay are kept, and only what changes is drawn.
     """
 
-    def __init__(
-        self, ctx: moderngl.Context, logical_size: tuple[int, int],
-        size: Callable[[], tuple[int, int]],
-    ) -> None:  # fmt: skip
+    def __init__(self, ctx: moderngl.Context, size: Callable[[], tuple[int, int]]) -> None:
         """`size` tells that of the window's framebuffer, pixels."""
         self._ctx, self._size = ctx, size
-        self.kept = KeptOverlay(ctx, logical_size) if is_software(ctx) else None
+        self.kept = KeptOverlay(ctx) if is_software(ctx) else None
         if self.kept is not None and not self.kept.works:
             self.kept.shutdown()
             self.kept = None
-        self.renderer = self.kept or ModernGLRenderer(wnd=None, ctx=ctx, display_size=logical_size)
+        self.renderer = self.kept or OverlayRenderer(ctx)
         self._pending: MakeBytes | None = None  # makes what the window is to have
         self._kept_alone = False  # it is kept already, and the window does not have it
         self._other = True  # the window has not just the picture that is kept

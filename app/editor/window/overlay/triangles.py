@@ -90,7 +90,7 @@ def read_lists(data: imgui.ImDrawData, before: tuple[DrawList, ...]) -> tuple[Dr
     for i, each in enumerate(data.cmd_lists):
         vertices, indices = each.vtx_buffer, each.idx_buffer
         commands = tuple(
-            (tuple(one.clip_rect), one.texture_id, one.elem_count // 3) for one in each.cmd_buffer
+            (tuple(one.clip_rect), one.get_tex_id(), one.elem_count // 3) for one in each.cmd_buffer
         )
         triangles = sum(count for _, _, count in commands)
         new = DrawList(

@@ -7,6 +7,7 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_names import is_thermal_name, sort_of_name
+from shapeshift.scene.captures.modalities.frame_modalities import light_first
 from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
 from shapeshift.scene.captures.modalities.stop_contents import contents_of
 from shapeshift.scene.captures.read_capture import read_capture
@@ -184,3 +185,62 @@ def test_many_folders_of_a_stop_are_counted(tmp_path):
     shots = [shot for i in range(6) for shot in light(f"cam{i}/{{}}.png", 1)]
     said = contents_of(read_capture(write_colmap(tmp_path, shots + heat("ir/{}.png"))))
     assert said[0].startswith("RGB: 6 photos, 1 of") and "2 in 2 more folders" in said[0]
+
+
+@pytest.mark.parametrize("name", [
+    "boson_left", "lepton", "Wärme", "thermique", "红外", "热成像_1", "赤外線", "열화상",
+    "тепловизор", "infrarrojo",
+])  # fmt: skip
+def test_words_of_heat_in_other_languages_and_of_cameras(name):
+    assert sort_of_name(name) == "thermal"
+
+
+@pytest.mark.parametrize("name", [
+    "heat_pump", "heatPump", "Heat Exchanger 2", "thermal_bath", "thermal-springs", "heater",
+    "fire_station", "airport", "近红外", "nahinfrarot",
+])  # fmt: skip
+def test_things_that_have_to_do_with_heat_are_none(name):
+    assert sort_of_name(name) == ""
+
+
+@pytest.mark.parametrize("key,hot,cold", [
+    ("sensor_id", "flir_0", "rgb_0"), ("camera_id", "thermal", "rgb"), ("cam", "ir", "color"),
+    ("lens", "thermal", "wide"), ("wavelength", "LWIR", "visible"), ("label", "thermal", "rgb"),
+    ("device", "FLIR Boson", "GoPro"), ("is_rgb", False, True), ("isVisible", 0, 1),
+])  # fmt: skip
+def test_keys_that_name_a_camera(key, hot, cold):
+    names = [f"images/{i}.png" for i in range(4)]
+    keys = [{key: hot}, {key: cold}, {key: hot}, {key: cold}]
+    _, of = modalities_of(names, HERE, keys, False)
+    assert of == ["Thermal", "RGB", "Thermal", "RGB"]
+
+
+@pytest.mark.parametrize("key,value", [
+    ("file_path", "thermal.png"), ("mask_path", "ir.png"), ("rgb", True), ("visible", False),
+    ("camera_model", "OPENCV"), ("label", "heat pump"), ("note", "thermal"),
+])  # fmt: skip
+def test_keys_that_say_nothing_of_heat(key, value):
+    _, of = modalities_of(["a.png", "b.png"], HERE, [{key: value}, {}], False)
+    assert of == ["RGB", "RGB"]
+
+
+@pytest.mark.parametrize("names,found", [
+    (["set/rgb/1.png", "set/t/1.png"], {"rgb": 1, "Thermal": 1}),
+    (["a/t/1.png", "a/u/1.png"], {"a": 2}),  # letters of an alphabet
+    (["DJI_0001_R.JPG", "DJI_0002.JPG"], {"RGB": 1, "Thermal": 1}),  # a Zenmuse XT2's
+    (["DJI_0001_R.JPG", "DJI_0002_R.JPG"], {"RGB": 2}),
+    (["DJI_0001_RAW.JPG", "DJI_0002.JPG"], {"RGB": 2}),
+])  # fmt: skip
+def test_letters_of_heat_without_a_pair(names, found):
+    assert stops_of(names) == found
+
+
+@pytest.mark.parametrize("said,found", [
+    (["thermal", "rgb"], ["rgb", "thermal"]),
+    (["rgb", "thermal"], ["rgb", "thermal"]),
+    (["opened", "closed"], ["opened", "closed"]),  # as they come
+    (["opened", "rgb", "thermal"], ["opened", "rgb", "thermal"]),
+    (["opened", "thermal", "rgb", "closed"], ["rgb", "thermal", "opened", "closed"]),
+])  # fmt: skip
+def test_named_modalities_have_light_first(said, found):
+    assert light_first([*said, *said]) == found

@@ -4,8 +4,8 @@ import glfw
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
+from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer
 from shapeshift.app.editor.window.window import KeyDown
 from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.rasterizer.resolve import resolve as resolve_bytes
@@ -48,11 +48,11 @@ def stripes(viewer, monkeypatch) -> None:
 
 
 def overlay_drawn_at_once(viewer) -> np.ndarray:
-    """What a GPU would show of this frame: the picture, then moderngl-window's renderer over it."""
+    """What a GPU would show of this frame: the picture, then the overlay over it."""
     window = viewer.window
     screen = window.screen()
     viewer.renderer.present(screen)
-    kept, plain = window.presented.kept, object.__new__(ModernGLRenderer)
+    kept, plain = window.presented.kept, object.__new__(OverlayRenderer)
     plain.__dict__.update(kept.__dict__)  # its program, buffers, and textures
     screen.use()
     plain.render(imgui.get_draw_data())
