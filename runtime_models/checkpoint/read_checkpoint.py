@@ -92,7 +92,7 @@ def read_raw_checkpoint(path: Path, reading: Reading) -> RawSplats:
         else:
             raw.scales[:] = shaped(scales, (count, 3), "scales", path)
         fill_colors(raw.sh)
-    return with_settings(raw, path)
+    return with_settings(raw, reading.outer or path)
 
 
 def arrays_of(path: Path, memory: Account) -> dict[str, np.ndarray]:

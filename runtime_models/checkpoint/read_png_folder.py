@@ -25,7 +25,7 @@ from shapeshift.runtime_models.splats.sog.sog_files import META, SogFiles, file_
 UP = "+Z"  # as of gsplat's checkpoints
 WIDTHS = {"means": 3, "scales": 3, "quats": 4, "opacities": 1, "sh0": 3}
 LARGEST_NUMBER = 1e38
-FIRST = "means_l.png"  # beside meta.json: tells it from a SOG
+MARKS = ("means_l.png", "means_u.png")  # one of them beside meta.json tells it from a SOG
 MOST_BYTES = 16  # of a PNG a pixel, with a head
 SMALL = 1 << 16
 
@@ -33,7 +33,7 @@ SMALL = 1 << 16
 def is_png_folder(path: Path) -> bool:
     """Whether a folder, or the meta.json in it, is one of gsplat's."""
     folder = path.parent if path.name == META else path
-    return (folder / META).is_file() and (folder / FIRST).is_file()
+    return (folder / META).is_file() and any((folder / name).is_file() for name in MARKS)
 
 
 def read_raw_png_folder(path: Path, reading: Reading) -> RawSplats:

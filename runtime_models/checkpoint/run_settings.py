@@ -15,6 +15,7 @@ from shapeshift.runtime_models.splats.plain_splats import COLMAP_UP, RawSplats
 FILES = ("cfg.yml", "config.yml")
 ABOVE = 3  # folders that are searched, that of the checkpoint first
 MOST_BYTES = 1 << 20
+TOO_LONG = ""  # the key that says so
 LINE = re.compile(
     r"^\s*(antialiased|rasterize_mode|normalize_world_space)\s*:\s*['\"]?(\w+)", re.MULTILINE
 )
@@ -24,7 +25,7 @@ GSPLAT_CLOUDS = "ply"  # a folder of a run of gsplat, with its clouds
 HOLDERS = ("ckpts", GSPLAT_CLOUDS, "compression", "nerfstudio_models")  # folders of a run
 
 
-def settings_beside(path: Path) -> tuple[str, dict[str, str]]:
+def settings_beside(path: Path) -> tuple[str, dict[str, list[str]]]:
     """(name of the settings' file, what it says) of the run that a path is of; "" without one.
 
     Looked for beside it, and above it where the folders between are those of a run.
@@ -33,9 +34,17 @@ def settings_beside(path: Path) -> tuple[str, dict[str, str]]:
     for _ in range(ABOVE):
         for name in FILES:
             file = folder / name
-            if file.is_file() and file.stat().st_size <= MOST_BYTES:
-                text = file.read_bytes().decode("utf-8", "replace")
-                return name, {key: value.lower() for key, value in LINE.findall(text)}
+            if file.is_file():
+                with file.open("rb") as opened:
+                    data = opened.read(MOST_BYTES + 1)
+                if len(data) > MOST_BYTES:
+                    return name, {TOO_LONG: []}
+                text = data.decode("utf-8", "replace")
+                said: dict[str, list[str]] = {}
+                for key, value in LINE.findall(text):
+                    if value.lower() not in said.setdefault(key, []):
+                        said[key].append(value.lower())
+                return name, said
         if not (folder.name in HOLDERS or folder.parent.name in HOLDERS):
             break
         folder = folder.parent
@@ -44,7 +53,19 @@ def settings_beside(path: Path) -> tuple[str, dict[str, str]]:
 
 def with_settings(raw: RawSplats, path: Path) -> RawSplats:
     """The splats as the settings of their run say: drawn antialiased, and what of them is up."""
-    name, said = settings_beside(path)
+    name, several = settings_beside(path)
+    if TOO_LONG in several:
+        what = f"its run's {name} has over {MOST_BYTES:,} bytes"
+        found = Finding(what, 0, "not looked at", file=raw.file, repaired=False)
+        return replace(raw, findings=(*raw.findings, found))
+    said = {key: values[0] for key, values in several.items() if len(values) == 1}
+    for key, values in several.items():
+        if len(values) > 1:
+            found = Finding(
+                f"its run's {name} says {key} {len(values)} times: {', '.join(values)[:60]}", 0,
+                "read as without it", file=raw.file, repaired=False,
+            )  # fmt: skip
+            raw = replace(raw, findings=(*raw.findings, found))
     if said.get("antialiased") in YES or said.get("rasterize_mode") == "antialiased":
         found = Finding(
             f"its run's {name} says that it was trained antialiased", 0, "drawn so",

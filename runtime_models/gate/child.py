@@ -26,6 +26,7 @@ def main(program: str) -> None:
     """Serves until the pipe ends."""
     if hasattr(signal, "SIGINT"):  # Ctrl-C is for the parent, which ends this process
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    heed_limits()
     given, answers = private_pipes()
     if os.name != "nt":  # Windows goes on naming a parent that is gone
         threading.Thread(target=end_with_parent, args=[os.getppid()], daemon=True).start()
@@ -49,6 +50,14 @@ def main(program: str) -> None:
             return
         if "memory" in answer:
             return  # a process that has run out of memory is in no known state
+
+
+def heed_limits() -> None:
+    """Lets the signals of time end this process, also where its parent ignores or blocks them."""
+    signals = [getattr(signal, name, None) for name in ("SIGPROF", "SIGXCPU")]
+    for each in [number for number in signals if number is not None]:
+        signal.signal(each, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [each])
 
 
 def private_pipes() -> tuple[BinaryIO, BinaryIO]:

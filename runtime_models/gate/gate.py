@@ -52,9 +52,11 @@ class Process:
             python, words["__PYVENV_LAUNCHER__"] = getattr(sys, "_base_executable", python), python
         package = sys.modules[__name__.partition(".")[0]]  # of which this module is a part
         program = str(Path(package.__file__ or "").with_name("__main__.py"))
-        # -P: the current folder's modules are not to stand in for those of packages.
+        # -P: the current folder's modules are not to stand in for those of packages; nor, where
+        # this process was started by -I, those of PYTHONPATH.
+        alone = ["-P", *(["-I"] if sys.flags.isolated else [])]
         self.child = subprocess.Popen(
-            [python, "-P", str(CHILD), program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [python, *alone, str(CHILD), program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL, env=words,
         )  # fmt: skip
         self.served = 0
@@ -261,6 +263,7 @@ class Held:
         self.door, self.path = DOORS[name], path
         self.size = path.stat().st_size
         self.process: Process | None = taken(name)
+        self._turn = threading.Lock()  # one pipe, whoever asks
         # Not by __del__: in a ring of garbage the pipes may be closed before it is called.
         self._forgotten = weakref.finalize(self, let_go, name, self.process)
         self._forgotten.atexit = False  # the process ends with its pipe
@@ -271,12 +274,14 @@ class Held:
 
         memory: bytes that it may take together with what was opened.
         """
-        if self.process is None:
-            raise BadFile(f"{path_end(self.path)}: it was cut off before; {self.door.advice}")
-        return self._ask(list(words), method, seconds, memory)
+        with self._turn:
+            return self._ask(list(words), method, seconds, memory)
 
     def _ask(self, words: list, method: str, seconds: float, memory: int) -> Any:
-        assert self.process is not None
+        if self.process is None:
+            raise BadFile(f"{path_end(self.path)}: it was cut off before; {self.door.advice}")
+        if self.process.owner != os.getpid():  # a fork's copy: two would read one pipe
+            raise BadFile(f"{path_end(self.path)}: another process has opened it; open it again")
         try:
             answer = asked(self.process, self.door, words, seconds, memory, None, method)
         except Ended as ended:

@@ -14,6 +14,7 @@ from typing import Any
 TIME, MEMORY = "time", "memory"
 GRACE_S = 2  # that RLIMIT_CPU, of whole seconds, comes later than the timer
 STATM = Path("/proc/self/statm")
+KB = 1024  # of ru_maxrss, on Linux
 PAGE_DATA = 5  # word of statm: pages of data and stacks
 PROCESS_TIME, PROCESS_MEMORY = 0x2, 0x100  # JOB_OBJECT_LIMIT_...
 EXTENDED = 9  # JobObjectExtendedLimitInformation
@@ -68,7 +69,17 @@ def own_bytes() -> int:
         return committed()
     if sys.platform == "darwin":
         return resident(os.getpid()) or 0
-    return int(STATM.read_text().split()[PAGE_DATA]) * os.sysconf("SC_PAGE_SIZE")
+    try:
+        return int(STATM.read_text().split()[PAGE_DATA]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, IndexError, ValueError):  # no /proc
+        return most_resident()
+
+
+def most_resident() -> int:
+    """The most bytes that this process has had in memory, as its kernel counts them."""
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KB
 
 
 def resident(process: int) -> int | None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.rotation import normalize, quaternions_of, rotation_matrices
 from shapeshift.runtime_models.splats.operations.rotate_splats import (
     quaternion_of,
@@ -30,11 +30,38 @@ def moved(raw: RawSplats, world_from_mesh: np.ndarray) -> RawSplats:
         return after(raw, world_from_mesh)
 
 
+def instances(raw: RawSplats, worlds: np.ndarray) -> list[RawSplats]:
+    """The splats once for each matrix of worlds (K, 4, 4), K at least 1; what was found once.
+
+    Of several, those that flatten them are left out, and said: scenes hide instances so.  Raises
+    BadFile where none is left.
+    """
+    if len(worlds) == 1:
+        return [moved(raw, worlds[0])]
+    flat = [not is_solid(np.linalg.svd(world[:3, :3], compute_uv=False)) for world in worlds]
+    if all(flat):
+        raise BadFile(f"{raw.file}: all {len(worlds):,} instances of its splats have no size.")
+    count = (len(worlds) - sum(flat)) * len(raw.means)
+    raw.memory.charge(count * (MOVING + 12 * raw.sh.shape[1]), f"{count:,} splats in instances")
+    if any(flat):
+        what = f"{sum(flat):,} of {len(worlds):,} instances have no size"
+        found = Finding(what, sum(flat), "left out", file=raw.file, repaired=False)
+        raw = replace(raw, findings=(*raw.findings, found))
+    rest = replace(raw, findings=())
+    solid = [world for world, gone in zip(worlds, flat, strict=True) if not gone]
+    return [moved(raw, solid[0]), *(moved(rest, world) for world in solid[1:])]
+
+
+def is_solid(sizes: np.ndarray) -> bool:
+    """Whether a matrix of such singular values, from large to small, leaves a body a body."""
+    return bool(sizes[2] > 1e-12 * sizes[0] > 0)
+
+
 @np.errstate(over="ignore", invalid="ignore")  # numbers that are none are for the judge to find
 def after(raw: RawSplats, world_from_mesh: np.ndarray) -> RawSplats:
     linear, offset = world_from_mesh[:3, :3], world_from_mesh[:3, 3]
     left, sizes, right = np.linalg.svd(linear)
-    if not sizes[2] > 1e-12 * sizes[0] > 0:
+    if not is_solid(sizes):
         raise BadFile(f"{raw.file}: a node squeezes its splats to a plane or to nothing.")
     turn = left @ right  # the nearest rotation; a reflection where the matrix mirrors
     raw = replace(raw, means=raw.means @ linear.T + offset)

@@ -39,6 +39,7 @@ class Reading:
     memory_gb: float = 0.0  # that files may take while they are read; 0 = as memory.py has it
     leaves: LeafReading | None = None  # None: one level of detail for all of a scene
     memory: Memory | Account | None = None  # what they have taken; None: nothing is open yet
+    outer: Path | None = None  # of what was unpacked: the file on disk, beside which facts lie
 
     def begun(self) -> "Reading":
         """The same with an account, for all files of one opening."""

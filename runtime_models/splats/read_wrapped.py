@@ -98,7 +98,7 @@ def unpacked_and_read(
         form = form_of(inner)
         if form is None:
             raise BadFile(f"{path.name} holds {name[:60]!r}, which is no file of splats.")
-        raw = form.read(inner, reading)
+        raw = form.read(inner, replace(reading, outer=path))
     return replace(raw, file=f"{path.name}: {inner.name}", format=f"{raw.format}, packed")
 
 

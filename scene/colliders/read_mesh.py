@@ -16,7 +16,7 @@ from shapeshift.runtime_models.files.memory import Account, Memory, refuse_empty
 from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.gltf.gltf_files import Asset
-from shapeshift.runtime_models.splats.gltf.gltf_nodes import placed_meshes
+from shapeshift.runtime_models.splats.gltf.gltf_nodes import OBEYED, placed_meshes
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
@@ -160,7 +160,8 @@ def read_gltf_triangles(
     """The triangles of the shown scene where its nodes stand.  Raises BadFile."""
     asset = Asset(path, memory)
     for needed in asset.item(asset.json, "extensionsRequired", list, []):
-        if not str(needed).startswith(("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_")):
+        harmless = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", *OBEYED)
+        if not str(needed).startswith(harmless):
             raise asset.refuse(f"it needs {str(needed)[:60]}, which is not read here.")
     vertices, faces, count, start = [], [], 0, 0
     ours_from_file = np.eye(4)

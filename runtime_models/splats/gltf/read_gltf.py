@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
-from shapeshift.runtime_models.model import Finding
+from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.splats.gltf.gltf_files import Asset
-from shapeshift.runtime_models.splats.gltf.gltf_nodes import placed_meshes
+from shapeshift.runtime_models.splats.gltf.gltf_nodes import OBEYED, Placed, placed_nodes
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, ours_from_file
-from shapeshift.runtime_models.splats.placed_splats import joined, moved
+from shapeshift.runtime_models.splats.placed_splats import instances, joined, moved
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 
 SPLATS = "KHR_gaussian_splatting"
@@ -23,7 +23,8 @@ ROTATION, SCALE, OPACITY = f"{PREFIX}ROTATION", f"{PREFIX}SCALE", f"{PREFIX}OPAC
 FIRST, COLOR = f"{PREFIX}SH_DEGREE_0_COEF_0", "COLOR_0"
 NAME = "glTF"
 # Required extensions that do not touch what is read here: materials are ignored by the extension.
-HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_")
+HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_",
+            *OBEYED)  # fmt: skip
 ROW = 44  # bytes of a splat without its harmonics
 
 
@@ -40,23 +41,61 @@ def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
     for name in asset.item(asset.json, "extensionsRequired", list, []):
         if not str(name).startswith(HARMLESS):
             raise asset.refuse(f"it needs the extension {str(name)[:60]}, which is not read here.")
+    found = [
+        (primitive, node)
+        for node in placed_nodes(asset)
+        for primitive in splat_primitives(asset, node.mesh)
+    ]
     placed = [
-        (primitive, matrix)
-        for mesh, matrix in placed_meshes(asset)
-        for primitive in splat_primitives(asset, mesh)
+        (primitive, node) for primitive, node in found if not node.hidden and len(node.worlds)
     ]
     if not placed:
-        meshes = len(asset.item(asset.json, "meshes", list, []))
-        raise asset.refuse(
-            f"its scene has no Gaussian splats ({meshes} mesh{'es' * (meshes != 1)}, none shown "
-            f"with {SPLATS}); export them with that extension."
-        )
+        raise no_splats(asset, len(found))
     parts = []
-    for number, (primitive, matrix) in enumerate(placed):
+    for number, (primitive, node) in enumerate(placed):
         reading.report(f"reading {path.name}", number / len(placed))
-        parts.append(moved(read_primitive(asset, primitive, reading), matrix))
+        parts += instances(read_primitive(asset, primitive, reading), node.worlds)
     raw = joined(parts, path.name)
-    return replace(raw, front=not asset.in_our_axes)
+    findings = (*raw.findings, *unseen([node for _, node in found], path.name))
+    return replace(raw, front=not asset.in_our_axes, findings=findings)
+
+
+def no_splats(asset: Asset, hidden: int) -> BadFile:
+    """Why a scene shows no splats: no such mesh, all of them hidden, or the extension lost."""
+    if hidden:
+        return asset.refuse("all its splats are on hidden nodes or on such without instances.")
+    meshes = asset.item(asset.json, "meshes", list, [])
+    rows = [row for i in range(len(meshes))
+            for row in asset.item(asset.entry("meshes", i), "primitives", list, [])]  # fmt: skip
+    names = {name for row in rows if isinstance(row, dict)
+             for name in asset.item(row, "attributes", dict, {})}  # fmt: skip
+    if any(present_name(name).startswith(PREFIX) for name in names):
+        return asset.refuse(
+            f"it has the attributes of Gaussian splats without the extension: another program, "
+            f"such as gltf-transform, dropped {SPLATS}; take the file from before that."
+        )
+    return asset.refuse(
+        f"its scene has no Gaussian splats ({len(meshes)} mesh{'es' * (len(meshes) != 1)}, none "
+        f"shown with {SPLATS}); export them with that extension."
+    )
+
+
+def unseen(nodes: list[Placed], file: str) -> list[Finding]:
+    """What the nodes of splats are that is not shown."""
+    hidden = sum(node.hidden for node in nodes)
+    animated = sum(node.animated and not node.hidden for node in nodes)
+    empty = sum(not len(node.worlds) and not node.hidden for node in nodes)
+    told = (
+        (hidden, "hidden (KHR_node_visibility)", "left out"),
+        (empty, "of no instance (EXT_mesh_gpu_instancing)", "left out"),
+        (animated, "moved by animations", "shown at rest"),
+    )
+    return [
+        Finding(f"{count:,} of {len(nodes):,} nodes of splats {what}", count, done, file=file,
+                repaired=False)
+        for count, what, done in told
+        if count
+    ]  # fmt: skip
 
 
 def splat_primitives(asset: Asset, mesh: object) -> list[dict]:

@@ -36,7 +36,8 @@ def take_filter_3d(raw: RawSplats) -> None:
 
     with np.errstate(all="ignore"):  # odd numbers are for the judge
         each_block(len(raw.means), work)
-    median = float(np.nanmedian(column)) if len(column) else 0.0
+    sizes = np.abs(column[np.isfinite(column)])  # of -f as of f: squares are taken
+    median = float(np.median(sizes)) if len(sizes) else 0.0
     what = f"Mip-Splatting's filter beside the splats ({COLUMN}, half of it over {median:.3g} m)"
     done = "taken into sizes and opacities, as its own viewer does; exports have it in them"
     raw.findings = (*raw.findings, Finding(what, 0, done, file=raw.file, repaired=False))

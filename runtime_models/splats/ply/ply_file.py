@@ -16,7 +16,8 @@ TYPES = {"float": "f4", "float32": "f4", "double": "f8", "float64": "f8", "uchar
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 DIGITS = re.compile(r"\d{1,15}", re.ASCII)
 LARGEST_HEADER = 1 << 16  # bytes
-VERTICAL = re.compile(r"vertical axis\s*[:=]?\s*([+-]?[xyz])", re.IGNORECASE)  # of nerfstudio
+VERTICAL = re.compile(r"vertical axis\b\s*[:=]?\s*(.*)", re.IGNORECASE)  # of nerfstudio
+AXIS = re.compile(r"[+-]?[XYZ]")
 
 
 @dataclass(frozen=True)
@@ -89,16 +90,23 @@ class PlyHeader:
 
 
 def put_vertical_axis(raw: RawSplats, header: PlyHeader) -> None:
-    """Sets what is up as a comment says, `Vertical Axis: z`; nothing where none does."""
-    for comment in header.comments:
-        if (found := VERTICAL.fullmatch(comment)) is not None:
-            axis = found[1].upper()
-            raw.up = axis if len(axis) == 2 else f"+{axis}"
-            what = f"its comment says that {raw.up} is up"
-            done = f"read so; --up={COLMAP_UP} reads it as 3DGS writes its files"
-            said = Finding(what, 0, done, file=raw.file, repaired=False)
-            raw.findings = (*raw.findings, said)
-            return
+    """Sets what is up as a comment says, `Vertical Axis: z`; nothing where none does.
+
+    A comment that names no axis, or several that name different ones, are a finding.
+    """
+    found = [VERTICAL.fullmatch(comment) for comment in header.comments]
+    said = list(dict.fromkeys(each[1].strip().upper() for each in found if each is not None))
+    if not said:
+        return
+    axes = {axis if len(axis) == 2 else f"+{axis}" for axis in said if AXIS.fullmatch(axis)}
+    if len(axes) == 1 and all(AXIS.fullmatch(axis) for axis in said):
+        (raw.up,) = axes
+        what = f"its comment says that {raw.up} is up"
+        done = f"read so; --up={COLMAP_UP} reads it as 3DGS writes its files"
+    else:
+        what = f"its comments name no one vertical axis ({', '.join(said)[:60] or 'nothing'})"
+        done = f"read with {raw.up} up; --up names another"
+    raw.findings = (*raw.findings, Finding(what, 0, done, file=raw.file, repaired=False))
 
 
 def read_header(path: Path) -> PlyHeader:

@@ -46,7 +46,7 @@ def read_raw_spz(path: Path, reading: Reading, axes: str = "") -> RawSplats:
     """
     reading = reading.within(path)
     with reading.account.lend(path.stat().st_size, "its bytes"):
-        return read_spz_bytes(path.read_bytes(), path.name, reading, axes, path)
+        return read_spz_bytes(path.read_bytes(), path.name, reading, axes, reading.outer or path)
 
 
 def read_spz_bytes(

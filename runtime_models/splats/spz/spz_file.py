@@ -105,12 +105,16 @@ def count_in(head: bytes, file: str) -> int:
 
 
 def is_spz(head: bytes) -> bool:
-    """Whether a file begins as one: plainly, or with a gzip stream of one."""
+    """Whether a file begins as one: plainly, or up to version 3 with a gzip stream of one.
+
+    Version 4 is plain: in a gzip stream it was packed once more, as any other file may be.
+    """
     if head[:2] == GZIP:
         try:
-            head = zlib.decompressobj(31).decompress(head, len(MAGIC))
+            head = zlib.decompressobj(31).decompress(head, 8)
         except zlib.error:
             return False
+        return head[:4] == MAGIC and int.from_bytes(head[4:8], "little") < 4
     return head[:4] == MAGIC
 
 

@@ -7,6 +7,7 @@ process on some damaged files.
 import importlib.util
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import member_names
 from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile, Finding
-from shapeshift.runtime_models.splats.placed_splats import joined, moved
+from shapeshift.runtime_models.splats.placed_splats import instances, joined
 from shapeshift.runtime_models.splats.plain_splats import (
     COLMAP_UP,
     RawSplats,
@@ -61,21 +62,32 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
     read_by_usd = ask("USD", path, [str(path.resolve())], memory=memory.left)
     arrays, facts = read_by_usd["arrays"], read_by_usd["facts"]
     memory.charge(sum(array.nbytes for array in arrays.values()), "its arrays")
-    found = [
-        part_of(arrays.get, number, field, facts, path, memory)
-        for number, field in enumerate(facts["fields"])
-    ]
-    parts = [part for part in found if part is not None]
+    metres = np.diag([facts["metres"]] * 3 + [1.0])
+    parts: list[RawSplats] = []
+    for number, field in enumerate(facts["fields"]):
+        part = part_of(arrays.get, number, field, facts, path, memory)
+        if part is not None:
+            parts += instances(part, metres @ arrays[f"{number}/worlds"])
     if not parts:
         held = f" (it has {', '.join(facts['others'])})" if facts["others"] else ""
         raise BadFile(f"{path.name} has no visible {KIND}{held}; export splats of that kind.")
-    return joined(parts, path.name)
+    raw = joined(parts, path.name)
+    told = (
+        (facts["unshown"], "of its fields of splats show later in time only"),
+        (facts["nested"], "instances of point instancers within point instancers"),
+    )
+    left = [
+        Finding(f"{count:,} {what}", count, "left out", file=path.name, repaired=False)
+        for count, what in told
+        if count
+    ]
+    return replace(raw, findings=(*raw.findings, *left))
 
 
 def part_of(
     read: Read, number: int, field: dict, facts: dict, path: Path, memory: Account
 ) -> RawSplats | None:
-    """The splats of one prim in the stage's world; None where it has none."""
+    """The splats of one prim in its own axes and units; None where it has none."""
     places = read(f"{number}/positions")
     if places is None or not len(places):
         return None
@@ -112,8 +124,7 @@ def part_of(
     raw.wxyz[:] = raw.wxyz[:, [3, 0, 1, 2]]  # a copy first: filed as x y z w
     raw.sh[:] = GRAY if sh is None else sh
     raw.findings = (*findings, *unusual(field, facts, count, path, first=number == 0))
-    metres = np.diag([facts["metres"]] * 3 + [1.0])
-    return moved(raw, metres @ read(f"{number}/matrix"))
+    return raw
 
 
 def up_of(facts: dict, path: Path) -> tuple[str, list[Finding]]:

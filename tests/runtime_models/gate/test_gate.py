@@ -233,6 +233,58 @@ def test_what_is_held_open_has_one_budget_of_memory_and_time_for_each_call(serve
         held.call("add", np.ones(5), **may)
 
 
+def test_threads_that_hold_one_file_take_turns(served):
+    """Answers that are mixed up would be a crash or a wrong sum."""
+    held = Held("held", served, [0.0], 50 * MB)
+    found = []
+
+    def work():
+        for _ in range(20):
+            found.append(held.call("add", np.ones(1), seconds=0.3, memory=50 * MB))
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    held.close(for_good=True)
+    assert sorted(found) == list(range(1, 61))
+
+
+def test_a_fork_s_copy_leaves_the_pipe_alone(served, monkeypatch):
+    held = Held("held", served, [2.0], 50 * MB)
+    held.process.owner += 1
+    with pytest.raises(BadFile, match="another process has opened it"):
+        held.call("add", np.ones(1), seconds=0.3, memory=50 * MB)
+    held.process.owner -= 1
+    assert held.call("add", np.ones(1), seconds=0.3, memory=50 * MB) == 3.0
+    held.close(for_good=True)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGPROF"), reason="signals of time are POSIX's")
+def test_a_parent_that_ignores_signals_of_time_takes_no_limit_away(served, monkeypatch):
+    monkeypatch.setattr(gate, "WAIT", 200)
+    before = signal.signal(signal.SIGPROF, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGXCPU])
+    try:
+        begun = time.monotonic()
+        with pytest.raises(BadFile, match=r"over 0\.31 s"):
+            ask("test", served, ["spin"])
+        assert time.monotonic() - begun < 20  # not 200 times 0.31 s
+    finally:
+        signal.signal(signal.SIGPROF, before)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGXCPU])
+
+
+def test_without_proc_the_kernel_s_own_count_is_the_start(monkeypatch, tmp_path):
+    """At least what lies in memory now; 0 would limit the process below what it has."""
+    if sys.platform in ("win32", "darwin"):
+        pytest.skip("have counts of their own")
+    there = limits.resident(os.getpid())
+    monkeypatch.setattr(limits, "STATM", tmp_path / "no" / "statm")
+    assert limits.own_bytes() >= there * 0.9
+
+
 def test_what_is_forgotten_lets_go_of_its_process(served):
     """Also in a ring of garbage, whose parts are closed in any order."""
     ring = [Held("held", served, [2.0], 50 * MB)]

@@ -97,7 +97,7 @@ CHANGES = [
     (ATTRIBUTES + P + "SCALE", None, "has no KHR.*:SCALE"),
     (ATTRIBUTES + P + "SH_DEGREE_0_COEF_0", None, "degree 1 or below"),
     (ATTRIBUTES + P + "SH_DEGREE_1_COEF_1", None, "degree 1 or below"),
-    ("meshes.0.primitives.0.extensions", {}, "no Gaussian splats"),
+    ("meshes.0.primitives.0.extensions", {}, "dropped KHR_gaussian_splatting"),
     ("meshes.0.primitives.0.extensions.KHR_gaussian_splatting", 3, "an object in braces is wanted"),
     ("meshes.0.primitives", [3], "that is no object"),
     ("meshes.0", None, "there is none"),

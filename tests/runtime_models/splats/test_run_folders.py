@@ -1,6 +1,7 @@
 """Folders of gsplat's and nerfstudio's runs, opened whole, and what their settings say."""
 
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -71,11 +72,41 @@ def test_settings_that_say_nothing_of_it_change_nothing(tmp_path, text):
     assert not read_raw(run / "ckpts" / "ckpt_29999_rank0.pt", Reading()).antialiased
 
 
+def test_settings_that_contradict_themselves_or_never_end_are_said(tmp_path):
+    run = write_gsplat_run(tmp_path / "a", [arrays_of(30)], antialiased="true")
+    text = (run / "cfg.yml").read_text()
+    for more, told in (
+        ("antialiased: True\n", "was trained antialiased"),  # twice the same
+        ("antialiased: false\n", "says antialiased 2 times: true, false"),
+        ("#" * (1 << 20), "has over 1,048,576 bytes"),
+    ):
+        (run / "cfg.yml").write_text(text + more)
+        raw = read_raw(run / "ckpts" / "ckpt_29999_rank0.pt", Reading())
+        assert raw.antialiased is ("was" in told)
+        assert told in raw.findings[0].what and len(raw.findings) == 1
+
+
+def test_settings_lie_beside_what_a_checkpoint_is_packed_in(tmp_path):
+    run = write_gsplat_run(tmp_path / "a", [arrays_of(30)], antialiased="true")
+    file = run / "ckpts" / "ckpt_29999_rank0.pt"
+    with zipfile.ZipFile(run / "ckpts" / "last.zip", "w") as archive:
+        archive.write(file, file.name)
+    assert read_raw(run / "ckpts" / "last.zip", Reading()).antialiased
+
+
+@pytest.mark.parametrize("name", ["means_l.png", "means_u.png", "shN.npz"])
+def test_a_png_folder_that_lacks_a_file_names_it(tmp_path, name):
+    write_png_folder(tmp_path / "rank0", arrays_of(64, 15))
+    (tmp_path / "rank0" / name).unlink()
+    with pytest.raises(BadFile, match=f"lacks '{name}'"):
+        read_model(tmp_path / "rank0", HUGE)
+
+
 def test_settings_of_another_folder_are_not_looked_at(tmp_path):
     (tmp_path / "cfg.yml").write_text("antialiased: true")
     (tmp_path / "scans" / "mine").mkdir(parents=True)
     assert settings_beside(tmp_path / "scans" / "mine" / "a.pt") == ("", {})
-    assert settings_beside(tmp_path / "a.pt")[1] == {"antialiased": "true"}
+    assert settings_beside(tmp_path / "a.pt")[1] == {"antialiased": ["true"]}
 
 
 @pytest.mark.parametrize("rest", [3, 8, 15])

@@ -3,7 +3,9 @@
 Files are made as the writers of either camp store them (tests/support/splats/spz_files.py).
 """
 
+import gzip
 import json
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -174,3 +176,25 @@ def test_what_we_write_says_its_axes(tmp_path, version, axes):
     assert got.findings == () and got.axes.endswith("its extension says so")
     assert got.axes.startswith({"ply": "right, down", "rub": "right, up"}[axes])
     assert np.abs(got.means - want.means).max() < 1e-4
+
+
+@pytest.mark.parametrize("version", [2, 3, 4])
+@pytest.mark.parametrize("packed", ["a.spz.gz", "a.zip"])
+def test_a_packed_file_is_read_as_the_plain_one_with_what_lies_beside(tmp_path, version, packed):
+    """Version 4 in gzip, too; cameras count that lie beside what it is packed in."""
+    data, path = spz_of(blob(), "RDF", version, 0), tmp_path / packed
+    if packed.endswith(".gz"):
+        path.write_bytes(gzip.compress(data))
+    else:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("in/a.spz", data)
+    assert "a guess" in describe(read_model(path), path)["axes"]
+    rows = [{"position": [0, 0, -4], "rotation": np.eye(3).tolist()}]
+    for flipped in (False, True):
+        if flipped:
+            rows = [{"position": [0, 0, 4], "rotation": np.diag([1, -1, -1]).tolist()}]
+        (tmp_path / "cameras.json").write_text(json.dumps(rows))
+        plain = tmp_path / "plain.spz"
+        plain.write_bytes(data)
+        said = describe(read_model(plain), plain)["axes"]
+        assert describe(read_model(path), path)["axes"] == said

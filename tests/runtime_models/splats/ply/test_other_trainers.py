@@ -68,7 +68,7 @@ def test_a_filter_at_the_ends_of_its_numbers(tmp_path):
 @pytest.mark.parametrize(
     "comment, up",
     [("Vertical Axis: z", "+Z"), ("vertical axis: Y", "+Y"), ("Vertical Axis: -y", "-Y"),
-     ("Vertical Axis = +x", "+X"), ("Vertical Axis: w", None), ("a Vertical Axis: z", None)],
+     ("Vertical Axis = +x", "+X"), ("a Vertical Axis: z", None)],
 )  # fmt: skip
 def test_a_comment_says_what_is_up(tmp_path, comment, up):
     path = write_rows(tmp_path / "a.ply", random_rows(20, names_of(1)), comments=(comment,))
@@ -79,6 +79,28 @@ def test_a_comment_says_what_is_up(tmp_path, comment, up):
     ]
     asked = read_plain(path, Reading(up="-Y", allow_huge=True))
     np.testing.assert_allclose(asked.means, raw.means * (1, -1, -1), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "comments, told",
+    [(["Vertical Axis: w"], "(W)"), (["Vertical Axis:"], "(nothing)"),
+     (["Vertical Axis: z", "vertical axis: y"], "(Z, Y)")],
+)  # fmt: skip
+def test_comments_that_name_no_one_axis_are_said(tmp_path, comments, told):
+    path = write_rows(tmp_path / "a.ply", random_rows(20, names_of(1)), comments=tuple(comments))
+    raw = read_raw(path, Reading())
+    assert raw.up == "-Y"
+    assert [finding.what for finding in raw.findings] == [
+        f"its comments name no one vertical axis {told}"
+    ]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("f, told", [(float("nan"), "0 m"), (-0.01, "0.01 m")])
+def test_the_filter_s_middle_is_of_sizes_and_numbers(tmp_path, f, told):
+    rows = [row | {"filter_3D": f} for row in random_rows(9, names_of(1))]
+    raw = read_raw(write_rows(tmp_path / "a.ply", rows), Reading())
+    assert f"half of it over {told})" in raw.findings[0].what
 
 
 def test_a_comment_of_points_says_what_is_up(tmp_path):
