@@ -223,7 +223,7 @@ def test_without_room_it_is_put_away_and_says_so(inspector):
 
 
 def test_without_heat_lengths_are_measured_all_the_same(inspector, monkeypatch):
-    monkeypatch.setattr(Inspecting, "thermal", property(lambda self: None))
+    monkeypatch.setattr(Inspecting, "measured", property(lambda self: None))
     inspector.pull(TABLE)
     assert not inspector.names(), "there is no spot without a value"
     inspector.marks.pulls = LENGTHS
