@@ -19,10 +19,11 @@ from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lenses.brown import brown_tangents, is_brown
 from shapeshift.scene.captures.lenses.panorama import is_panorama
 from shapeshift.scene.captures.photo import load_photo
-from shapeshift.scene.captures.undistort import by_pycolmap, pinhole_of
+from shapeshift.scene.captures.undistort import by_pycolmap, pinhole_of, pixels_of
 from shapeshift.scene.pose import View
 
 MOST_SIDE = 1024  # pixels: what segmenters look at
+MOST_AWAY = 0.5  # pixels from where a lens sends a point's tangent to the point
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,20 @@ class WorkPhoto:
 
 
 def straight_points(lens: ColmapCamera, points: np.ndarray) -> np.ndarray:
-    """(n, 2) pixels of the straight camera, of points in a bent photo's pixels."""
+    """(n, 2) pixels of the straight camera, of points in a bent photo's pixels; NaN of those that
+    it does not see.
+
+    Past 90 degrees of a fisheye pycolmap gives the angle as if it were a tangent, within the
+    straight photo: what the lens does not send back to its point is no tangent of it.
+    """
     straight = pinhole_of(lens)
     if is_brown(lens):
-        return brown_tangents(lens, points) * straight.focal + straight.centre
-    return by_pycolmap(lens, points, back=True) * straight.focal + straight.centre
+        tangents = brown_tangents(lens, points)
+    else:
+        tangents = by_pycolmap(lens, points, back=True)
+    away = np.abs(pixels_of(lens, tangents) - points).max(axis=1)  # pixels
+    tangents = np.where((away <= MOST_AWAY)[:, None], tangents, np.nan)  # NaN is away
+    return tangents * straight.focal + straight.centre
 
 
 def work_photos(capture: Capture, stops: Sequence[Stop]) -> list[WorkPhoto]:
@@ -114,6 +124,11 @@ def prompt_of(spec: ObjectSpec, said: PhotoPrompt, photo: WorkPhoto) -> Prompt:
             raise BadFile(
                 f"object '{spec.name}': {x:g}, {y:g} lies outside of {photo.name}, which has "
                 f"{width}x{height} pixels."
+            )
+        if not np.isfinite(photo.places([(x, y)])).all():
+            raise BadFile(
+                f"object '{spec.name}': {x:g}, {y:g} of {photo.name} lies outside of what the "
+                "photo shows without its lens's bend; say a place nearer to the middle."
             )
     box = None
     if said.box:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
-from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
 
 VERSION = b"\0\1"  # the first bytes: 0.1
@@ -25,6 +25,7 @@ BUCKETS_AT = 32
 HARMONICS = (0, 9, 24, 45)  # numbers a splat beyond the first three, by SH degree; 3 is written
 #                              by other converters, GaussianSplats3D itself stops at 2
 UNPACKED = 64  # bytes a splat of what is needed on the way, without its harmonics
+LAST_CODE, TELLING = 65534, 100  # from where a code is the last; splats that tell something
 RANGE = 32767  # codes on either side of a bucket's centre, where a section does not say
 BYTE_HARMONIC = 1.5  # largest 8-bit harmonic, where the header does not say
 
@@ -94,6 +95,7 @@ def fill(raw: RawSplats, rows: slice, data: bytes, header: Header, section: Spla
     means = raw.means[rows]
     means[:] = table["mean"]
     if header.level:
+        raw.findings = (*raw.findings, *thrown_to_ends(table["mean"], header.file))
         means -= section.range
         means *= section.block_m / 2 / section.range
         means += centers_of(data, header, section)
@@ -182,6 +184,21 @@ def row_of(level: int, degree: int) -> np.dtype:
             ("sh", harmonic, HARMONICS[degree]),
         ]
     )
+
+
+def thrown_to_ends(codes: np.ndarray, file: str) -> list[Finding]:
+    """What is said of codes (N, 3) of which an axis knows the two ends of its range alone.
+
+    GaussianSplats3D's writer makes them of scenes that are flat in y or z.
+    """
+    ends = (codes == 0) | (codes >= LAST_CODE)
+    lost = ends.all(0) & (codes == 0).any(0) & (codes != 0).any(0)
+    if len(codes) < TELLING or not lost.any():
+        return []
+    axes = ", ".join(np.array(list("xyz"))[lost])
+    what = f"{len(codes):,} splats lie at the ends of their blocks in {axes}, none between"
+    done = "shown as filed; GaussianSplats3D's writer spoils flat scenes so, level 0 is right"
+    return [Finding(what, len(codes), done, file=file, repaired=False)]
 
 
 def centers_of(data: bytes, header: Header, section: SplatSection) -> np.ndarray:

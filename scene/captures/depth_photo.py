@@ -24,7 +24,7 @@ from shapeshift.scene.captures.photo import (
     quiet,
     refuse_other_view,
 )
-from shapeshift.scene.captures.radiometric.no_value import FLOATS, GREY_16
+from shapeshift.scene.captures.radiometric.no_value import FLOATS, GREY_16, without_value
 from shapeshift.scene.captures.undistort import pixels_of, straight_pixels
 
 NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's
@@ -216,6 +216,9 @@ def _pixels(path: Path, most: int) -> tuple[np.ndarray, bool]:
         except BROKEN as error:
             raise BadFile(f"{path_end(path)}: cut off ({error}); copy it again") from None
         values, floats = np.array(image, np.float32), image.mode == FLOATS
+        gone = without_value(image, np.asarray(image))
+    if gone is not None:
+        values[gone] = 0
     if not floats:
         values[values >= 65535] = 0
     return values, floats

@@ -7,13 +7,13 @@ AtmosphericTransAlpha1 ... X), for distances of metres to some hundred:
     share = X exp(-sqrt(d) (a1 + b1 sqrt(water))) + (1 - X) exp(-sqrt(d) (a2 + b2 sqrt(water)))
 """
 
-import math
 from dataclasses import dataclass
+
+from shapeshift.scene.captures.radiometric.flir_run import air_share, water_of
 
 X = 1.9
 ALPHAS = (0.006569, 0.01262)
 BETAS = (-0.002276, -0.00667)
-WATER = (1.5587, 0.06939, -0.00027816, 6.8455e-7)  # of powers of T in °C
 FARTHEST_M = 1000.0  # beyond it the fit gives what no air does
 COLDEST_C, HOTTEST_C = -60.0, 60.0  # of air
 
@@ -41,17 +41,13 @@ class Air:
     @property
     def water(self) -> float:
         """Grams in a cubic metre."""
-        powers = (c * self.celsius**power for power, c in enumerate(WATER))
-        return self.humidity / 100 * math.exp(sum(powers))
+        return water_of(self.humidity / 100, self.celsius)
 
     @property
     def transmission(self) -> float:
         """Share of a surface's radiation that arrives, above 0, at most 1."""
-        far, wet = math.sqrt(self.distance_m), math.sqrt(self.water)
-        first, second = (
-            math.exp(-far * (alpha + beta * wet)) for alpha, beta in zip(ALPHAS, BETAS, strict=True)
-        )
-        return min(max(X * first + (1 - X) * second, 1e-3), 1.0)
+        share = air_share(self.distance_m, self.water, (X, *ALPHAS, *BETAS))
+        return min(max(share, 1e-3), 1.0)
 
     def words(self) -> str:
         """Such as "12 m of air, 60 %, 15 °C: 97.3 % arrive"."""

@@ -83,13 +83,14 @@ def main() -> None:
     ):
         for name, stop, sections, act in (
             ("inspect.png", "Thermal", ("Stops", "Look", "Camera"), lay_marks),
-            ("measure.png", "RGB", ("Inspect", "Camera"), lay_lengths),
+            ("measure.png", "RGB", ("Look", "Inspect", "Camera"), lay_lengths),
         ):
             viewer = viewer_on(window, renderer, read(DEMO), Path(pictures), stop)
             viewer.shell.actions.sections.update(dict.fromkeys(sections, False))
             settle(viewer)
             with hands_on(viewer, os.environ["DISPLAY"]) as hands:
                 act(viewer, hands)
+                viewer.shell.actions.sections.update(dict.fromkeys(sections, False))
                 settle(viewer)
                 save_png(window.picture() / 255.0, folder / name)
             viewer.parts.finder.close()

@@ -1,5 +1,6 @@
 """What readers of other programs' poses share: their photos, their lenses, what points up."""
 
+import codecs
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import is_number
+from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.capture_files import SMALLER, folded, parts_of
+from shapeshift.scene.capture_files import CODE_PAGES, NAMES_TRIED, SMALLER, folded, parts_of
 from shapeshift.scene.capture_photos import image_size
 from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 from shapeshift.scene.captures.colmap_tables import BROWN, ColmapCamera
@@ -105,6 +107,24 @@ def pictures_below(folder: Path, deepest: int) -> Iterable[str]:
         names = [f for f in files if os.path.splitext(f)[1].lower() in ENDINGS]
         found += [(below / name).as_posix() for name in names if not name.startswith(".")]
     return sorted(found)
+
+
+def text_in(path: Path, photos: PhotoIndex | None = None) -> str:
+    """A file's text with \n between its lines.  What is no UTF-8 is read in the code page in which
+    most of the photos' names are in it; without any in that of western Windows.  Raises BadFile.
+    """
+    data = read_text_file(path, "its words")
+    wide = data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    pages = ["utf-16" if wide else "utf-8-sig"]
+    try:
+        text = data.decode(pages[0])
+    except UnicodeDecodeError:
+        pages = pages if wide else list(CODE_PAGES)
+        named = [] if photos is None else [n for n in photos.by_name if not n.isascii()]
+        texts = [data.decode(page, "replace") for page in pages]
+        found = [sum(name in folded(t) for name in named[:NAMES_TRIED]) for t in texts]
+        text = texts[found.index(max(found))]
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 @dataclass

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 from shapeshift.scene.captures.colmap_tables import RADIAL_BACKWARDS, ColmapCamera
@@ -17,6 +16,7 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     brown_lens,
     camera_inverse,
     checked_lens,
+    text_in,
     world_from,
 )
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
@@ -58,22 +58,18 @@ class Words:
         return int(value)
 
 
-def text_in(path: Path) -> str:
-    return read_text_file(path, "its words").decode("utf-8-sig", "replace")
-
-
 def bundler_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     """x right, y up, z back; pixels from the photo's middle; radial distortion alone (its manual).
 
     Raises BadFile.
     """
-    head, _, rest = text_in(path).lstrip().partition("\n")
+    head, _, rest = text_in(path, photos).lstrip().partition("\n")
     if not head.startswith("# Bundle file"):
         raise BadFile(f"{path} does not begin with '# Bundle file'; {AGAIN}.")
     words = Words(path, rest)
     most = path.stat().st_size
     cameras, points = words.count(most), words.count(most)
-    names = listed_names(path, cameras)
+    names = listed_names(path, cameras, photos)
     out = Gathered(path, "Bundler", photos)
     for name in names:
         f, k1, k2 = words.numbers(3)
@@ -98,14 +94,14 @@ def radial_lens(out: Gathered, name: str, f: float, k1: float, k2: float) -> Col
     return brown_lens(size, pinhole, (k1, k2), (0.0, 0.0), f"{out.path}: {name}")
 
 
-def listed_names(path: Path, count: int) -> list[str]:
+def listed_names(path: Path, count: int, photos: PhotoIndex) -> list[str]:
     """The photos, in the cameras' order: one a line, of which the first word counts."""
     for place in (path.parent, path.parent.parent):
         for form in LISTS:
             table = place / form.format(stem=path.stem)
             if not table.is_file() or table == path:
                 continue
-            names = list(first_words(text_in(table)))
+            names = list(first_words(text_in(table, photos)))
             if len(names) == count:
                 return names
     raise BadFile(
@@ -137,7 +133,7 @@ def nvm_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     """
     from scipy.spatial.transform import Rotation
 
-    lines = iter([line for line in text_in(path).splitlines() if line.strip()])
+    lines = iter([line for line in text_in(path, photos).splitlines() if line.strip()])
     head = next(lines, "")
     if not head.startswith("NVM_V3"):
         raise BadFile(f"{path} does not begin with NVM_V3; {AGAIN}.")

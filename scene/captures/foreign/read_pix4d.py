@@ -15,9 +15,10 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     PhotoIndex,
     brown_lens,
     checked_size,
+    text_in,
     world_from,
 )
-from shapeshift.scene.captures.foreign.read_bundler import Words, text_in
+from shapeshift.scene.captures.foreign.read_bundler import Words
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 
 MARK, LAST = "fileName imageWidth imageHeight", "camera model"
@@ -26,7 +27,7 @@ ROWS = 10  # lines of a photo
 
 def pix4d_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     """Raises BadFile."""
-    lines = [line.strip() for line in text_in(path).splitlines()]
+    lines = [line.strip() for line in text_in(path, photos).splitlines()]
     start = next((i for i, line in enumerate(lines) if line.startswith(LAST)), -1)
     rows = [line for line in lines[start + 1 :] if line]
     if start < 0 or not rows or len(rows) % ROWS:

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
@@ -22,6 +21,7 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     Gathered,
     PhotoIndex,
     brown_lens,
+    text_in,
 )
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 from shapeshift.scene.pose import OPENCV_FROM_EYE
@@ -39,7 +39,7 @@ MUST = ("name", "x", "y", "alt", "heading", "pitch", "roll", "f")
 
 def realityscan_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     """Raises BadFile."""
-    rows = rows_of(path)
+    rows = rows_of(path, photos)
     columns = columns_of(rows[0])
     out = Gathered(path, "RealityScan", photos, Z_UP)
     if lacks := [key for key in MUST if key not in columns]:
@@ -54,6 +54,11 @@ def realityscan_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
         where = f"{path}, line {number}"
         if len(row) <= max(columns.values()):
             raise BadFile(f"{where}: {len(row)} columns, the first line names more; export again")
+        if len(row) > len(rows[0]) and any(word.strip() for word in row[len(rows[0]) :]):
+            raise BadFile(
+                f"{where}: {len(row)} columns, the first line names {len(rows[0])}; export it "
+                "again with decimal points"
+            )
         name = row[columns["name"]].strip()
         values = {key: number_in(row[at], where) for key, at in columns.items() if key != "name"}
         pose = np.eye(4)
@@ -80,8 +85,8 @@ def look_like_degrees(places: np.ndarray) -> bool:
     return bool(100 * across < min(high, np.abs(places[:, :2].mean(axis=0)).max()))
 
 
-def rows_of(path: Path) -> list[list[str]]:
-    text = read_text_file(path).decode("utf-8-sig", "replace").replace("\0", "")
+def rows_of(path: Path, photos: PhotoIndex) -> list[list[str]]:
+    text = text_in(path, photos).replace("\0", "")
     first = text.partition("\n")[0]
     cut = max(",;\t", key=first.count)
     try:

@@ -60,6 +60,23 @@ def test_places_in_a_bent_photo_become_places_in_the_straight_one(tmp_path, k1):
     assert np.abs(bent - straight).max() > 0.01
 
 
+def test_what_a_fisheye_sees_past_90_degrees_is_outside(tmp_path):
+    """An equidistant lens by hand: a pixel lies at the angle times the focal length."""
+    photo, focal = photo_of(tmp_path / "a.png", (64, 64)), 16.0
+    lens = ColmapCamera("OPENCV_FISHEYE", (64, 64), (focal, focal, 32, 32, 0, 0, 0, 0))
+    photo = replace(photo, photo=replace(photo.photo, lens=lens))
+    angles = np.array([0.0, 0.5, 1.5, 1.6, 1.9])  # radians
+    straight = straight_points(lens, np.stack([32 + focal * angles, np.full(5, 32.0)], axis=1))
+    wanted = focal * np.tan(angles[:3]) + pinhole_of(lens).centre[0]
+    np.testing.assert_allclose(straight[:3, 0], wanted, rtol=1e-6)
+    assert np.isnan(straight[3:]).all()
+    prompt_of(ObjectSpec(1, "thing"), PhotoPrompt("a.png", inside=((40, 32),)), photo)
+    with pytest.raises(BadFile, match=r"thing': 62, 32 of a.png lies outside of what"):
+        prompt_of(ObjectSpec(1, "thing"), PhotoPrompt("a.png", inside=((62, 32),)), photo)
+    with pytest.raises(BadFile, match="lies outside of what"):
+        prompt_of(ObjectSpec(1, "thing"), PhotoPrompt("a.png", (2, 30, 40, 34)), photo)
+
+
 @pytest.mark.parametrize("k1", [0.0, 0.2, -0.2])
 @pytest.mark.parametrize("factor", [1, 2])
 def test_a_mask_and_a_box_of_a_photo_lie_in_one_place(tmp_path, k1, factor):

@@ -83,6 +83,19 @@ def test_numbers_that_are_none_are_left_to_the_judge(read):
     assert np.isnan(raw.means[1, 0]) and np.isinf(raw.means[1, 1:]).all()
 
 
+@pytest.mark.parametrize("count", [99, 100])
+@pytest.mark.parametrize("middle", [0, 1])
+def test_a_flat_scene_thrown_to_the_ends_of_its_codes_is_said(read, count, middle):
+    """Of z alone both ends and nothing between; of fewer than 100 splats nothing is said."""
+    codes = np.random.default_rng(0).integers(1, 65534, (count, 3))
+    codes[:, 2] = np.where(np.arange(count) % 3, 65535, 0)
+    codes[0, 2] = 30_000 if middle else 0
+    made = HandSection([codes], [(0.0, 0.0, 0.0)], bucket_size=count)
+    told = [finding.what for finding in read(ksplat(1, [made])[0]).findings]
+    said = f"{count} splats lie at the ends of their blocks in z, none between"
+    assert told == ([said] if count == 100 and not middle else [])
+
+
 GOOD = ksplat(1, [section([4, 2], 1)])[0]
 
 

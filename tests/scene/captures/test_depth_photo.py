@@ -14,6 +14,7 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.synthetic.balls import DEPTH_UNIT, make_balls
 from tests.support.scene.captures import simple, write_transforms
+from tests.support.scene.gaps import write_tiff
 
 STEPS = np.array([[0, 1, 2, 1000], [65534, 65535, 7, 30000], [5, 5, 5, 5]], np.uint16)
 
@@ -185,3 +186,14 @@ def test_depth_of_another_unit_than_the_points_is_refused(balls, times):
 def test_points_that_are_hidden_do_not_matter(balls):
     hidden = np.concatenate([balls.points, balls.points - [0, 9, 0]])  # under the floor
     refuse_other_units(replace(balls, points=hidden), "here")
+
+
+@pytest.mark.parametrize("dtype,unit", [(np.float32, 1.0), (np.uint16, 0.001)])
+def test_the_no_data_number_of_a_tiff_is_not_known(tmp_path, dtype, unit):
+    values = np.array([[7, 2], [3, 7]], dtype)
+    frames, rest = simple(tmp_path, 2)
+    write_tiff(tmp_path / "d.tif", np.kron(values, np.ones((6, 8), dtype)), "7")
+    frames[0] |= {"depth_path": "d.tif"}
+    write_transforms(tmp_path, frames, **rest)
+    got = load_depth(read_capture(tmp_path).photos[0])[::6, ::8]
+    np.testing.assert_array_equal(got, np.array([[0, 2], [3, 0]], np.float32) * np.float32(unit))

@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.radiometric.number_photos import radiometric_celsius
 from shapeshift.scene.inspection.air import NO_AIR, Air
 from shapeshift.scene.inspection.camera_settings import camera_settings
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
@@ -49,26 +50,43 @@ def set_to(monkeypatch, surface: tuple[float, float], air: tuple[float, float, f
 @pytest.mark.parametrize(
     ("celsius", "off"), [(0.0, 0.15), (35.0, 0.15), (60.0, 0.15), (120.0, 0.3)]
 )
-def test_surfaces_are_what_flyr_makes_of_the_same_air(tmp_path, monkeypatch, celsius, off):
-    """flyr takes the way in two halves, so its share is the square of ours of half the distance.
-
-    What is left: flyr's Planck curve is this camera's, of 10.3 micrometres, ours of 9.8.
-    """
-    flyr = pytest.importorskip("flyr")
+def test_surfaces_are_what_a_photo_of_the_same_air_says(tmp_path, monkeypatch, celsius, off):
+    """What is left: the photo's Planck curve is this camera's, of 10.3 micrometres, ours of 9.8."""
+    pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
     metres, humidity, air_c, emissivity, mirrored = 20.0, 0.7, 12.0, 0.9, 15.0
     set_to(monkeypatch, (emissivity, mirrored), (metres, humidity, air_c))
     path = flir_files.write_flir(tmp_path / "a.jpg", np.full((3, 4), celsius), (4, 3))
-    want = float(flyr.unpack(str(path)).celsius[0, 0])
-
-    class TwoHalves(Air):
-        @property
-        def transmission(self) -> float:
-            return Air(self.distance_m / 2, self.humidity, self.celsius).transmission ** 2
-
-    air = TwoHalves(metres, 100 * humidity, air_c)
+    want = float(radiometric_celsius(path, (4, 3))[0, 0])
+    air = Air(metres, 100 * humidity, air_c)
     emission = Emission(SurfaceRadiation(emissivity, mirrored), air=air)
     got = float(emission.corrected(np.array(celsius), "°C"))
     assert got == pytest.approx(want, abs=off) and abs(want - celsius) > 0.3
+
+
+@pytest.mark.parametrize("metres", [0.0, 1.0, 10.0, 100.0])
+@pytest.mark.parametrize("emissivity", [1.0, 0.8])
+def test_a_photo_is_read_through_air_of_its_whole_distance(
+    tmp_path, monkeypatch, metres, emissivity
+):
+    """Counts by FLIR's S = E t B(T) + (1 - E) t B(reflected) + (1 - t) B(air), forwards; a count is
+    0.02 °C of a black body, more where less of it arrives.
+    """
+    pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
+    surfaces, air_c, mirrored, humidity = np.array([[-20.0, 20, 50, 120]] * 3), 20.0, 15.0, 0.5
+    set_to(monkeypatch, (emissivity, mirrored), (metres, humidity, air_c))
+    grams = humidity * math.exp(1.5587 + 0.06939 * 20 - 0.00027816 * 400 + 6.8455e-7 * 8000)
+    share = 1.9 * math.exp(-(metres**0.5) * (0.006569 - 0.002276 * grams**0.5))
+    share -= 0.9 * math.exp(-(metres**0.5) * (0.01262 - 0.00667 * grams**0.5))
+    radiation = flir_files.radiation
+    arrives = (
+        emissivity * share * radiation(surfaces)
+        + (1 - emissivity) * share * radiation(mirrored)
+        + (1 - share) * radiation(air_c)
+    )
+    counts = np.rint(arrives).astype(np.uint16)
+    monkeypatch.setattr(flir_files, "raw_counts", lambda celsius: counts)
+    path = flir_files.write_flir(tmp_path / "a.jpg", surfaces, (4, 3))
+    np.testing.assert_allclose(radiometric_celsius(path, (4, 3)), surfaces, atol=0.05)
 
 
 def test_what_the_camera_was_set_to_is_put_back():

@@ -20,8 +20,13 @@ SEGMENT = 60_000  # bytes of numbers a segment
 
 def raw_counts(celsius: np.ndarray) -> np.ndarray:
     """What the camera's detector counts: Planck's law, a black body without air before it."""
+    return np.rint(radiation(celsius)).astype(np.uint16)
+
+
+def radiation(celsius: np.ndarray | float) -> np.ndarray:
+    """The same before it is counted."""
     kelvin = np.asarray(celsius, np.float64) + KELVIN
-    return np.rint(R1 / (R2 * (np.exp(B / kelvin) - F)) - O).astype(np.uint16)
+    return R1 / (R2 * (np.exp(B / kelvin) - F)) - O
 
 
 def camera_record(saturated: tuple[float, float] | None = None, emissivity: float = 1) -> bytes:

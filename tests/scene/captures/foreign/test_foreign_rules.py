@@ -303,3 +303,40 @@ def test_a_wide_photo_of_another_size_has_its_lens_scaled(photos):
     capture = read_capture(photos)
     assert capture.photos[0].view.size == (20, 15)
     assert np.isclose(capture.photos[0].view.pinhole()[1], 19)
+
+
+TABLES = {
+    "realityscan": lambda d, s: write.realityscan(
+        d, s, dict.fromkeys(("px", "py", "k1", "k2", "k3", "k4", "t1", "t2"), 0.0) | {"f": 34.0}
+    ),
+    "bundler": lambda d, s: write.bundler(d, s, (38.0, 0.0, 0.0)),
+    "nvm": lambda d, s: write.nvm(d, s, 37.0, 0.0),
+    "pix4d": lambda d, s: write.pix4d(
+        d, s, (37, 20, 15, (0, 0, 0), (0, 0)), s[0].centre
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", TABLES)
+@pytest.mark.parametrize("encoding,letter", [
+    ("utf-16", "ä"), ("cp1252", "ä"), ("cp1251", "я"), ("cp932", "橋"), ("utf-8-sig", "橋"),
+])  # fmt: skip
+def test_tables_of_text_in_any_encoding_and_with_any_line_ends(tmp_path, form, encoding, letter):
+    shots = [replace(shot, name=f"{letter}_{shot.name}") for shot in SHOTS]
+    save_photos(tmp_path, shots)
+    before = set(tmp_path.iterdir())
+    TABLES[form](tmp_path, shots)
+    for path in set(tmp_path.iterdir()) - before:
+        text = path.read_text("utf-8-sig").replace("\n", "\r")
+        path.write_bytes(text.encode(encoding))
+    assert names(read_capture(tmp_path)) == {shot.name for shot in shots}
+
+
+def test_a_table_with_decimal_commas_is_refused_as_such(photos):
+    path = TABLES["realityscan"](photos, SHOTS)
+    head, *rows = path.read_text().splitlines()
+    name = SHOTS[0].name
+    row = f"{name}{rows[0].removeprefix(name).replace('.', ',')}"
+    path.write_text(f"{head}\n{row}\n")
+    with pytest.raises(BadFile, match=r"line 2: 31 columns, the first line names 16; .*points"):
+        read_capture(photos)

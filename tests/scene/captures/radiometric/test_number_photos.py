@@ -101,6 +101,15 @@ def test_degrees_of_a_radiometric_photo_are_those_of_planck(tmp_path, png):
         assert "\n" not in str(refused.value)
 
 
+def test_a_png_of_more_bytes_than_numbers_is_not_called_damaged(tmp_path):
+    """Noise does not shrink; flyr reads two bytes a number."""
+    pytest.importorskip("flyr", reason="the optional extra thermal is not installed")
+    noise = np.random.default_rng(0).uniform(-20, 500, (60, 80))
+    path = write_flir(tmp_path / "a.jpg", noise, (80, 60), png=True)
+    with pytest.raises(BadFile, match="a PNG of more bytes than numbers"):
+        radiometric_celsius(path, (80, 60))
+
+
 def test_without_the_reader_a_sentence_says_so(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "flyr", None)
     path = write_flir(tmp_path / "a.jpg", RAMP, (16, 12))
