@@ -28,11 +28,11 @@ def capture_facts(path: Path) -> dict | None:
         "stops": [
             {
                 "name": stop.name, "x": stop.x, "kind": stop.kind, "unit": stop.unit,
-                "value_range": stop.value_range,
+                "value_range": stop.value_range, "formula": stop.formula,
                 "train": photos_of(capture, stop.name, "train"),
                 "test": photos_of(capture, stop.name, "test"),
             }
-            for stop in capture.stops
+            for stop in sorted((*capture.stops, *capture.formulas), key=lambda stop: stop.x)
         ],
         "points": 0 if capture.points is None else len(capture.points),
         "files": [asdict(row) for row in capture.files],
@@ -50,10 +50,9 @@ def print_capture(facts: dict) -> None:
     from shapeshift.scene.captures.capture import FoundFiles
 
     for stop in facts["stops"]:
-        print_text(
-            f"{stop['x']:.3f}  {stop['name']} ({stop['kind']}): {stop['train']} photos to train "
-            f"on, {stop['test']} held out"
-        )
+        photos = f"{stop['train']} photos to train on, {stop['test']} held out"
+        what = f"by formula, {stop['formula']}" if stop["formula"] else photos
+        print_text(f"{stop['x']:.3f}  {stop['name']} ({stop['kind']}): {what}")
     print_files([FoundFiles(**row) for row in facts["files"]], stderr=False)
     for doubt in facts["doubts"]:
         print_text(doubt)

@@ -53,7 +53,9 @@ NO_CAMERA = {"model", "path", "file"}  # a lens's form; where a file lies
 LETTER = re.compile(r"(?:^|(?<=[_. -]))([TVWZ])(?=$|[_. -])", re.IGNORECASE)
 DRONE = re.compile(r"DJI_(?:\d{14}_)?\d{4}_T(?![a-z0-9])", re.IGNORECASE)
 RADIOMETRIC = re.compile(r"DJI_\d{4}_R(?![a-z0-9])", re.IGNORECASE)  # of its Zenmuse XT2
+OTHER_LETTERS = re.compile(r"DJI_\d{4}_(?!R(?![a-z0-9]))", re.IGNORECASE)  # beside: R is red
 KEY_WORDS = {"is", "image", "photo", "frame", "camera"}  # beside the one of a sort in a key
+MAKERS = {"flir", "flir_one", "boson", "lepton"}  # folders of cameras of heat
 PARTNERS = {"MAX", "DC"}  # before the numbers of Autel's and FLIR's visible photos
 FEWEST_PAIRS = 2  # one pair may be two letters of an alphabet
 FLAGS = {"true": True, "false": False, "1": True, "0": False, "yes": True, "no": False}
@@ -154,7 +156,7 @@ def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[Seen]:
     files = [os.path.splitext(parts_of(name)[-1])[0] for name in names]
     by_folder = [sort_of_folders(part) for part in folders]
     letters = {part.upper() for found in folders for part in found if len(part) == 1}
-    if "T" in letters and (letters & set("VWZ") or LIGHT in by_folder):
+    if "T" in letters and (letters & set("VWZ") or (letters == {"T"} and LIGHT in by_folder)):
         by_letter = [sort_of_letter([p.upper() for p in part if len(p) == 1]) for part in folders]
         by_folder = [one or other for one, other in zip(by_folder, by_letter, strict=True)]
     by_file = [
@@ -171,6 +173,8 @@ def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[Seen]:
 def sort_of_folders(folders: Sequence[str]) -> str:
     """Of the outermost folder that says one; where two contradict each other, of both."""
     found = {sort_of_name(name) for name in folders} - {""}
+    if len(found) > 1:  # flir/visible: a camera of heat has a lens of light, too
+        found = {sort_of_name(name) for name in folders if name.lower() not in MAKERS} - {""}
     return found.pop() if len(found) == 1 else "both" if found else ""
 
 
@@ -205,9 +209,10 @@ def by_letters(files: Sequence[str]) -> list[str]:
 
 
 def radiometric(files: Sequence[str]) -> list[bool]:
-    """Which DJI calls so; not where all are."""
+    """Which DJI calls so; not where all are, nor where letters are bands, or left and right."""
     found = [RADIOMETRIC.match(name) is not None for name in files]
-    return found if not all(found) else [False] * len(files)
+    told = any(found) and not all(found) and not any(map(OTHER_LETTERS.match, files))
+    return found if told else [False] * len(files)
 
 
 def stem_of(file: str) -> str:

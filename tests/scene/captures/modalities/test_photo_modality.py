@@ -230,6 +230,11 @@ def test_keys_that_say_nothing_of_heat(key, value):
     (["DJI_0001_R.JPG", "DJI_0002.JPG"], {"RGB": 1, "Thermal": 1}),  # a Zenmuse XT2's
     (["DJI_0001_R.JPG", "DJI_0002_R.JPG"], {"RGB": 2}),
     (["DJI_0001_RAW.JPG", "DJI_0002.JPG"], {"RGB": 2}),
+    (["DJI_0001_R.TIF", "DJI_0001_G.TIF", "DJI_0002.JPG"], {"RGB": 3}),  # bands
+    (["DJI_0001_R.JPG", "DJI_0001_L.JPG"], {"RGB": 2}),
+    (["a/rgb/1.png", "a/s/1.png", "a/t/1.png"], {"a": 3}),
+    (["flir/visible/1.png", "flir/thermal/1.png", "left/1.png"], {"RGB": 2, "flir": 1}),
+    (["FLIR/1.png", "FLIR/rgb/1.png", "left/1.png"], {"RGB": 2, "FLIR": 1}),
 ])  # fmt: skip
 def test_letters_of_heat_without_a_pair(names, found):
     assert stops_of(names) == found

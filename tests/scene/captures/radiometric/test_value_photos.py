@@ -1,13 +1,17 @@
 """Photos of a measured quantity that is no heat: their range, palette and unit, what is refused."""
 
+import json
+
 import numpy as np
 import pytest
 from PIL import Image
 
+from shapeshift.app import cli
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.scene.captures import simple, write_transforms
+from tests.support.scene.strangers.situations import Shot, write_colmap
 
 HEIGHT, WIDTH = 12, 16
 
@@ -70,3 +74,14 @@ def test_colours_are_no_values(tmp_path):
 def test_what_a_modality_of_values_cannot_say(tmp_path, said, words):
     with pytest.raises(BadFile, match=words):
         capture_of(tmp_path, ramp(np.uint8), "000.png", **said)
+
+
+def test_info_lists_an_index_by_formula(tmp_path, capsys):
+    shots = [Shot(f"{name}/{i}.png", "I;16") for name in ("red", "nir") for i in range(2)]
+    write_colmap(tmp_path, shots)
+    said = [{"name": n, "x": x, "kind": "values"} for n, x in (("red", 0), ("nir", 1))]
+    said.append({"name": "Index", "x": 0.5, "kind": "values", "value_range": [-1, 1]}
+                | {"formula": "nir - red"})  # fmt: skip
+    (tmp_path / "capture.json").write_text(json.dumps({"modalities": said}))
+    assert cli.main(["info", str(tmp_path)]) == 0
+    assert "0.500  Index (values): by formula, nir - red\n" in capsys.readouterr().out
