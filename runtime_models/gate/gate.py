@@ -9,12 +9,15 @@ sentence.
 import atexit
 import os
 import queue
+import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -55,10 +58,16 @@ class Process:
         # -P: the current folder's modules are not to stand in for those of packages; nor, where
         # this process was started by -I, those of PYTHONPATH.
         alone = ["-P", *(["-I"] if sys.flags.isolated else [])]
-        self.child = subprocess.Popen(
-            [python, *alone, str(CHILD), program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL, env=words,
-        )  # fmt: skip
+        try:
+            self.child = subprocess.Popen(
+                [python or "", *alone, str(CHILD), program], stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=words,
+            )  # fmt: skip
+        except OSError as why:
+            raise BadFile(
+                f"the process that would read the file does not start ({why.strerror or why}); "
+                f"it would be {python or 'of no Python that is known'}"
+            ) from None
         self.served = 0
         self.owner = os.getpid()
 
@@ -253,6 +262,51 @@ def put_back(name: str, process: Process) -> None:
             waiting.append(process)
             return
     process.end()
+
+
+@contextmanager
+def in_utf8(path: Path) -> Iterator[str]:
+    """A name of a file for libraries that take UTF-8 alone: its own, or that of a link to it.
+
+    Where the folder alone has another name, the link is to that: files beside are found by it.
+    Raises BadFile where there can be no link.
+    """
+    if is_utf8(str(path)):
+        yield str(path)
+        return
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="shapeshift-"))
+    except OSError as why:
+        raise no_link(path, why) from None
+    try:
+        if is_utf8(path.name):
+            (link := folder / "beside").symlink_to(path.parent, target_is_directory=True)
+            link /= path.name
+        else:
+            link = folder / f"file{path.suffix if is_utf8(path.suffix) else ''}"
+            link.symlink_to(path)
+    except OSError as why:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise no_link(path, why) from None
+    try:
+        yield str(link)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)  # of links: what they lead to stays
+
+
+def no_link(path: Path, why: OSError) -> BadFile:
+    return BadFile(
+        f"{path_end(path)}: its name is no UTF-8, and no link of another name can be made "
+        f"({why.strerror}); rename it"
+    )
+
+
+def is_utf8(name: str) -> bool:
+    try:
+        name.encode()
+    except UnicodeEncodeError:  # bytes that Python keeps as halves of pairs
+        return False
+    return True
 
 
 class Held:

@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.gate.doors import DOORS
-from shapeshift.runtime_models.gate.gate import Held
+from shapeshift.runtime_models.gate.gate import Held, in_utf8
 
 A_GIVEN_BYTE = 128  # of memory for each byte that a network is given: 64 channels, some at once
 A_THREAD = 16 << 20  # bytes that a thread reserves
@@ -34,8 +34,9 @@ class StrangeNetwork:
         account = Memory().of(path)
         self.free = DOORS["network"].memory + A_THREAD * (threads or os.cpu_count() or 1)
         self.free += account.left
-        given = str(path.absolute()) if data is None else data
-        self._held = Held("network", path, [given, threads], self.free)
+        with in_utf8(path.absolute()) as name:
+            given = name if data is None else data
+            self._held = Held("network", path, [given, threads], self.free)
         self._inputs, self._outputs = (
             [Value(*value) for value in self._held.facts[what]] for what in ("inputs", "outputs")
         )

@@ -265,3 +265,19 @@ def test_wrong_files_are_refused_within_their_budget(name, sown, tmp_path):
     assert not out.faults
     assert out.mutations >= 100 and out.opened + out.refused == out.mutations
     assert out.over_s <= MOST_S and out.over_mb * 1e6 <= MOST_BYTES
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names of POSIX are bytes")
+@pytest.mark.parametrize("where", ["file", "folder"])
+@pytest.mark.parametrize("name", FUZZED)
+def test_every_door_opens_names_that_are_no_utf8(name, where, sown, tmp_path):
+    """Its own or its folder's; OpenUSD and onnxruntime take UTF-8 alone."""
+    odd = tmp_path / os.fsdecode(b"a\xff\xfe")
+    try:
+        odd.mkdir()
+    except (OSError, UnicodeError):
+        pytest.skip("this file system takes no such name")
+    for seed in [seed for seed in sown if seed.door == name]:
+        path = odd / seed.name if where == "folder" else odd.with_suffix(Path(seed.name).suffix)
+        path.write_bytes(seed.data)
+        seed.read(path)

@@ -15,7 +15,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import member_names
-from shapeshift.runtime_models.gate.gate import ask
+from shapeshift.runtime_models.gate.gate import ask, in_utf8
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.splats.placed_splats import instances, joined
 from shapeshift.runtime_models.splats.plain_splats import (
@@ -59,7 +59,8 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
     reading = reading.within(path)
     memory = reading.account
     reading.report(f"reading {path.name}", 0.0)
-    read_by_usd = ask("USD", path, [str(path.resolve())], memory=memory.left)
+    with in_utf8(path.resolve()) as name:
+        read_by_usd = ask("USD", path, [name], memory=memory.left)
     arrays, facts = read_by_usd["arrays"], read_by_usd["facts"]
     memory.charge(sum(array.nbytes for array in arrays.values()), "its arrays")
     metres = np.diag([facts["metres"]] * 3 + [1.0])

@@ -39,7 +39,7 @@ def refuse_outside(root: Path) -> None:
     """Raises Unreadable where a layer names a file outside the scene's folder or package."""
     from pxr import Sdf
 
-    folder, waiting = root.parent.resolve(), [str(root)]
+    folder, waiting = root.resolve().parent, [str(root)]
     seen: set[str] = set()
     while waiting:
         if len(seen) > MOST_LAYERS:

@@ -285,6 +285,12 @@ def test_without_proc_the_kernel_s_own_count_is_the_start(monkeypatch, tmp_path)
     assert limits.own_bytes() >= there * 0.9
 
 
+def test_a_process_that_does_not_start_is_said(served, monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    with pytest.raises(BadFile, match="does not start"):
+        ask("test", served, ["pid"])
+
+
 def test_what_is_forgotten_lets_go_of_its_process(served):
     """Also in a ring of garbage, whose parts are closed in any order."""
     ring = [Held("held", served, [2.0], 50 * MB)]
