@@ -124,7 +124,8 @@ SITUATIONS += [
     Situation(name, met, partial(with_photos, make=named(file, content)),
               f"refused, with the way there: {what}", by_name)
     for name, met, file, content, what in (
-        ("Metashape's project alone", "site.psx", "site.psx", b"<document/>", "a project of Metashape"),
+        ("Metashape's project alone", "site.psx", "site.psx", b"<document/>",
+         "a project of Metashape"),
         ("Pix4D's project alone", "flight.p4d", "flight.p4d", b"<pix4d/>", "a project of Pix4D"),
         ("COLMAP's data base alone", "database.db", "database.db", b"SQLite format 3\0",
          "COLMAP's data base, which has photos and matches and no poses"),
