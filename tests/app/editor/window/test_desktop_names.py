@@ -16,7 +16,7 @@ NAMES = ("\x1b[2J\u202egnp.exe", "a\ud800\x00b\nnew line", "%s%n%s%n", "n" * 50_
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_kind_of_text_takes_any_name(window, name):
-    imgui.new_frame()
+    window.begin_frame()
     imgui.begin(name)
     imgui.text(name)
     imgui.text_wrapped(name)
