@@ -74,7 +74,7 @@ def words_of(name: str) -> tuple[str, ...]:
 
     Letters between digits are none ("a3ir9f"): such names are made up by a program.
     """
-    words = []
+    words: list[str] = []
     for token in re.split(r"[\W_]+", HEAT_THING.sub(r"\2", NEAR.sub("nearinfrared", name))):
         if len(found := LETTERS.findall(token)) == 1:
             inside = CAMEL.findall(found[0])

@@ -151,7 +151,7 @@ def in_code_page(names: Sequence[str], folder: Path | None) -> list[str]:
                 text = name.decode(page, "surrogateescape" if page == "utf-8" else "strict")
             except UnicodeDecodeError:
                 continue
-            there += os.path.isfile(find_file(folder, text, ("",)).path)
+            there += os.path.isfile(find_file(folder or Path(), text, ("",)).path)
         if there > most:
             best, most = page, there
     errors = "surrogateescape" if best == "utf-8" else "replace"

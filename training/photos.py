@@ -198,7 +198,7 @@ def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[L
         of_lens.setdefault(photo.lens, []).append(i)
     order = [i for numbers in of_lens.values() for i in numbers]
     loaded = {i: reader.read(mine[i]) for i in order}
-    return [photo for i in range(len(mine)) if not (photo := loaded[i]).is_blank]
+    return [loaded[i] for i in range(len(mine)) if not loaded[i].is_blank]
 
 
 def unknown_pixels(

@@ -115,6 +115,6 @@ def refuse_amounts(options: Options) -> None:
     for name, value in (("--cell", options.cell), ("--millimetres", options.millimetres)):
         if not 0 <= value < float("inf"):
             raise UsageError(f"{name} is {value:g}; 0 (by the scene) or more is wanted.")
-    for name, value in (("--degrees", options.degrees), ("--colour", options.colour)):
-        if value is not None and not 0 < value < float("inf"):
-            raise UsageError(f"{name} is {value:g}; more than 0 is wanted.")
+    for name, most in (("--degrees", options.degrees), ("--colour", options.colour)):
+        if most is not None and not 0 < most < float("inf"):
+            raise UsageError(f"{name} is {most:g}; more than 0 is wanted.")

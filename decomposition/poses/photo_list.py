@@ -104,13 +104,13 @@ def stops_of_photos(
     folder = root if (root / "capture.json").is_file() else above
     if said := said_beside(folder).get("modalities"):
         where = f"{folder}/capture.json"
-        stops = stops_from(said, where)
+        listed = stops_from(said, where)
 
         def cameras_of(row: int) -> set[str]:
             return {"{}x{}".format(*photos[row].size)}
 
-        of = said_modality_of(said, stops, names, where, cameras_of)
-        return tuple(sorted(stops, key=lambda stop: stop.x)), of, tuple(said)
+        of = said_modality_of(said, listed, names, where, cameras_of)
+        return tuple(sorted(listed, key=lambda stop: stop.x)), of, tuple(said)
     stops, of = modalities_of(names, root)
     rows = zip(photos, of, strict=True)
     opened = [Opened(photo.name, stop, photo.mode, photo.size) for photo, stop in rows]

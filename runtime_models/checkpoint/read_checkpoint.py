@@ -159,14 +159,14 @@ def colors_of(
     if colors is None:
         raise BadFile(f"{path.name} has splats without colours; {WANTED}.")
     what = "colours of which a network makes others, for each photo"
-    found = Finding(what, 0, "shown without it", file=path.name, repaired=False)
+    without = Finding(what, 0, "shown without it", file=path.name, repaired=False)
 
     logits = shaped(colors, (count, 3), "colors", path)
 
     def fill_colors(sh: np.ndarray) -> None:
         sh[:, 0] = (sigmoid(logits) - 0.5) / C0
 
-    return 1, fill_colors, (found,)
+    return 1, fill_colors, (without,)
 
 
 def sigmoid(logits: np.ndarray) -> np.ndarray:

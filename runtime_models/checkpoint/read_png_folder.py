@@ -128,8 +128,9 @@ def harmonics(folder: Path, meta: Fields, count: int, rest: int, memory: Account
         centroids = read_array(archive, "centroids", file.name, memory)
         labels = read_array(archive, "labels", file.name, memory)
     bits = meta.object("shN").data.get("quantization")
-    whole = isinstance(bits, int) and 1 <= bits <= 8
-    if centroids is None or labels is None or centroids.ndim != 2 or not whole:
+    if not (isinstance(bits, int) and 1 <= bits <= 8):
+        bits = 0
+    if centroids is None or labels is None or centroids.ndim != 2 or not bits:
         raise BadFile(f"{folder.name}: shN.npz has no centroids, labels and bits; copy it again.")
     shape_fits = centroids.shape[1] == 3 * rest and labels.shape == (count,)
     if not shape_fits or labels.dtype.kind not in "ui" or centroids.dtype != np.uint8:

@@ -124,7 +124,8 @@ def moved_by_chunks(splats: PlainSplats) -> tuple[int, float] | None:
     starts = np.arange(0, len(order), CHUNK)
     places = splats.means[order]
     spans = np.maximum.reduceat(places, starts) - np.minimum.reduceat(places, starts)
-    steps = (spans / np.float32([2047, 1023, 2047]) / 2).max(axis=1)  # metres, half a code
+    codes = np.array([2047, 1023, 2047], np.float32)
+    steps = (spans / codes / 2).max(axis=1)  # metres, half a code
     each = np.repeat(steps, CHUNK)[: len(order)]
     rows = each > splats.scales[order].max(axis=1)
     return (int(rows.sum()), float(each[rows].max())) if rows.any() else None

@@ -10,7 +10,7 @@ values, and a formula of blended values is another number than the blend of its 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -172,14 +172,14 @@ def with_values(model: AnchorModel, name: str, share: np.ndarray) -> AnchorModel
 def before_head(mlp: Mlp, colors: np.ndarray) -> np.ndarray:
     """(N,) what the network's last layer has to give for colours (N,) 0..1, by its activation."""
     held = np.clip(colors, NEAR_END, 1 - NEAR_END)
-    inverse = {
+    inverse: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "none": lambda y: y,
         "sigmoid": lambda y: np.log(y) - np.log1p(-y),
         "tanh": np.arctanh,
         "exp": np.log,
         "softplus": lambda y: np.log(np.expm1(y)),
-    }[mlp.head]
-    wanted = inverse((colors if mlp.head == "none" else held) / mlp.gain)
+    }
+    wanted = inverse[mlp.head]((colors if mlp.head == "none" else held) / mlp.gain)
     return wanted if mlp.clip is None else np.clip(wanted, *mlp.clip)
 
 

@@ -49,7 +49,7 @@ class Formula:
         with np.errstate(all="ignore"):
             for step in self.steps:
                 if isinstance(step, float):
-                    pile.append(np.float64(step))
+                    pile.append(np.array(step))
                 elif step[0] == "=":
                     pile.append(np.asarray(values[step[1:]], np.float64))
                 elif step == "!":

@@ -326,7 +326,8 @@ def no_value_from(listed: object, where: str) -> dict[str, NoValue]:
     for entry in listed if isinstance(listed, list) else ():
         if not isinstance(entry, dict):
             continue
-        fields, numbers = Fields(entry, f"{where}: modality {shown(entry.get('name'))}"), ()
+        fields = Fields(entry, f"{where}: modality {shown(entry.get('name'))}")
+        numbers: tuple = ()
         if fields.has("no_data"):
             said = entry["no_data"]
             numbers = tuple(said) if isinstance(said, list) else (said,)

@@ -157,7 +157,8 @@ def photos_and_doubts(
     """missing: photos that are named and not there.  Raises BadFile."""
     lenses = [lens_of(shot.entry, shot.path, shot.where) for shot in shots]
     photos: list[Photo] = []
-    no_depth, no_normals, rescaled, turned, round_depth = ([] for _ in range(5))
+    gathered: list[list] = [[] for _ in range(5)]
+    no_depth, no_normals, rescaled, turned, round_depth = gathered
     for shot, lens in zip(shots, lenses, strict=True):
         photos += (made := photos_of(shot, lens, world, folder))
         path = str(shot.path)

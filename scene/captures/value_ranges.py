@@ -62,8 +62,13 @@ def with_own_ranges(
             every = _some_values(mine)
             ends = _own_range(every, mine[0].path)
             doubts += untold_no_data(stop.name, every)
-        gaps = {"may_lack_values": True} if kind == "radiometric" else {}
-        photos = [replace(p, counts=ends, **gaps) if p.modality == stop.name else p for p in photos]
+        lack = kind == "radiometric"
+        photos = [
+            replace(p, counts=ends, may_lack_values=lack or p.may_lack_values)
+            if p.modality == stop.name
+            else p
+            for p in photos
+        ]
         unit = stop.unit or ("°C" if kind == "radiometric" else "")
         palette = stop.palette or USUAL_PALETTE[stop.kind]  # without one values are no scale
         out.append(replace(stop, value_range=ends, unit=unit, palette=palette))

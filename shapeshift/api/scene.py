@@ -342,9 +342,9 @@ class Scene(InspectedScene):
         from shapeshift.api.style import add_formula
         from shapeshift.app.training.style_options import Options
 
-        where = self.path or Path("scene")
-        asked = {"range": value_range, "unit": unit, "palette": palette, "after": after}
-        options = Options(scene=where, out=Path(), name=name, formula=formula, pace=pace, **asked)
+        named: dict[str, Any] = {"range": value_range, "name": name, "formula": formula}
+        named |= {"unit": unit, "palette": palette, "after": after, "pace": pace}
+        options = Options(scene=self.path or Path("scene"), out=Path(), **named)
         return Scene.from_model(add_formula(self, options))
 
     def without_stop(self, name: str) -> "Scene":

@@ -199,7 +199,7 @@ def mean_score(names: list[str], found: list[dict[str, float]], alive: int) -> M
     """Of what photo_scores found of photos of these names."""
     each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
     psnr_db, ssim_mean = (mean_of(found, key) or 0.0 for key in ("psnr_db", "ssim"))
-    some = {key: mean_of(found, key) for key in SOME_HAVE}
+    some: dict[str, Any] = {key: mean_of(found, key) for key in SOME_HAVE}
     return ModalityScore(psnr_db, ssim_mean, len(found), alive, each, **some)
 
 

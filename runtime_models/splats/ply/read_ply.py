@@ -174,7 +174,9 @@ class Columns:
     def tell_left_out(self) -> None:
         """A finding about SH degree 4, with its part of all that varies with direction."""
         if self.left_out:
-            found = fourth_degree(len(self.left_out) // 3, *self.shares, self.raw.file)
+            found = fourth_degree(
+                len(self.left_out) // 3, self.shares[0], self.shares[1], self.raw.file
+            )
             self.raw.findings = (*self.raw.findings, found)
 
     def keep(self, name: str, rows: slice, column: np.ndarray) -> None:

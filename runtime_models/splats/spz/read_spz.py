@@ -80,7 +80,7 @@ def read_spz_bytes(
         what = f"extensions {', '.join(others)}"
         findings.append(Finding(what, 0, "not looked at", file=file, repaired=False))
     if kept < there:
-        findings.append(fourth_degree(there - kept, *shares, file))
+        findings.append(fourth_degree(there - kept, shares[0], shares[1], file))
     raw.findings = tuple(findings)
     if axes and not axes_said(extensions):
         found = Axes(axes, "as what it lies in says", True)

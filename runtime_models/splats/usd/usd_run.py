@@ -109,7 +109,8 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
     seen = instances = 0
     walk = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
     for prim in walk:
-        kind, placed = str(prim.GetTypeName()), []
+        kind = str(prim.GetTypeName())
+        placed: list = []
         if prim.IsA(UsdGeom.PointInstancer):
             walk.PruneChildren()  # what is in it stands where its instances are, not by itself
             placed, below, nested = instances_of(UsdGeom.PointInstancer(prim), facts)

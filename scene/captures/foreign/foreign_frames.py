@@ -6,8 +6,10 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shapeshift.runtime_models.files.json_fields import is_number
 from shapeshift.runtime_models.files.memory import read_text_file
@@ -220,11 +222,11 @@ def lens_words(lens: ColmapCamera | None) -> dict:
     return {"w": width, "h": height, "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "lens": lens}
 
 
-def checked_size(width: object, height: object, where: str) -> tuple[int, int]:
+def checked_size(width: Any, height: Any, where: str) -> tuple[int, int]:
     for side in (width, height):
         if not (is_number(side) and 1 <= side <= 1 << 20 and int(side) == side):
             raise BadFile(f"{where} has {width!s:.20}x{height!s:.20} pixels; export it again")
-    return int(width), int(height)  # type: ignore[arg-type]
+    return int(width), int(height)
 
 
 def checked_lens(
@@ -255,14 +257,14 @@ def brown_lens(
     )
 
 
-def world_from(rotation: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def world_from(rotation: np.ndarray, centre: ArrayLike) -> np.ndarray:
     """(4, 4) from camera-from-world (3, 3) and where the camera stands (3,)."""
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = np.asarray(rotation).T, centre
     return out
 
 
-def camera_inverse(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
+def camera_inverse(rotation: np.ndarray, translation: ArrayLike) -> np.ndarray:
     """(4, 4) world from camera, of the pose that takes world to camera."""
     turn = np.asarray(rotation, np.float64).T
     return world_from(turn.T, -turn @ np.asarray(translation, np.float64))

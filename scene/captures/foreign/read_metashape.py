@@ -102,7 +102,7 @@ def cameras_of(chunk: Element) -> list[tuple[Element, str]]:
 
 def transforms_of(chunk: Element, where: str) -> dict[str | None, np.ndarray]:
     """By the component's number; None: of the chunk, for cameras of no component."""
-    out = {None: transform_of(chunk.find("transform"), where)}
+    out: dict[str | None, np.ndarray] = {None: transform_of(chunk.find("transform"), where)}
     for component in chunk.iterfind("components/component"):
         if component.find("transform") is not None:
             out[component.get("id")] = transform_of(component.find("transform"), where)
@@ -135,7 +135,8 @@ def lens_of(sensor: Element, where: str) -> ColmapCamera | None:
         resolution = chosen[0].find("resolution")
     if resolution is None:
         return None
-    size = checked_size(*(whole(resolution.get(key)) for key in ("width", "height")), where)
+    width, height = (whole(resolution.get(key)) for key in ("width", "height"))
+    size = checked_size(width, height, where)
     if sensor.get("type") == "spherical":
         return ColmapCamera.panorama(size)
     kind = chosen[0].get("type", sensor.get("type", "frame")) if chosen else ""

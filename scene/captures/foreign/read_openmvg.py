@@ -42,14 +42,14 @@ def openmvg_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     for row in said.rows("views", MOST_ROWS, "view", 0):
         view = row.object("value").object("ptr_wrapper").object("data")
         name = "/".join(filter(None, (view.text("local_path", ""), view.text("filename"))))
-        pose = poses.get(str(view.value("id_pose", None)))
+        found = poses.get(str(view.value("id_pose", None)))
         lens = lenses.get(str(view.value("id_intrinsic", None)))
-        if pose is None:
+        if found is None:
             out.leave(name, "have no pose")
         elif lens is None:
             out.leave(name, "have no lens that is read here")
         else:
-            out.add(name, pose, lens)
+            out.add(name, found, lens)
     add_points(out, said)
     return out.finished()
 

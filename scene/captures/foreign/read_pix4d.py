@@ -41,7 +41,8 @@ def pix4d_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
         if len(words) != 3:
             raise BadFile(f"{path}: {rows[first][:40]!r} is no name, width and height")
         name, where = words[0], f"{path}: {words[0]}"
-        size = checked_size(*Words(path, " ".join(words[1:])).numbers(2), where)
+        width, height = Words(path, " ".join(words[1:])).numbers(2)
+        size = checked_size(width, height, where)
         numbers = Words(path, " ".join(rows[first + 1 : first + ROWS]))
         k = np.reshape(numbers.numbers(9), (3, 3))
         radial, tangential = numbers.numbers(3), numbers.numbers(2)

@@ -64,14 +64,14 @@ def stops_of_frames(
     names = [named_file(entries[i]) for i in bare]
     if len(bare) == len(entries) and (told := said_beside(folder).get("modalities")):
         place = f"{folder}/capture.json"
-        stops = stops_from(told, place)
+        told_stops = stops_from(told, place)
 
         def cameras_of(row: int) -> set[str]:
             path = find_file(folder, names[row]).path
             return {"{}x{}".format(*image_size(path, None))} if os.path.isfile(path) else set()
 
-        of = said_modality_of(told, stops, names, place, cameras_of)
-        return tuple(sorted(stops, key=lambda stop: stop.x)), of, told
+        of = said_modality_of(told, told_stops, names, place, cameras_of)
+        return tuple(sorted(told_stops, key=lambda stop: stop.x)), of, told
     found, of = modalities_of(names, folder, [own_keys(entries[i]) for i in bare], False)
     usual = dict(zip(bare, of, strict=True))
     if len(found) > 1 and any(days):

@@ -296,7 +296,8 @@ def of_two_sorts(
     rest = [group for group in groups if not group[0]]
     order = {LIGHT: 0, HEAT: 1, "": 2 if lit else 0.5}
     named = {group: name_of(group, [seen[i] for i in rows]) for group, rows in groups.items()}
-    listed, of, kinds = [], [""] * len(seen), []
+    listed: list[str] = []
+    of, kinds = [""] * len(seen), []
     for group, name in sorted(named.items(), key=lambda row: (order[row[0][0]], row[1])):
         name = name if name not in listed else f"{name} {len(listed) + 1}"
         listed.append(name)

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import PurePosixPath
 
 from shapeshift.runtime_models.files.json_fields import Fields, shown
@@ -40,7 +41,7 @@ class Choice:
     cameras: tuple[str, ...] | None
 
     def depths(self, names: Sequence[str], cameras_of: Callable[[int], set[str]]) -> list[int]:
-        return [self.depth(name, lambda row=row: cameras_of(row)) for row, name in enumerate(names)]
+        return [self.depth(name, partial(cameras_of, row)) for row, name in enumerate(names)]
 
     def folded(self) -> "Choice":
         """The same for names in small letters."""

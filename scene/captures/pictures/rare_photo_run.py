@@ -28,11 +28,12 @@ def rare_photo(path: str, most: int) -> dict[str, Any]:
                 return told
             image.load()
             exif, unseen = image.info.get("exif"), image.info.get("transparency")
+            shown: pillow.Image = image
             if image.mode not in KEPT:
-                image = image.convert("RGBA" if "A" in image.mode or unseen is not None else "RGB")
-            palette = image.getpalette() if image.mode == "P" else None
+                shown = image.convert("RGBA" if "A" in image.mode or unseen is not None else "RGB")
+            palette = shown.getpalette() if shown.mode == "P" else None
             return told | {
-                "mode": image.mode, "pixels": image.tobytes(), "palette": palette,
+                "mode": shown.mode, "pixels": shown.tobytes(), "palette": palette,
                 "exif": exif if isinstance(exif, bytes) else b"",
                 "transparency": unseen if isinstance(unseen, int | bytes) else None,
             }  # fmt: skip

@@ -81,7 +81,7 @@ def without_value(
         gone = ~((numbers >= low) & (numbers <= high))
         out = gone if out is None else out | gone
     if out is not None and out.ndim == 3:
-        out = out.all(axis=2)
+        out = np.asarray(out.all(axis=2))
     return out if out is not None and out.any() else None
 
 

@@ -31,7 +31,9 @@ def sharing_folders(listed: Sequence[object], where: str) -> dict[str, list[str]
 
     listed: the entries of 'modalities', of which these say the same of their photos.
     """
-    bands, first, found = stated_bands(listed, where), {}, {}
+    bands = stated_bands(listed, where)
+    first: dict = {}
+    found: dict = {}
     for entry in listed:
         fields = Fields(entry, where)
         name = fields.text("name")

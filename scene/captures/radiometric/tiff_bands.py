@@ -173,7 +173,7 @@ def band_header(path: Path) -> Image.Image | None:
     header._size = page.size
     header._mode = "F" if dtype is not None and dtype.kind == "f" else "I;16"
     header.info["bands"] = len(found)
-    header.tag_v2 = {GDAL_NODATA: page.no_data}
+    header.__dict__["tag_v2"] = {GDAL_NODATA: page.no_data}  # where Pillow's TIFFs have it
     return header
 
 
@@ -242,7 +242,7 @@ def _opened(path: Path, order: str, page: Page, sample: int, band: int) -> Image
     numbers = _numbers(numbers, dtype, order, (many, tile, page.one(PREDICTOR, 1)))
     band_of = numbers[:, :width, sample if page.beside else 0]
     made = Image.fromarray(np.ascontiguousarray(_shown(band_of, dtype)))
-    made.tag_v2 = {GDAL_NODATA: page.no_data}
+    made.__dict__["tag_v2"] = {GDAL_NODATA: page.no_data}
     return made
 
 
@@ -271,7 +271,11 @@ def _numbers(
         summed = np.cumsum(steps, axis=2, dtype=np.uint8)
         planes = summed.reshape(height, rows.shape[1], size, tile * samples)
         rows, order = np.ascontiguousarray(np.moveaxis(planes, 2, 3)), ">"
-    found = np.ascontiguousarray(rows).view(dtype.newbyteorder(order)).astype(dtype)
+    found = (
+        np.ascontiguousarray(rows)
+        .view(dtype.newbyteorder(">" if order == ">" else "<"))
+        .astype(dtype)
+    )
     found = found.reshape(height, -1, tile, samples)
     if predictor == DIFFERENCES:
         found = np.cumsum(found, axis=2, dtype=dtype)
