@@ -159,11 +159,13 @@ def say_levels(models: Iterable[Model], path: Path, options: ReadingOptions) -> 
         )
 
 
-def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
-    """Posed photos, not their pixels; progress, what its stops hold and doubts go to stderr.
+def open_capture(
+    path: Path, memory_gb: float | None = None, hear: Callable[..., object] = say
+) -> "Capture":
+    """Posed photos, not their pixels; progress goes to stderr.
 
-    memory_gb: --memory, for all that this process reads from now on; None: what is usual.  Raises
-    BadFile, UsageError.
+    memory_gb: --memory, for all that this process reads from now on; None: what is usual.  hear:
+    told what its stops hold, and doubts.  Raises BadFile, UsageError.
     """
     from shapeshift.app.errors import UsageError
     from shapeshift.app.progress import working
@@ -180,7 +182,7 @@ def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
         os.environ[VARIABLE] = str(memory_gb)  # where its pixels are read, also by children
     with working("reading the capture"):
         capture = read_capture(path)
-    say(*contents_of(capture), *capture.doubts)
+    hear(*contents_of(capture), *capture.doubts)
     return capture
 
 

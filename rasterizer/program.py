@@ -57,7 +57,8 @@ def build(context, path: Path, options: list[str]) -> dict:
         with warnings.catch_warnings():
             # pyopencl warns of every log that is not empty; that of NVIDIA never is.
             warnings.simplefilter("ignore", cl.CompilerWarning)
-            program = cl.Program(context, text).build([*options, "-cl-kernel-arg-info"])
+            # -w: PoCL's compiler counts its warnings on the terminal otherwise.
+            program = cl.Program(context, text).build([*options, "-cl-kernel-arg-info", "-w"])
     except cl.RuntimeError as error:
         log = str(error).split("(options:")[0]
         raise BuildError(f"{path} does not build:\n{_with_origins(log, origins)}") from error

@@ -148,12 +148,14 @@ def cut(
     return found, counts
 
 
-def straight_capture(options: Options, model: "AnchorModel | SplatLayers") -> "Capture":
+def straight_capture(
+    options: Options, model: "AnchorModel | SplatLayers", hear: Callable[..., object] = say
+) -> "Capture":
     """The capture, its cameras where the training found them.  Raises BadFile."""
     from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
 
     return with_extrinsics(
-        open_capture(options.capture, options.memory or None), rig_of(model.provenance)
+        open_capture(options.capture, options.memory or None, hear), rig_of(model.provenance)
     )
 
 

@@ -16,7 +16,7 @@ LOOKS_A_FRAME = 12  # frames looked at for each that is kept, at most: decoding 
 FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg"
 
 
-def take_frames(name: str, into: str, count: int, tell: Callable[..., None]) -> int:
+def take_frames(name: str, into: str, count: int, hear: Callable[..., None]) -> int:
     """Writes at most `count` frames into a folder, the sharpest of equal parts of the video.
 
     Gives how many.  Raises Unreadable.
@@ -35,7 +35,7 @@ def take_frames(name: str, into: str, count: int, tell: Callable[..., None]) -> 
                      if p.pts is not None and second is not None]  # fmt: skip
         if len(times) < 2:
             raise Unreadable(f"holds {len(times)} frames; a video of a walk is wanted")
-        return write_sharpest(av, video, Path(into), count, sorted(times), tell)
+        return write_sharpest(av, video, Path(into), count, sorted(times), hear)
     except (av.error.FFmpegError, OSError) as error:
         raise Unreadable(f"no video that can be read ({error})") from None
 
@@ -45,7 +45,7 @@ def opened(av, video: Path):
 
 
 def write_sharpest(
-    av, video: Path, folder: Path, count: int, times: list[float], tell: Callable[..., None]
+    av, video: Path, folder: Path, count: int, times: list[float], hear: Callable[..., None]
 ) -> int:  # fmt: skip
     count = min(count, len(times))
     part_of = np.minimum(np.arange(len(times)) * count // len(times), count - 1)
@@ -66,7 +66,7 @@ def write_sharpest(
             here = int(part_of[min(i, len(times) - 1)])
             if here != part:
                 write()
-                tell(done=written, of=count)
+                hear(done=written, of=count)
                 best, part = None, here
             if i % every and best is not None:
                 continue

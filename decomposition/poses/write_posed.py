@@ -16,7 +16,7 @@ from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.scene.cameras.write_colmap_cameras import camera_bytes, image_bytes
 from shapeshift.scene.captures.capture_rules import is_grey
 from shapeshift.scene.captures.colmap_tables import COUNT, ColmapCamera, Posed, read_tables
-from shapeshift.scene.captures.modalities.said_modalities import CHOICES, Group, entries_of
+from shapeshift.scene.captures.modalities.said_modalities import CHOICES, PhotoGroup, entries_of
 
 REPORT = "poses.json"
 PAIRED_LENS = "SIMPLE_PINHOLE"
@@ -76,7 +76,7 @@ def modalities_said(photos: PhotoList, placed: set[str], images: Path) -> list[d
         usual = "" if photos.said else USUAL_PALETTE.get(stop.kind, "")
         grey = usual and is_grey(images / names[mine[0]])
         palette = stop.palette or (usual if grey else "")
-        groups.append(Group(stop.name, stop.kind, palette, mine))
+        groups.append(PhotoGroup(stop.name, stop.kind, palette, mine))
         kept = own.get(stop.name, {}).items()
         told.append({key: value for key, value in kept if key not in CHOICES})
     if len(groups) < 2 and not photos.said:

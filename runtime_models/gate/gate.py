@@ -50,17 +50,17 @@ class Process:
         # One thread, one arena: each further one would reserve memory that no file asked for.
         words |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1",
                   "PXR_WORK_THREAD_LIMIT": "1", "ORT_DISABLE_TELEMETRY": "1"}  # fmt: skip
-        python = sys.executable
+        python = sys.executable or ""
         if sys.platform == "win32":  # the environment's own python.exe would start another one
             python, words["__PYVENV_LAUNCHER__"] = getattr(sys, "_base_executable", python), python
         package = sys.modules[__name__.partition(".")[0]]  # of which this module is a part
         program = str(Path(package.__file__ or "").with_name("__main__.py"))
         # -P: the current folder's modules are not to stand in for those of packages; nor, where
         # this process was started by -I, those of PYTHONPATH.
-        alone = ["-P", *(["-I"] if sys.flags.isolated else [])]
+        alone = ["-I"] if sys.flags.isolated else []
         try:
             self.child = subprocess.Popen(
-                [python or "", *alone, str(CHILD), program], stdin=subprocess.PIPE,
+                [python, "-P", *alone, str(CHILD), program], stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=words,
             )  # fmt: skip
         except OSError as why:
@@ -71,7 +71,7 @@ class Process:
         self.served = 0
         self.owner = os.getpid()
 
-    def ask(self, request: dict, patience: float, most: int, tell: Tell | None) -> dict:
+    def ask(self, request: dict, patience: float, most: int, hear: Tell | None) -> dict:
         """The answer to a request.  Raises Ended, BadFile where nothing can be limited."""
         assert self.child.stdin is not None and self.child.stdout is not None
         answers: queue.Queue[Any] = queue.Queue()
@@ -101,8 +101,8 @@ class Process:
             elif "tell" not in said:
                 self.served += 1
                 return said
-            elif tell is not None:
-                tell(said["tell"])
+            elif hear is not None:
+                hear(said["tell"])
 
     def limit_of(self, said: dict) -> int:
         """Bytes in memory that the parent watches for, 0: none.  Raises BadFile."""
@@ -153,13 +153,13 @@ def listen(pipe: BinaryIO, answers: "queue.Queue[Any]", most: int) -> None:
             return
 
 
-_idle: dict[str, list[Process]] = {}
+idle_processes: dict[str, list[Process]] = {}
 _lock = threading.Lock()
 
 
 def ask(
     name: str, path: Path, words: list, *, memory: int | None = None, size: int | None = None,
-    tell: Tell | None = None,
+    hear: Tell | None = None,
 ) -> Any:  # fmt: skip
     """What a door's function gives for a file.  Raises BadFile, one sentence.
 
@@ -173,13 +173,13 @@ def ask(
     process, kept = taken(name), False
     try:
         try:
-            answer = asked(process, door, words, seconds, memory, tell)
+            answer = asked(process, door, words, seconds, memory, hear)
         except Ended as ended:
             if str(ended) != "crash" or not process.served:
                 raise
             process.end()  # perhaps a file before has left it so: once more by a fresh one
             process = Process()
-            answer = asked(process, door, words, seconds, memory, tell)
+            answer = asked(process, door, words, seconds, memory, hear)
         kept = "memory" not in answer
     except Ended as ended:
         raise cut_off(door, path, size, seconds, str(ended)) from None
@@ -192,14 +192,14 @@ def ask(
 
 
 def asked(
-    process: Process, door: Door, words: list, seconds: float, memory: int, tell: Tell | None,
+    process: Process, door: Door, words: list, seconds: float, memory: int, hear: Tell | None,
     method: str = "",
 ) -> dict:  # fmt: skip
     request = {
         "imports": door.imports, "target": door.target, "words": words, "method": method,
         "seconds": seconds, "memory": memory, "tells": door.tells,
     }  # fmt: skip
-    return process.ask(request, WAIT * seconds, memory, tell)
+    return process.ask(request, WAIT * seconds, memory, hear)
 
 
 def seconds_of(door: Door, size: int) -> float:
@@ -246,7 +246,7 @@ def cut_off(door: Door, path: Path, size: int, seconds: float, why: str) -> BadF
 def taken(name: str) -> Process:
     """A process of a door that waits, or a new one."""
     with _lock:
-        waiting = _idle.setdefault(name, [])
+        waiting = idle_processes.setdefault(name, [])
         while waiting:
             process = waiting.pop()
             if process.owner == os.getpid() and process.child.poll() is None:
@@ -257,7 +257,7 @@ def taken(name: str) -> Process:
 
 def put_back(name: str, process: Process) -> None:
     with _lock:
-        waiting = _idle.setdefault(name, [])
+        waiting = idle_processes.setdefault(name, [])
         if len(waiting) < IDLE:
             waiting.append(process)
             return
@@ -371,9 +371,9 @@ def let_go(name: str, process: Process) -> None:
 def end_all() -> None:
     """Ends the processes that wait."""
     with _lock:
-        for process in [each for waiting in _idle.values() for each in waiting]:
+        for process in [each for waiting in idle_processes.values() for each in waiting]:
             process.end()
-        _idle.clear()
+        idle_processes.clear()
 
 
 atexit.register(end_all)

@@ -20,11 +20,11 @@ PROCESS_TIME, PROCESS_MEMORY = 0x2, 0x100  # JOB_OBJECT_LIMIT_...
 EXTENDED = 9  # JobObjectExtendedLimitInformation
 TASK_INFO, TASK_BYTES = 4, 96  # PROC_PIDTASKINFO and its size; the second word is resident bytes
 
-_job: list[Any] = []  # Windows: the job object of this process
+held_job: list[Any] = []  # Windows: the job object of this process
 
 
 def arm(seconds: float, memory: int) -> list[str]:
-    """Limits what this process may take from now on; which of TIME and MEMORY are limited.
+    """BasicLimits what this process may take from now on; which of TIME and MEMORY are limited.
 
     memory: bytes that it may have as a whole, see own_bytes.
     """
@@ -109,12 +109,12 @@ def arm_windows(seconds: float, memory: int) -> list[str]:
     import ctypes
 
     kernel = kernel32()
-    if not _job:
+    if not held_job:
         job = ctypes.c_void_p(kernel.CreateJobObjectW(None, None))
         if not (job and kernel.AssignProcessToJobObject(job, this_process())):
             return []
-        _job.append((job, extended_limits()()))
-    job, wanted = _job[0]
+        held_job.append((job, extended_limits()()))
+    job, wanted = held_job[0]
     wanted.flags = PROCESS_TIME | PROCESS_MEMORY
     wanted.process_time = int(1e7 * (time.process_time() + seconds))  # units of 100 ns
     wanted.process_memory = memory
@@ -151,7 +151,7 @@ def extended_limits() -> type:
     """JOBOBJECT_EXTENDED_LIMIT_INFORMATION."""
     import ctypes
 
-    class Limits(ctypes.Structure):
+    class BasicLimits(ctypes.Structure):
         _fields_ = [
             ("process_time", ctypes.c_int64), ("job_time", ctypes.c_int64),
             ("flags", ctypes.c_uint32), ("least_set", ctypes.c_size_t),
@@ -162,7 +162,7 @@ def extended_limits() -> type:
             ("peak_process", ctypes.c_size_t), ("peak_job", ctypes.c_size_t),
         ]  # fmt: skip
 
-    return Limits
+    return BasicLimits
 
 
 def memory_counters() -> type:

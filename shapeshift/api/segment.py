@@ -61,7 +61,7 @@ def segment(
     refuse_inputs(options)
     refuse_outputs(options)
     model = labelled(scene.model, "the scene")
-    found = straight_capture(options, model)
+    found = straight_capture(options, model, lambda *sentences: None)
     cut(
         options, specs, model, found, open_device(),
         progress or (lambda what, done, of: None), lambda sentence: None,

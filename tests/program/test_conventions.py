@@ -220,6 +220,7 @@ NOT_PRIVATE = {
     "_exit",
     "_state",
     "_getframe",
+    "_obj",  # what ctypes.byref was given
 }
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.page import serve
-from shapeshift.app.page.page_server import HERE, PageServer
+from shapeshift.app.page.page_server import HERE, LocalServer, PageServer
 from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.package.write_package import write_package
 from tests.support.web.page_scenes import paced_model
@@ -97,9 +97,9 @@ def test_connections_that_browsers_break_off_are_no_news(server, capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_many_connections_wait_in_line(server):
+def test_many_connections_wait_in_line():
     """socketserver's own line of 5 makes the sixth wait a second for each try."""
-    assert server._server.request_queue_size >= 100
+    assert LocalServer.request_queue_size >= 100
 
 
 def test_new_files_are_another_version(server):

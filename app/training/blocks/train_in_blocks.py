@@ -53,8 +53,9 @@ def train_blocks(
     refuse_options(options, said)
     check_writable(options.out)
     refuse_foreign_folder(options.out)
-    capture = open_capture(options.capture, options.memory)
-    print_files(capture.files)
+    capture = open_capture(options.capture, options.memory, hear)
+    if hear is say:  # the command, not the library
+        print_files(capture.files)
     if wanted.count is None and wanted.grid is None:
         refuse_one(options, capture, said)
     work = work_folder(options.out)

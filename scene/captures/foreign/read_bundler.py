@@ -26,7 +26,7 @@ BUNDLER_FROM_OPENCV = np.diag([1.0, -1.0, -1.0])  # its cameras look along -z, y
 AGAIN = "copy or export it again"
 
 
-class Words:
+class TableWords:
     """The words of a text file, one after the other."""
 
     def __init__(self, path: Path, text: str) -> None:
@@ -66,7 +66,7 @@ def bundler_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     head, _, rest = text_in(path, photos).lstrip().partition("\n")
     if not head.startswith("# Bundle file"):
         raise BadFile(f"{path} does not begin with '# Bundle file'; {AGAIN}.")
-    words = Words(path, rest)
+    words = TableWords(path, rest)
     most = path.stat().st_size
     cameras, points = words.count(most), words.count(most)
     names = listed_names(path, cameras, photos)
@@ -140,12 +140,12 @@ def nvm_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
     fixed = head.split()[1:]  # "FixedK fx cx fy cy r": one lens for all photos
     most = path.stat().st_size
     out = Gathered(path, "VisualSFM", photos)
-    for _ in range(Words(path, next(lines, "")).count(most)):
+    for _ in range(TableWords(path, next(lines, "")).count(most)):
         line = next(lines, "")
         words = line.rsplit(maxsplit=10)  # names may have blanks
         if len(words) != 11:
             raise BadFile(f"{path}: {line[:40]!r} is no name with ten numbers; {AGAIN}.")
-        f, w, x, y, z, *more = Words(path, " ".join(words[1:])).numbers(10)
+        f, w, x, y, z, *more = TableWords(path, " ".join(words[1:])).numbers(10)
         name = words[0].replace('"', " ").strip()  # as it writes blanks
         if not math.hypot(w, x, y, z) > 0.5:
             raise BadFile(f"{path}: {name}: its quaternion has no direction; {AGAIN}.")
@@ -161,7 +161,7 @@ def nvm_lens(out: Gathered, name: str, f: float, k: float, fixed: list[str]) -> 
         return None
     pinhole = [f, f, size[0] / 2, size[1] / 2]
     if fixed and fixed[0].startswith("FixedK"):
-        fx, cx, fy, cy, *_ = Words(out.path, " ".join(fixed[1:])).numbers(4)
+        fx, cx, fy, cy, *_ = TableWords(out.path, " ".join(fixed[1:])).numbers(4)
         pinhole = [fx, fy, cx, cy]
     # The sign is that of a place as it is measured; 0 leaves a pinhole.
     return checked_lens(RADIAL_BACKWARDS, size, (*pinhole, k), f"{out.path}: {name}")
@@ -170,8 +170,8 @@ def nvm_lens(out: Gathered, name: str, f: float, k: float, fixed: list[str]) -> 
 def add_nvm_points(out: Gathered, path: Path, lines: Iterator[str], most: int) -> None:
     line = next(lines, "0")
     rows = []
-    for _ in range(Words(path, line).count(most)):
-        rows.append(Words(path, " ".join(next(lines, "").split(maxsplit=6)[:6])).numbers(6))
+    for _ in range(TableWords(path, line).count(most)):
+        rows.append(TableWords(path, " ".join(next(lines, "").split(maxsplit=6)[:6])).numbers(6))
     if rows:
         table = np.array(rows)
         out.points, out.colors = table[:, :3], table[:, 3:] / 255

@@ -18,7 +18,7 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     text_in,
     world_from,
 )
-from shapeshift.scene.captures.foreign.read_bundler import Words
+from shapeshift.scene.captures.foreign.read_bundler import TableWords
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 
 MARK, LAST = "fileName imageWidth imageHeight", "camera model"
@@ -41,9 +41,9 @@ def pix4d_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
         if len(words) != 3:
             raise BadFile(f"{path}: {rows[first][:40]!r} is no name, width and height")
         name, where = words[0], f"{path}: {words[0]}"
-        width, height = Words(path, " ".join(words[1:])).numbers(2)
+        width, height = TableWords(path, " ".join(words[1:])).numbers(2)
         size = checked_size(width, height, where)
-        numbers = Words(path, " ".join(rows[first + 1 : first + ROWS]))
+        numbers = TableWords(path, " ".join(rows[first + 1 : first + ROWS]))
         k = np.reshape(numbers.numbers(9), (3, 3))
         radial, tangential = numbers.numbers(3), numbers.numbers(2)
         place, rotation = np.array(numbers.numbers(3)), np.reshape(numbers.numbers(9), (3, 3))
@@ -57,4 +57,6 @@ def offset_beside(path: Path) -> np.ndarray:
     """(3,) what Pix4D has taken off all places, metres; zeros without the file."""
     name = path.name.partition("_calibrated_camera_parameters")[0]
     table = path.with_name(f"{name}_offset.xyz")
-    return np.array(Words(table, text_in(table)).numbers(3)) if table.is_file() else np.zeros(3)
+    return (
+        np.array(TableWords(table, text_in(table)).numbers(3)) if table.is_file() else np.zeros(3)
+    )

@@ -14,7 +14,7 @@ from shapeshift.scene.captures.capture_rules import spread_stops, stops_from
 from shapeshift.scene.captures.dated_stops import day_of_frame
 from shapeshift.scene.captures.modalities.photo_modality import modalities_of
 from shapeshift.scene.captures.modalities.said_modalities import (
-    Group,
+    PhotoGroup,
     said_modality_of,
     settling_line,
 )
@@ -103,10 +103,10 @@ def of_days(
     where: str,
 ) -> BadFile:
     """Of frames of several days of which some show heat: each would be of two stops."""
-    groups: dict[tuple[str, str], Group] = {}
+    groups: dict[tuple[str, str], PhotoGroup] = {}
     kinds = {stop.name: stop.kind for stop in stops}
     for row, name in sorted(usual.items(), key=lambda item: (days[item[0]], kinds[item[1]])):
-        each = Group(f"{name} {days[row]}".strip(), kinds[name])
+        each = PhotoGroup(f"{name} {days[row]}".strip(), kinds[name])
         groups.setdefault((days[row], name), each).rows.append(row)
     line = settling_line(list(groups.values()), [named_file(entry) for entry in entries])
     return BadFile(

@@ -26,7 +26,7 @@ from shapeshift.runtime_models.stop_names import (
 from shapeshift.scene.capture_files import is_strange, parts_of
 from shapeshift.scene.captures.capture_rules import spread_stops
 from shapeshift.scene.captures.modalities.said_modalities import (
-    Group,
+    PhotoGroup,
     settling_line,
     shared_folders,
 )
@@ -62,7 +62,7 @@ FLAGS = {"true": True, "false": False, "1": True, "0": False, "yes": True, "no":
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenPhoto:
     """What is known of a photo before its file is opened."""
 
     folders: tuple[str, ...]  # of its name, without those that all photos share
@@ -149,7 +149,7 @@ def splits_of(names: Sequence[str]) -> list[str]:
     return [said[0] if said else "train" for said in found]
 
 
-def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[Seen]:
+def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[SeenPhoto]:
     folders = folders_of(names)
     shared = shared_folders(folders) if len(names) > 1 else 0
     folders = [part[shared:] for part in folders]
@@ -167,7 +167,7 @@ def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[Seen]:
     ]
     by_key = [sort_of_keys(frame) for frame in keys]
     rows = zip(folders, files, by_key, by_folder, by_file, strict=True)
-    return [Seen(*row) for row in rows]
+    return [SeenPhoto(*row) for row in rows]
 
 
 def sort_of_folders(folders: Sequence[str]) -> str:
@@ -250,7 +250,7 @@ def use_of_key(key: str) -> str:
     return "camera" if CAMERA_KEYS & set(said) and NO_CAMERA.isdisjoint(said) else ""
 
 
-def refuse_contradictions(seen: Sequence[Seen], names: Sequence[str], folder: Path) -> None:
+def refuse_contradictions(seen: Sequence[SeenPhoto], names: Sequence[str], folder: Path) -> None:
     """Raises BadFile where a photo's folders, name and keys say different things."""
     odd = [i for i, photo in enumerate(seen) if len(photo.sorts) > 1 or "both" in photo.sorts]
     if not odd:
@@ -263,7 +263,7 @@ def refuse_contradictions(seen: Sequence[Seen], names: Sequence[str], folder: Pa
     heat = [p.by_key == HEAT or (not p.by_key and is_hot(p)) for p in seen]
     if len(set(heat)) == 1:  # then keys tell none from another
         heat = [is_hot(p) for p in seen]
-    groups = [Group("RGB", LIGHT), Group("Thermal", HEAT)]
+    groups = [PhotoGroup("RGB", LIGHT), PhotoGroup("Thermal", HEAT)]
     for i, hot in enumerate(heat):
         groups[hot].rows.append(i)
     raise BadFile(
@@ -273,14 +273,14 @@ def refuse_contradictions(seen: Sequence[Seen], names: Sequence[str], folder: Pa
     )
 
 
-def is_hot(photo: Seen) -> bool:
+def is_hot(photo: SeenPhoto) -> bool:
     """By what is nearest to the file, for a proposal."""
     said = [sort_of_name(name) for name in photo.folders if sort_of_name(name)]
     return (said[-1] if said else photo.by_file) == HEAT
 
 
 def of_two_sorts(
-    seen: Sequence[Seen], names: Sequence[str], folder: Path, folders_are_stops: bool
+    seen: Sequence[SeenPhoto], names: Sequence[str], folder: Path, folders_are_stops: bool
 ) -> tuple[tuple[Stop, ...], list[str]]:
     """Stops of photos of which some show heat and others do not: light, heat, then the rest."""
     mixed = of_both_sorts(seen) if folders_are_stops else set()
@@ -307,7 +307,7 @@ def of_two_sorts(
     return spread_stops(listed, kinds), of
 
 
-def of_both_sorts(seen: Iterable[Seen]) -> set[tuple[str, ...]]:
+def of_both_sorts(seen: Iterable[SeenPhoto]) -> set[tuple[str, ...]]:
     """First folders below which there is heat and something else."""
     found: dict[tuple[str, ...], set[bool]] = defaultdict(set)
     for photo in seen:
@@ -315,7 +315,7 @@ def of_both_sorts(seen: Iterable[Seen]) -> set[tuple[str, ...]]:
     return {first for first, sorts in found.items() if len(sorts) > 1 and first}
 
 
-def name_of(group: tuple[str, tuple[str, ...]], photos: Sequence[Seen]) -> str:
+def name_of(group: tuple[str, tuple[str, ...]], photos: Sequence[SeenPhoto]) -> str:
     """Of a stop: its folder's where there is one, as it is written there."""
     sort, state = group
     if not sort:
@@ -331,10 +331,10 @@ def name_of(group: tuple[str, tuple[str, ...]], photos: Sequence[Seen]) -> str:
 
 
 def ambiguous(
-    seen: Sequence[Seen], names: Sequence[str], folder: Path, mixed: set[tuple[str, ...]]
+    seen: Sequence[SeenPhoto], names: Sequence[str], folder: Path, mixed: set[tuple[str, ...]]
 ) -> BadFile:
     """Of first folders that hold both sorts and may be places, or states of what is shown."""
-    groups = [Group("RGB", LIGHT), Group("Thermal", HEAT)]
+    groups = [PhotoGroup("RGB", LIGHT), PhotoGroup("Thermal", HEAT)]
     for i, photo in enumerate(seen):
         groups[photo.sort == HEAT].rows.append(i)
     folders = sorted(first[0] for first in mixed)

@@ -23,7 +23,7 @@ DEEPEST = 1000  # a pattern has fewer folders; what names photos or cameras goes
 
 
 @dataclass
-class Group:
+class PhotoGroup:
     """A modality that a line of capture.json is to say: which photos it has."""
 
     name: str
@@ -33,7 +33,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Choice:
+class PhotoChoice:
     """Which photos an entry of 'modalities' takes; what is None takes all."""
 
     folders: tuple[str, ...] | None
@@ -43,10 +43,10 @@ class Choice:
     def depths(self, names: Sequence[str], cameras_of: Callable[[int], set[str]]) -> list[int]:
         return [self.depth(name, partial(cameras_of, row)) for row, name in enumerate(names)]
 
-    def folded(self) -> "Choice":
+    def folded(self) -> "PhotoChoice":
         """The same for names in small letters."""
         lists = (self.folders, self.photos, self.cameras)
-        return Choice(*(found and tuple(map(str.lower, found)) for found in lists))
+        return PhotoChoice(*(found and tuple(map(str.lower, found)) for found in lists))
 
     def depth(self, name: str, cameras: Callable[[], set[str]]) -> int:
         """How exactly it names that photo; 0: not at all."""
@@ -99,7 +99,7 @@ def said_modality_of(
     return [name for _, name in out]
 
 
-def choice_of(entry: Fields, name: str) -> Choice:
+def choice_of(entry: Fields, name: str) -> PhotoChoice:
     """Of an entry of 'modalities'; one that says nothing of its photos has the folder of its name.
 
     Raises BadFile.
@@ -107,7 +107,7 @@ def choice_of(entry: Fields, name: str) -> Choice:
     said = {key: texts_of(entry, key) for key in CHOICES}
     if not any(said.values()):
         said["folder"] = (name,)
-    return Choice(said["folder"], said["photos"], said["camera"])
+    return PhotoChoice(said["folder"], said["photos"], said["camera"])
 
 
 def texts_of(entry: Fields, key: str) -> tuple[str, ...] | None:
@@ -124,7 +124,7 @@ def texts_of(entry: Fields, key: str) -> tuple[str, ...] | None:
     return tuple(listed)
 
 
-def said_in_words(choice: Choice) -> str:
+def said_in_words(choice: PhotoChoice) -> str:
     listed = choice.photos or choice.cameras or choice.folders or ()
     return path_end(", ".join(listed))
 
@@ -197,7 +197,7 @@ def after_any(pattern: Sequence[str], places: set[int]) -> set[int]:
 
 
 def settling_line(
-    groups: Sequence[Group], names: Sequence[str], cameras: Sequence[str] = ()
+    groups: Sequence[PhotoGroup], names: Sequence[str], cameras: Sequence[str] = ()
 ) -> str:
     """What capture.json is to hold so that each group is a modality.
 
@@ -207,7 +207,7 @@ def settling_line(
 
 
 def entries_of(
-    groups: Sequence[Group], names: Sequence[str], cameras: Sequence[str] = ()
+    groups: Sequence[PhotoGroup], names: Sequence[str], cameras: Sequence[str] = ()
 ) -> list[dict]:
     """The entries of 'modalities' that read_capture takes for these groups, light first."""
     groups = [group for group in groups if group.rows]
@@ -221,7 +221,9 @@ def entries_of(
     return out
 
 
-def choices_of(groups: Sequence[Group], names: Sequence[str], cameras: Sequence[str]) -> list[dict]:
+def choices_of(
+    groups: Sequence[PhotoGroup], names: Sequence[str], cameras: Sequence[str]
+) -> list[dict]:
     """By folders where these tell the groups apart, else by cameras, by patterns, or one by one."""
     parts = plain_parts(names)
     folders = [{"/".join(parts[row][:-1]) for row in group.rows} for group in groups]

@@ -10,7 +10,7 @@ from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_files import parts_of
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.modalities.said_modalities import Group, settling_line
+from shapeshift.scene.captures.modalities.said_modalities import PhotoGroup, settling_line
 
 ONE_CHANNEL = {"L", "LA", "La", "1"}  # how PIL names pictures of a byte without colours,
 NUMBERS = {"I;16", "I;16B", "I;16L", "I;16N", "I", "F"}  # and what is 16 bits or more
@@ -98,13 +98,13 @@ def mixed(
 ) -> BadFile:
     """Of a stop whose rows `grey` are of another sort than its others."""
     rest = [row for row, p in enumerate(photos) if p.stop == stop.name and row not in grey]
-    light = Group("RGB" if stop.kind == "layer" else stop.name, stop.kind, stop.palette, rest)
+    light = PhotoGroup("RGB" if stop.kind == "layer" else stop.name, stop.kind, stop.palette, rest)
     light.kind = "rgb" if stop.kind == "layer" and len(stops) == 1 else stop.kind
-    heat = Group("Thermal", "thermal", "ironbow", sorted(grey))
+    heat = PhotoGroup("Thermal", "thermal", "ironbow", sorted(grey))
     if stop.kind == "thermal":  # then those in colours are the odd ones
         light, heat = (
-            Group("RGB", "rgb", "", rest),
-            Group(stop.name, "thermal", "ironbow", sorted(grey)),
+            PhotoGroup("RGB", "rgb", "", rest),
+            PhotoGroup(stop.name, "thermal", "ironbow", sorted(grey)),
         )
     others = [g for g in groups_of(photos, stops) if g.name != stop.name]
     names = [photo.name for photo in photos]
@@ -124,10 +124,10 @@ def mixed(
     )
 
 
-def groups_of(photos: Sequence[Opened], stops: Sequence[Stop]) -> list[Group]:
+def groups_of(photos: Sequence[Opened], stops: Sequence[Stop]) -> list[PhotoGroup]:
     """The stops as they are."""
     return [
-        Group(s.name, s.kind, s.palette, [i for i, p in enumerate(photos) if p.stop == s.name])
+        PhotoGroup(s.name, s.kind, s.palette, [i for i, p in enumerate(photos) if p.stop == s.name])
         for s in stops
     ]
 

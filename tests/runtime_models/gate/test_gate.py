@@ -81,7 +81,7 @@ def served(tmp_path, monkeypatch):
     path = tmp_path / "file.bin"
     path.write_bytes(b"0123456789")
     yield path
-    for process in gate._idle.pop("test", []):
+    for process in gate.idle_processes.pop("test", []):
         process.end()
 
 
@@ -218,7 +218,7 @@ def test_threads_have_processes_of_their_own(served):
     for thread in threads:
         thread.join()
     assert len(found) == 2
-    assert len(gate._idle["test"]) == gate.IDLE
+    assert len(gate.idle_processes["test"]) == gate.IDLE
 
 
 def test_what_is_held_open_has_one_budget_of_memory_and_time_for_each_call(served):
@@ -352,7 +352,7 @@ def test_a_job_object_is_given_time_and_memory(monkeypatch):
 
             setattr(Windows.kernel32, name, Call(function))
     monkeypatch.setattr(ctypes, "windll", Windows, raising=False)
-    monkeypatch.setattr(limits, "_job", [])
+    monkeypatch.setattr(limits, "held_job", [])
     used = time.process_time()
     assert limits.committed() == 1000
     assert limits.arm_windows(2.0, 500) == [limits.TIME, limits.MEMORY]
@@ -375,7 +375,7 @@ def test_the_process_ends_with_the_program(served, tmp_path):
         "from shapeshift.runtime_models.gate import gate, doors\n"
         "door = doors.Door('t', 'f', 'numpy', (), 'stand_in_parser:read', 60, 0, 1 << 28)\n"
         "gate.DOORS['t'] = door\n"
-        "p = gate.taken('t'); print(p.child.pid, flush=True); gate._idle['t'].append(p)\n"
+        "p = gate.taken('t'); print(p.child.pid, flush=True); gate.idle_processes['t'].append(p)\n"
         f"gate.ask('t', Path({str(served)!r}), ['sleep'])\n"
     )
     parent = subprocess.Popen([sys.executable, "-P", str(script)], stdout=subprocess.PIPE)

@@ -49,7 +49,7 @@ class OverlayRenderer:
         most = int(ctx.info["GL_MAX_TEXTURE_SIZE"])
         self._platform.renderer_texture_max_width = most
         self._platform.renderer_texture_max_height = most
-        self._textures: dict[int, moderngl.Texture] = {}  # all that are drawn with, by GL's number
+        self.textures: dict[int, moderngl.Texture] = {}  # all that are drawn with, by GL's number
         self._program = ctx.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
         self._program["picture"] = 0
         self._vertex_buffer = ctx.buffer(reserve=imgui.VERTEX_SIZE * FIRST_CORNERS)
@@ -63,11 +63,11 @@ class OverlayRenderer:
 
     def register_texture(self, texture: moderngl.Texture) -> None:
         """From now on it can be drawn, under its `glo`."""
-        self._textures[texture.glo] = texture
+        self.textures[texture.glo] = texture
 
     def remove_texture(self, texture: moderngl.Texture) -> None:
         """Before it is released."""
-        del self._textures[texture.glo]
+        del self.textures[texture.glo]
 
     def render(self, data: imgui.ImDrawData) -> None:
         """Over what the framebuffer in use has."""
@@ -85,7 +85,7 @@ class OverlayRenderer:
             write(self._vertex_buffer, bytes_of(vertices, imgui.VERTEX_SIZE))
             write(self._index_buffer, bytes_of(indices, imgui.INDEX_SIZE))
             for command in each.cmd_buffer:
-                self._textures[command.get_tex_id()].use(0)
+                self.textures[command.get_tex_id()].use(0)
                 self.ctx.scissor = scissor(tuple(command.clip_rect), scale, height)
                 self._vertices.render(
                     moderngl.TRIANGLES, vertices=command.elem_count, first=command.idx_offset
@@ -113,13 +113,13 @@ class OverlayRenderer:
                 box = wanted.update_rect
                 new = pixels_of(wanted)[box.y : box.y + box.h, box.x : box.x + box.w]
                 viewport = (box.x, box.y, box.w, box.h)
-                self._textures[wanted.tex_id].write(new.tobytes(), viewport, alignment=1)
+                self.textures[wanted.tex_id].write(new.tobytes(), viewport, alignment=1)
                 wanted.set_status(status.ok)
             elif wanted.status == status.want_destroy and wanted.unused_frames > 0:
                 self._destroy(wanted)
 
     def _destroy(self, wanted: imgui.ImTextureData) -> None:
-        texture = self._textures[wanted.tex_id]
+        texture = self.textures[wanted.tex_id]
         self.remove_texture(texture)
         texture.release()
         wanted.set_tex_id(0)
@@ -127,7 +127,7 @@ class OverlayRenderer:
 
     def shutdown(self) -> None:
         for own in self._platform.textures:
-            if own.tex_id in self._textures:
+            if own.tex_id in self.textures:
                 self._destroy(own)
         self._io.backend_flags &= ~imgui.BackendFlags_.renderer_has_textures
         for part in (self._vertices, self._vertex_buffer, self._index_buffer, self._program):

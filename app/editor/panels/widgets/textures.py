@@ -14,6 +14,9 @@ class Textures:
         self._ctx, self._overlay = ctx, overlay
         self._kept: dict[str, tuple[np.ndarray, moderngl.Texture]] = {}
 
+    def __len__(self) -> int:
+        return len(self._kept)
+
     def reference(self, name: str, picture: np.ndarray) -> imgui.ImTextureRef:
         """What ImGui draws a picture by, (H, W, 3) or, with alpha, (H, W, 4) uint8; `name` has one
         at a time.

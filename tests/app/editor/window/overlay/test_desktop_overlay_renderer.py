@@ -45,7 +45,7 @@ def same_letters(renderer) -> int:
     filled = 0
     for own in imgui.get_platform_io().textures:
         if own.status == imgui.ImTextureStatus.ok:
-            texture, pixels = renderer._textures[own.tex_id], pixels_of(own)
+            texture, pixels = renderer.textures[own.tex_id], pixels_of(own)
             assert texture.size == (own.width, own.height)
             there = np.frombuffer(texture.read(alignment=1), np.uint8).reshape(pixels.shape)
             np.testing.assert_array_equal(there, pixels)
@@ -81,7 +81,7 @@ def test_textures_that_imgui_has_done_with_are_released(viewer, renderer):
         viewer.window.text_size = size
         run_frames(viewer, 3)
     own = [t.tex_id for t in imgui.get_platform_io().textures if t.tex_id]
-    assert len(own) <= 2 and set(own) <= renderer._textures.keys()
-    assert len(renderer._textures) <= len(own) + len(viewer.window.textures._kept)
+    assert len(own) <= 2 and set(own) <= renderer.textures.keys()
+    assert len(renderer.textures) <= len(own) + len(viewer.window.textures)
     viewer.window.text_size = None
     run_frames(viewer, 2)
