@@ -27,5 +27,5 @@ def take_frames(
         raise BadFile(f"{video} does not exist; give a folder of photos, or a video.")
     return ask(
         "video", video, [str(video.absolute()), str(folder.absolute()), count],
-        tell=lambda said: progress("sharpest frames", said["done"], said["of"]),
+        hear=lambda said: progress("sharpest frames", said["done"], said["of"]),
     )  # fmt: skip

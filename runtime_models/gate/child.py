@@ -82,7 +82,7 @@ def serve(request: dict, held: list, say: Callable[[Any], None]) -> dict:
         return {"absent": str(why)}
     module, _, name = request["target"].partition(":")
     target = getattr(importlib.import_module(module), name)
-    more = {"tell": lambda **what: say({"tell": what})} if request["tells"] else {}
+    more = {"hear": lambda **what: say({"tell": what})} if request["tells"] else {}
     if not request["method"]:  # else the budget is counted from where the file was opened
         held.clear()
         held[:] = [own_bytes()]

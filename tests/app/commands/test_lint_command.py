@@ -109,8 +109,8 @@ def test_packages_folders_and_anchors(data, capsys):
         before = [state_of(file) for file in files]
         assert run(Options(scene, json=True)) == 0
         facts = json.loads(capsys.readouterr().out)
-        # Two of the demo's splats are thinner than viewers with half floats can draw.
-        assert [row["count"] for row in facts["findings"]] == [2] * scene.is_file()
+        # Two of the leg's splats are thinner than viewers with half floats can draw.
+        assert [row["count"] for row in facts["findings"]] == [2] * scene.is_dir()
         assert 1 < facts["splats_over_a_pixel"] < 20  # 17 of the demo
         assert [state_of(file) for file in files] == before
 

@@ -161,7 +161,7 @@ class KeptOverlay(OverlayRenderer):
         first = 0
         for box, command, places in jobs:
             clip, texture, _ = drawn.commands[command]
-            self._textures[texture].use(0)
+            self.textures[texture].use(0)
             self.ctx.scissor = within(scissor(clip, drawn.scale, height), box, height)
             self._vertices.render(moderngl.TRIANGLES, vertices=3 * len(places), first=first)
             first += 3 * len(places)
