@@ -73,7 +73,7 @@ def decibels_of(options: Options, model: "AnchorModel") -> dict[str, float]:
     from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
     from shapeshift.training.evaluation.evaluate import evaluate_model
 
-    capture = open_capture(options.capture, options.memory)
+    capture = open_capture(options.capture, options.memory, lambda *said: None)  # was said before
     capture = with_extrinsics(capture, rig_of(model.provenance))
     factor, device = trained_downscale(model.provenance), open_device(options.device)
     masks = options.asked.get("masks", "auto")
