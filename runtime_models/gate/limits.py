@@ -24,7 +24,7 @@ held_job: list[Any] = []  # Windows: the job object of this process
 
 
 def arm(seconds: float, memory: int) -> list[str]:
-    """BasicLimits what this process may take from now on; which of TIME and MEMORY are limited.
+    """Limits what this process may take from now on; which of TIME and MEMORY are limited.
 
     memory: bytes that it may have as a whole, see own_bytes.
     """
