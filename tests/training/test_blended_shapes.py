@@ -1,6 +1,7 @@
 """Steps that look between two stops: which they are, and what a viewer then draws there."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -78,8 +79,10 @@ def cross_fade_db(model: AnchorModel, views: list[View]) -> float:
 
 
 def test_the_picture_between_light_and_heat_comes_nearer_to_their_cross_fade(device, shared):
-    """Three seeds: 35.7 to 47.3 dB, 44.1 to 48.7, 35.6 to 47.0, and on a processor without AVX-512
-    50.6 to 54.1, where 3.5 dB are what is left to gain; stops lose 0.35 dB at most.
+    """Three seeds: 35.7 to 47.3 dB, 44.1 to 48.7, 35.6 to 47.0; stops lose 0.35 dB at most.
+
+    A processor without AVX-512 rounds otherwise, and its runs end nearer without it: 50.6 to 54.1
+    dB, 51.0 to 53.8 and 50.1 to 54.2, so there the bounds are other ones, of the first seed.
     """
     views, fades, psnr = None, [], []
     for share in (0.0, 0.5):
@@ -87,7 +90,10 @@ def test_the_picture_between_light_and_heat_comes_nearer_to_their_cross_fade(dev
         views = views or [photo.view for photo in trainer.held_out if photo.modality == "RGB"]
         fades.append(cross_fade_db(trainer.model(), views))
         psnr.append(trainer.held_out_psnr(9))
-    assert fades[1] > 45 and fades[1] > fades[0] + 3
+    flags = Path("/proc/cpuinfo")
+    wide = not flags.is_file() or "avx512f" in flags.read_text()
+    least, gain = (45, 4) if wide else (53, 3)
+    assert fades[1] > least and fades[1] > fades[0] + gain
     for name, with_it in psnr[1].items():
         assert with_it > psnr[0][name] - 0.6, name
 
