@@ -1,4 +1,5 @@
-"""A process of its own for structure from motion: `python -P colmap_run.py find|write JOB.json`.
+"""A process of its own for structure from motion: `python -P colmap_run.py find|write JOB.json
+SECONDS BYTES`, of processor time and memory that it may take at most.
 
 pycolmap is C++ that logs to standard error, holds the interpreter for minutes and ends the process
 on what it does not like: none of this may happen to the program.  It ends when its standard input
@@ -12,6 +13,7 @@ Writes: `find` the model with most photos into best/ and its arrays into best.np
 model, turned and scaled, into sparse/.
 """
 
+import importlib.util
 import json
 import os
 import sys
@@ -21,7 +23,8 @@ from typing import Any
 
 import numpy as np
 
-ABSENT = 3  # the exit code where pycolmap is not installed: see colmap_child.py
+ABSENT, UNLIMITED = 3, 4  # exit codes: see colmap_child.py
+LIMITS = Path(__file__).resolve().parents[2] / "runtime_models" / "gate" / "limits.py"
 MOST_ERROR_PX = 8.0  # a mean reprojection error beyond this is no model
 # What is tried where fewer than ENOUGH of the photos find their place: the least angle between the
 # two photos that a model begins with, the inliers that a photo needs, whether matches are guided
@@ -223,12 +226,23 @@ def end_with_parent() -> None:
     os._exit(1)
 
 
-def main(what: str, path: str) -> None:
+def arm(seconds: float, memory: int) -> None:
+    """Sets the limits of the gate for outside parsers: pycolmap reads the photos themselves."""
+    spec = importlib.util.spec_from_file_location("limits", LIMITS)
+    assert spec is not None and spec.loader is not None
+    limits = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(limits)
+    if "time" not in limits.arm(seconds, memory):
+        sys.exit(UNLIMITED)
+
+
+def main(what: str, path: str, seconds: str, memory: str) -> None:
     try:
         import pycolmap  # noqa: F401
     except ImportError as why:
         sys.stderr.write(str(why))
         sys.exit(ABSENT)
+    arm(float(seconds), int(memory))
     job = json.loads(Path(path).read_text())
     {"find": find, "write": write}[what](job)
 

@@ -16,6 +16,7 @@ from shapeshift.decomposition.poses.photo_list import PhotoList
 from shapeshift.decomposition.poses.pose_report import PoseReport
 from shapeshift.decomposition.poses.upright import COLMAP_UP, find_up, length_between, similarity
 from shapeshift.decomposition.poses.write_posed import write_posed
+from shapeshift.runtime_models.files.memory import PART, machine_memory
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
@@ -32,6 +33,8 @@ FAILURE = (
     "the search for poses ended with code {code}, perhaps for want of memory; {log} has its last "
     "words.  Try smaller photos (--side) or fewer (--every)."
 )
+# Seconds of processor time that a search may take: in all, for each photo, for each pair of them.
+START_S, PHOTO_S, PAIR_S = 600, 60, 5
 FEW_POINTS = 60  # that a photo sees: its pose hangs on little
 
 
@@ -81,7 +84,7 @@ def find_poses(
     refuse_links(work)
     masks = copy_masks(photos, settings.masks, work) if settings.masks else None
     job = describe(photos, work, settings, masks)
-    reports = run_colmap("find", start_job(work, job), progress)
+    reports = run_colmap("find", start_job(work, job), job, progress)
     if not reports or reports[-1]["registered"] < 2:
         raise BadFile(
             f"{photos.root}: no two of its {len(photos.photos)} photos could be placed beside each "
@@ -93,7 +96,7 @@ def find_poses(
     turn, up, scale = frame_of(best, photos, settings.length)
     write_job = work / "write.json"
     write_whole(write_job, json.dumps(job | {"similarity": turn.tolist()}).encode())
-    run_colmap("write", write_job, progress)
+    run_colmap("write", write_job, job, progress)
     placed = {str(name) for name in best["names"]}
     report = PoseReport(
         photos=len(photos.photos),
@@ -112,9 +115,19 @@ def find_poses(
     return report
 
 
-def run_colmap(what: str, job: Path, progress: Progress) -> list[dict]:
-    """Does `what` of the job, beside which the log is; returns what it reports.  Raises BadFile."""
-    return run_child(SCRIPT, [what, str(job)], job.with_name("log.txt"), progress, FAILURE)
+def run_colmap(what: str, file: Path, job: dict, progress: Progress) -> list[dict]:
+    """Does `what` of the job in `file`, beside which the log is; returns what it reports.
+
+    It may take the memory of this machine that files may take.  Raises BadFile.
+    """
+    words = [what, str(file), f"{allowed_s(job):.1f}", str(int(PART * machine_memory()))]
+    return run_child(SCRIPT, words, file.with_name("log.txt"), progress, FAILURE)
+
+
+def allowed_s(job: dict) -> float:
+    """Seconds of processor time that a search may take: many times what photos that are whole take,
+    so that it ends where a damaged one would make a decoder run on."""
+    return START_S + PHOTO_S * sum(map(len, job["groups"])) + PAIR_S * job["pairs"]
 
 
 def refuse_links(work: Path) -> None:

@@ -7,6 +7,7 @@ on what it does not like: none of this may happen to the program.
 import json
 import queue
 import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -21,7 +22,9 @@ from shapeshift.runtime_models.model import BadFile
 Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
 POLL_S = 0.5
 FULL_BYTES = 1 << 20  # less is left on a full disk: its last write wanted more
-ABSENT = 3  # the exit code of a script where pycolmap is not installed or does not load
+# Exit codes of a script: pycolmap is not installed or does not load; nothing limits this process.
+ABSENT, UNLIMITED = 3, 4
+OVER_TIME = {-getattr(signal, name) for name in ("SIGPROF", "SIGXCPU") if hasattr(signal, name)}
 
 
 def run_child(
@@ -51,6 +54,15 @@ def run_child(
     if code == ABSENT:
         raise BadFile(
             "pycolmap, which photos are matched with, is not installed; install the requirements."
+        )
+    if code == UNLIMITED:
+        raise BadFile(
+            "this system limits no process, and pycolmap reads strangers' photos in none."
+        )
+    if code in OVER_TIME:
+        raise BadFile(
+            f"pycolmap took longer than these photos should take; {log} has its last words.  Leave "
+            "out photos that are damaged, or give fewer."
         )
     if code and shutil.disk_usage(log.parent).free < FULL_BYTES:  # C++ ends with SIGABRT then
         raise BadFile(f"the disk of {log.parent} is full; make room there and start it again.")

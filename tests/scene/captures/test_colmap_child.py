@@ -27,6 +27,17 @@ def test_a_full_disk_is_told_from_other_ends(tmp_path, monkeypatch, ending):
         ended(tmp_path, monkeypatch, ending, FULL_BYTES)
 
 
+@pytest.mark.parametrize(("ending", "said"), [
+    ("import signal; os.kill(os.getpid(), signal.SIGXCPU)", "took longer than these photos"),
+    ("import signal; os.kill(os.getpid(), signal.SIGPROF)", "took longer than these photos"),
+    ("sys.exit(4)", "this system limits no process"),
+    ("sys.exit(3)", "is not installed"),
+])  # fmt: skip
+def test_what_a_limit_ended_is_said(tmp_path, monkeypatch, ending, said):
+    with pytest.raises(BadFile, match=said):
+        ended(tmp_path, monkeypatch, ending, 10**9)
+
+
 @pytest.mark.parametrize("free", [0, 10**9])
 def test_what_ends_well_gives_its_reports(tmp_path, monkeypatch, free):
     assert ended(tmp_path, monkeypatch, "", free) == [{"found": 3}]
