@@ -309,6 +309,8 @@ def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
 
 def with_counts(photos: list[Photo], listed: object, where: str) -> list[Photo]:
     """The photos with what the list of modalities says of the numbers in them."""
+    if not (isinstance(listed, list) and any(isinstance(entry, dict) for entry in listed)):
+        return photos
     counts, no_value = counts_from(listed, where), no_value_from(listed, where)
     out = []
     for photo in with_bands(photos, listed, where):
@@ -360,9 +362,12 @@ def split_every_8th(photos: list[Photo]) -> list[Photo]:
     """Every 8th photo of each modality, by name, becomes a test photo; fewer than 3 all train."""
     tests = set()
     for name in {p.modality for p in photos}:
-        mine = sorted({p.path for p in photos if p.modality == name})  # once of a panorama
+        paths = {p.path for p in photos if p.modality == name}  # once of a panorama
+        mine = sorted(paths, key=lambda path: path.parts)
         tests |= set(mine[::TEST_EVERY]) if len(mine) >= 3 else set()
-    return [replace(p, split="test" if p.path in tests else "train") for p in photos]
+    splits = ["test" if p.path in tests else "train" for p in photos]
+    rows = zip(photos, splits, strict=True)
+    return [p if p.split == split else replace(p, split=split) for p, split in rows]
 
 
 def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:

@@ -1,12 +1,11 @@
 """Captures of several days: modalities with dates become stops as far apart as their dates."""
 
-from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-from shapeshift.runtime_models.files.json_fields import Fields
+from shapeshift.runtime_models.files.json_fields import Fields, own_keys
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.splats.layers.frames import DATED, date_of
 from shapeshift.runtime_models.stop_dates import (
@@ -37,8 +36,7 @@ def day_of_frame(entry: Mapping, where: str) -> str:
 
     A date that a file has for all of its frames is of the file.
     """
-    own = entry.maps[0] if isinstance(entry, ChainMap) else entry
-    return date_in_entry(Fields(own, where))[: len("2026-05-04")]
+    return date_in_entry(Fields(own_keys(entry), where))[: len("2026-05-04")]
 
 
 def named_by_date(names: Sequence[str]) -> tuple[Stop, ...]:

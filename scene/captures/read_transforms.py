@@ -1,7 +1,6 @@
 """transforms.json and cameras.json -> Capture: nerfstudio, Blender, our own form, OpenCV tables."""
 
 import os
-from collections import ChainMap
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
@@ -9,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, shown
+from shapeshift.runtime_models.files.json_fields import Fields, Inherited, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_files import files_below, find_file, photo_key
@@ -256,9 +255,9 @@ def gather(files: tuple[Path, ...], table: FileTable | None = None) -> tuple[dic
             raise BadFile(f"{file}: no list 'frames'; this file holds no posed photos")
         if not frames:
             raise BadFile(f"{file}: 'frames' is empty; a capture needs at least one photo")
-        split = {"split": file.stem.rpartition("_")[2]} if len(files) > 1 else {}
+        held = [{"split": file.stem.rpartition("_")[2]}, data] if len(files) > 1 else [data]
         # One after the other, not one of them: each frame would hold all that is said for all.
-        entries += [ChainMap(frame, split, data) for frame in listed(frames, data, file, table)]
+        entries += [Inherited(frame, *held) for frame in listed(frames, data, file, table)]
         everything |= data
     return everything, entries
 

@@ -74,15 +74,20 @@ def by_pycolmap(lens: ColmapCamera, given: np.ndarray, back: bool) -> np.ndarray
 
 def is_straight(lens: ColmapCamera, where: str) -> bool:
     """Whether the lens shifts no corner by more than STRAIGHT pixels.  Raises BadFile."""
-    focal, (width, height) = lens.focal, lens.size
-    if not all(0 < f < np.inf for f in focal):
-        raise BadFile(f"{where} has focal lengths {focal}; both must be above 0")
-    x, y = np.meshgrid([0, width / 2, width], [0, height / 2, height])
-    corners = np.stack([x.ravel(), y.ravel()], axis=1)
+    if not all(0 < f < np.inf for f in lens.focal):
+        raise BadFile(f"{where} has focal lengths {lens.focal}; both must be above 0")
     if not lens.bends or is_panorama(lens):
         return not lens.bends
-    shift = np.abs(pixels_of(lens, (corners - lens.centre) / focal) - corners).max()
-    return bool(shift <= STRAIGHT)
+    return corner_shift(lens) <= STRAIGHT
+
+
+@lru_cache(maxsize=64)  # thousands of photos have one lens
+def corner_shift(lens: ColmapCamera) -> float:
+    """Pixels by which distortion shifts the corner or middle of an edge that it shifts most."""
+    width, height = lens.size
+    x, y = np.meshgrid([0, width / 2, width], [0, height / 2, height])
+    corners = np.stack([x.ravel(), y.ravel()], axis=1)
+    return float(np.abs(pixels_of(lens, (corners - lens.centre) / lens.focal) - corners).max())
 
 
 @lru_cache(maxsize=64)

@@ -33,7 +33,7 @@ def lens_of(entry: Mapping, path: Path, where: str) -> ColmapCamera:
     if isinstance(lens := entry.get("lens"), ColmapCamera):  # of another program; JSON has none
         return lens
     fields = Fields(entry, where)
-    for key in NUMBERS:
+    for key in filter(entry.__contains__, NUMBERS):
         fields.number(key, 0.0, low=-LARGEST_NUMBER, high=LARGEST_NUMBER)
     if "w" in entry and "h" in entry:
         width, height = size = int(entry["w"]), int(entry["h"])

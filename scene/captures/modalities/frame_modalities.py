@@ -1,11 +1,10 @@
 """The stops of frames in JSON, and which each frame is of; capture.json beside them."""
 
 import os
-from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
+from shapeshift.runtime_models.files.json_fields import Fields, own_keys, read_json, shown
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.capture_files import find_file
@@ -119,8 +118,3 @@ def named_file(entry: Mapping) -> str:
     """The photo that a frame names; "" where it is no text, which shots_of refuses."""
     name = entry.get("file_path") or entry.get("file") or ""
     return name if isinstance(name, str) else ""
-
-
-def own_keys(entry: Mapping) -> Mapping:
-    """What a frame says itself, without what its file says for all."""
-    return entry.maps[0] if isinstance(entry, ChainMap) else entry

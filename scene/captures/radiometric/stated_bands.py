@@ -53,7 +53,7 @@ def only_bands(sharing: dict[str, list[str]]) -> set[str]:
 def of_each_band(photos: Sequence[Photo], sharing: dict[str, list[str]]) -> list[Photo]:
     """The photos of a first modality once for each that shares its folder."""
     return [
-        replace(photo, modality=name)
+        photo if photo.modality == name else replace(photo, modality=name)
         for photo in photos
         for name in sharing.get(photo.modality, [photo.modality])
     ]
