@@ -35,6 +35,8 @@ def ranges(raw: RawSplats) -> tuple[tuple[float, float], tuple[float, float]]:
 
 def any_invalid(raw: RawSplats, rows: slice) -> bool:
     """Whether any of these rows may be odd."""
+    if raw.usual:
+        return False
     largest = float(np.finfo(np.float32).max)
     everything = (-largest, largest)
     scales, opacities = ranges(raw)

@@ -55,7 +55,7 @@ def activate(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawSplat
 
 def sigmoid(logits: np.ndarray) -> None:
     """1 / (1 + exp(-logits)), in place; infinite ones are 0 and 1."""
-    np.negative(logits, out=logits)
+    logits *= -1  # not negative(): numpy 2.4.6 without AVX-512 errs where one entry in four is it
     np.exp(logits, out=logits)
     logits += 1
     np.divide(1, logits, out=logits)

@@ -1,5 +1,6 @@
 """Turns plain splats: places, quaternions and spherical harmonics together."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -7,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import basis
-from shapeshift.runtime_models.files.blocks import BLOCK, each_block
+from shapeshift.runtime_models.files.blocks import block_of, each_block
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.plain_splats import AXES, PlainSplats
@@ -78,29 +79,32 @@ def half_turn_rotator(diagonal: tuple[float, float, float], count: int) -> Calla
     axis = 1 + int(signs.argmax())
     other = [i for i in (1, 2, 3) if i != axis]
     order = np.array([axis, *(0 if i == axis else 6 - axis - i for i in (1, 2, 3))])
-    quaternion_signs = np.ones(4, np.float32)
-    quaternion_signs[[0, other[0], other[1]]] = -1, *((-1, 1) if axis != 2 else (1, -1))
-    tiled = np.tile(signs.astype(np.float32), 4 * BLOCK)  # of the longest block
+    negative = [0, other[axis == 2]]  # entries of the turned quaternion
+    most = block_of(44 + 12 * count)  # rows of the longest block
+    tiled = np.tile(signs.astype(np.float32), most)
     harmonic_signs = signs_of_harmonics(signs, count)  # (count,)
-    every_channel = np.repeat(harmonic_signs, 3)
+    every_channel = np.tile(np.repeat(harmonic_signs, 3), most)
 
     def rotate_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
-        if means.flags.c_contiguous and 3 * len(means) <= len(tiled):
-            numbers = means.reshape(-1)  # one long loop, not one of three for each
-            numbers *= tiled[: numbers.size]
-        else:
-            means *= tiled[:3]
-        wxyz[:] = wxyz.take(order, axis=1)
-        wxyz *= quaternion_signs
-        if sh.shape[1] == 1:
-            return
-        if sh.flags.c_contiguous:
-            flat = sh.reshape(len(sh), -1)  # one long loop a splat, not many of three
-            flat *= every_channel
-        else:
-            sh *= harmonic_signs[:, None]
+        flip(means, tiled)
+        before = wxyz.copy()
+        for i in range(4):  # a column each: numpy is slow at runs of four
+            column = before[:, order[i]]
+            # Not negative(out=...): numpy 2.4.6 without AVX-512 takes neighbours for every fourth.
+            wxyz[:, i] = -column if i in negative else column
+        if count > 1:
+            flip(sh, every_channel)
 
     return rotate_rows
+
+
+def flip(rows: np.ndarray, signs: np.ndarray) -> None:
+    """Multiplies rows (n, ...) by signs, those of one row after the other, in place."""
+    if rows.flags.c_contiguous and rows.size <= len(signs):
+        numbers = rows.reshape(-1)  # one long loop, not a short one for each row
+        numbers *= signs[: numbers.size]
+    else:
+        rows *= signs[: math.prod(rows.shape[1:])].reshape(rows.shape[1:])
 
 
 def signs_of_harmonics(signs: np.ndarray, count: int) -> np.ndarray:

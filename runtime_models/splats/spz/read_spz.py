@@ -64,6 +64,7 @@ def read_spz_bytes(
         format=f"spz v{header.version}",
         logits=False,
         antialiased=bool(header.flags & ANTIALIASED),
+        usual=header.version > 1,  # whole numbers alone; version 1 has half floats
         memory=memory,
     )
     shares = np.zeros(2)  # squares of harmonics of degree 4, and of all that vary

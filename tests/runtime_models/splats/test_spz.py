@@ -10,6 +10,7 @@ import pytest
 
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.lint.invalid_rows import invalid_rows
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import format_of, read_plain, read_raw
@@ -49,6 +50,31 @@ def test_every_splat_is_what_it_is_by_hand(version, degree, count):
         for name, want in hand.items():
             got = getattr(raw, name)[i]
             np.testing.assert_allclose(got.ravel(), np.ravel(want), rtol=0, atol=2e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("version", [1, 2, 3, 4])
+def test_what_is_said_to_be_usual_is_so_of_any_codes(version):
+    """A reader that says so is believed: of no code, sensible or not, comes an odd number."""
+    width, count = (9, 1, 3, 3, 4 if version >= 3 else 3, 45), 600
+    rng = np.random.default_rng(0)
+    for fill in (0, 255, 127, 128, None):
+        codes = (
+            rng.integers(0, 256, (count, sum(width)), np.uint8)
+            if fill is None
+            else np.full((count, sum(width)), fill, np.uint8)
+        )
+        parts = np.split(codes, np.cumsum(width)[:-1], axis=1)
+        if version == 1:
+            parts[0] = parts[0][:, :6]
+        streams = [np.ascontiguousarray(part).tobytes() for part in parts]
+        for bits in (0, 30):
+            raw = read(file_of(version, count, 3, streams, bits=bits))
+            assert raw.usual == (version > 1)
+            raw.usual = False
+            odd = invalid_rows(raw)
+            assert len(odd) == 0 or version == 1, (fill, bits)
+            lengths = np.linalg.norm(raw.wxyz, axis=1)
+            assert (lengths > 0.99).all() and (lengths < 2).all()
 
 
 @pytest.mark.parametrize("bits", [0, 1, 12, 23, 24, 30])
