@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.runtime_models.checkpoint.run_settings import settings_beside
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.splats.formats import read_plain, read_raw
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -33,6 +33,8 @@ def test_a_gsplat_run_opens_whole_and_is_drawn_as_it_was_trained(tmp_path, said,
     assert model.splat_count == 65 and model.antialiased is drawn
     assert model.stops[0].name == "results"
     assert any("cfg.yml" in finding.what for finding in model.findings) is drawn
+    assert model.findings[-1].what == "its run has splats of step 6999 as well"
+    assert model.findings[-1].done == "29999 is read" and describe(model, run)["step"] == "29999"
     assert model.provenance["files"] == [f"ckpts/ckpt_29999_rank{i}.pt" for i in range(2)]
     alone = read_plain(run / "ckpts" / "ckpt_29999_rank0.pt", HUGE)
     assert alone.antialiased is drawn, "the file alone is of the same run"
@@ -51,6 +53,15 @@ def test_a_world_that_was_not_turned_is_colmap_s(tmp_path):
     assert read_raw(one / "ply" / "point_cloud_30000.ply", Reading()).up == "+Z"
     newer = read_model(one, HUGE)  # its cloud is later than its checkpoint
     assert newer.provenance["files"] == ["ply/point_cloud_30000.ply"]
+
+
+def test_a_last_step_with_fewer_files_than_another_is_said(tmp_path):
+    write_gsplat_run(tmp_path / "a", [arrays_of(4), arrays_of(5)], step=10)
+    write_gsplat_run(tmp_path / "a", [arrays_of(4)], step=20)
+    model = read_model(tmp_path / "a", HUGE)
+    assert [f.what for f in model.findings[-2:]] == [
+        "its run has splats of step 10 as well", "step 20 has 1 of 2 files of another step",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("mode, drawn", [("antialiased", True), ("classic", False)])
