@@ -97,6 +97,53 @@ def test_settings_that_contradict_themselves_or_never_end_are_said(tmp_path):
         assert told in raw.findings[0].what and len(raw.findings) == 1
 
 
+TEXT = "# caf\xe9\nantialiased: true\n"
+
+
+@pytest.mark.parametrize("name", ["cfg.yml", "config.yml", "config.yaml"])
+@pytest.mark.parametrize("data", [TEXT.encode(code) for code in (
+    "utf-8", "utf-8-sig", "utf-16", "utf-32", "cp1252")] + [
+    b"\xfe\xff" + TEXT.encode("utf-16-be")])  # fmt: skip
+def test_settings_in_any_encoding_that_says_its_name_are_read(tmp_path, name, data):
+    run = write_gsplat_run(tmp_path / "a", [arrays_of(9)])
+    (run / "cfg.yml").unlink()
+    (run / name).write_bytes(data)
+    raw = read_raw(run / "ckpts" / "ckpt_29999_rank0.pt", Reading())
+    assert raw.antialiased and len(raw.findings) == 1 and name in raw.findings[0].what
+
+
+@pytest.mark.parametrize("data, told", [
+    (b"\xff\xfe\0", "cfg.yml is no UTF-16, though it begins so"),
+    (TEXT.encode("utf-16-le"), "cfg.yml is no text"), (bytes(99), "cfg.yml is no text"),
+    (b"\x80\x81caf\xe9", "cfg.yml is no UTF-8"), (None, "cfg.yml is no file"),
+    (b"antialiased: maybe", "cfg.yml says antialiased maybe, which is unknown"),
+    (b"rasterize_mode: fancy", "cfg.yml says rasterize_mode fancy, which is unknown"),
+])  # fmt: skip
+def test_settings_that_cannot_be_read_are_said(tmp_path, data, told):
+    run = write_gsplat_run(tmp_path / "a", [arrays_of(9)])
+    (run / "cfg.yml").unlink()
+    (run / "cfg.yml").mkdir() if data is None else (run / "cfg.yml").write_bytes(data)
+    raw = read_raw(run / "ckpts" / "ckpt_29999_rank0.pt", Reading())
+    assert [finding.what for finding in raw.findings] == [f"its run's {told}"]
+    assert not raw.antialiased and not raw.findings[0].repaired
+
+
+@pytest.mark.parametrize("data, drawn, told", [
+    (b"Namespace(sh_degree=3, antialiasing=True, eval=False)", True, "was trained antialiased"),
+    (b"Namespace(sh_degree=3, antialiasing=False)", False, ""),
+    (b"Namespace(sh_degree=3)", False, ""),
+    (bytes(9), False, "cfg_args is no text"),
+])  # fmt: skip
+def test_arguments_of_a_3dgs_run_are_obeyed(tmp_path, data, drawn, told):
+    cloud = tmp_path / "point_cloud" / "iteration_7" / "point_cloud.ply"
+    cloud.parent.mkdir(parents=True)
+    write_ply(some_splats(9, 1), cloud)
+    (tmp_path / "cfg_args").write_bytes(data)
+    model = read_model(tmp_path, HUGE)
+    assert model.antialiased is drawn
+    assert [told in finding.what for finding in model.findings] == [True] * bool(told)
+
+
 def test_settings_lie_beside_what_a_checkpoint_is_packed_in(tmp_path):
     run = write_gsplat_run(tmp_path / "a", [arrays_of(30)], antialiased="true")
     file = run / "ckpts" / "ckpt_29999_rank0.pt"
@@ -116,7 +163,7 @@ def test_a_png_folder_that_lacks_a_file_names_it(tmp_path, name):
 def test_settings_of_another_folder_are_not_looked_at(tmp_path):
     (tmp_path / "cfg.yml").write_text("antialiased: true")
     (tmp_path / "scans" / "mine").mkdir(parents=True)
-    assert settings_beside(tmp_path / "scans" / "mine" / "a.pt") == ("", {})
+    assert settings_beside(tmp_path / "scans" / "mine" / "a.pt") == ("", {}, "")
     assert settings_beside(tmp_path / "a.pt")[1] == {"antialiased": ["true"]}
 
 
