@@ -14,13 +14,14 @@ from shapeshift.runtime_models.splats.gltf.gltf_files import Asset
 from shapeshift.runtime_models.splats.gltf.gltf_nodes import OBEYED, Placed, placed_nodes
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, ours_from_file
 from shapeshift.runtime_models.splats.placed_splats import instances, joined, moved
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, fourth_degree
 
 SPLATS = "KHR_gaussian_splatting"
 SPZ = "KHR_gaussian_splatting_compression_spz_2"
 PREFIX = f"{SPLATS}:"
 ROTATION, SCALE, OPACITY = f"{PREFIX}ROTATION", f"{PREFIX}SCALE", f"{PREFIX}OPACITY"
 FIRST, COLOR = f"{PREFIX}SH_DEGREE_0_COEF_0", "COLOR_0"
+FOURTH = tuple(f"{PREFIX}SH_DEGREE_4_COEF_{n}" for n in range(9))  # not drawn
 NAME = "glTF"
 # Required extensions that do not touch what is read here: materials are ignored by the extension.
 HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_",
@@ -171,6 +172,12 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
     sh = np.empty((count, len(names), 3), np.float32)
     for coefficient, name in enumerate(names):
         sh[:, coefficient] = (read(name, 4)[:, :3] - 0.5) / C0 if name == COLOR else read(name, 3)
+    left_out = [name for name in FOURTH if name in attributes]
+    findings: tuple[Finding, ...] = ()
+    if left_out:
+        share = sum(float(np.square(read(name, 3), dtype=np.float64).sum()) for name in left_out)
+        drawn = float(np.square(sh[:, 1:], dtype=np.float64).sum())
+        findings = (fourth_degree(len(left_out), share, share + drawn, asset.path.name),)
     return RawSplats(
         means=np.array(means),  # out of the file: who judges them may write into them
         scales=np.array(scales),
@@ -182,6 +189,7 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
         log_scales=False,
         logits=False,
         up="+Y",
+        findings=findings,
         memory=asset.memory,
     )
 

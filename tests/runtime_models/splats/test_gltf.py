@@ -65,6 +65,21 @@ def test_attributes_are_read_by_name_and_order(tmp_path):
         array += 1  # the reader's own: who judges them may write
 
 
+@pytest.mark.parametrize("prefix", [P, "_"])
+def test_degree_four_is_drawn_as_three_and_its_share_is_told(tmp_path, prefix):
+    arrays = splat_arrays(7, 4)
+    squares = {
+        band: sum(float(np.square(a, dtype=float).sum()) for n, a in arrays.items() if band in n)
+        for band in ("DEGREE_1", "DEGREE_2", "DEGREE_3", "DEGREE_4")
+    }
+    named = {name.replace(P + "SH", prefix + "SH"): array for name, array in arrays.items()}
+    got = raw(write_glb(tmp_path / "a.glb", *make_asset(named)))
+    assert got.sh.shape == (7, 16, 3)
+    (found,) = got.findings
+    share = f"{100 * squares['DEGREE_4'] / sum(squares.values()):.2g} %"
+    assert "9 coefficients of SH degree 4" in found.what and share in found.done
+
+
 @pytest.mark.parametrize("kind", ["i1", "<i2"])
 def test_normalised_rotations_and_opacities(tmp_path, kind):
     arrays, most = splat_arrays(9), np.iinfo(kind).max
