@@ -1,5 +1,7 @@
 """How commands open a scene file: its models with progress and findings."""
 
+from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,12 +23,13 @@ OF_OBJECTS = ("mode", "up", "flip")  # options that the file has for each object
 
 
 def open_scene_file(
-    path: Path, options: ReadingOptions, show_findings: bool = True
-) -> tuple["SceneFile", dict[str, "Model"], "Scene"]:
+    path: Path, options: ReadingOptions, show_findings: bool = True,
+    progress: Callable[[str, float], None] | None = None,
+) -> tuple["SceneFile", dict[str, "Model"], "Scene"]:  # fmt: skip
     """What the file says, the model of each object, and what is drawn.
 
-    Progress goes to stderr, and findings unless `show_findings` is false.  Raises BadFile, and
-    UsageError for options that an object has in the file.
+    Progress goes to stderr, or to `progress`; findings, too, unless `show_findings` is false.
+    Raises BadFile, and UsageError for options that an object has in the file.
     """
     from dataclasses import replace
 
@@ -38,8 +41,8 @@ def open_scene_file(
         if getattr(options, name):
             raise UsageError(f"--{name} is for one model; in {path.name} each object has its own.")
     file = read_scene_file(path)
-    with progress_after(PATIENCE_S) as progress:
-        file, models = read_models(file, replace(options.reading(), progress=progress))
+    with nullcontext(progress) if progress else progress_after(PATIENCE_S) as shown:
+        file, models = read_models(file, replace(options.reading(), progress=shown))
     if show_findings:
         print_findings(models)
         say_levels(models.values(), path, options)

@@ -22,16 +22,16 @@ if not os.path.isdir(os.path.join(_here, "renderer")):  # a checkout
 # Module below this package: the names that it gives to it.  __init__.pyi says the same to type
 # checkers and editors.
 _NAMES_OF = {
-    "api.load": ("info", "load"),
+    "api.load": ("info", "lint", "load"),
     "api.scene": ("Scene",),
     "api.picture": ("Picture",),
     "api.render": ("Renderer",),
-    "api.write": ("Exported", "export"),
-    "api.inspect": ("change",),
-    "api.learn": ("TrainedScene", "evaluate", "poses", "train", "update"),
-    "api.measure": ("bench", "chart", "compare"),
-    "api.play": ("Step", "cameras", "simulate"),
+    "api.write": ("Exported", "WrittenLevels", "export", "lod"),
+    "api.learn": ("FittedScene", "TrainedScene", "fit", "train", "update"),
+    "api.measure": ("bench", "change", "chart", "compare", "evaluate", "stability"),
+    "api.play": ("Step", "cameras", "colliders", "poses", "simulate"),
     "app.change.find_change": ("SceneChange",),
+    "app.inspection.thermal": ("Inspection",),
     "app.paths": ("DEMO", "TOUCH"),
     "app.errors": ("UsageError",),
     "decomposition.masks.specs": ("ObjectSpec", "PhotoPrompt"),

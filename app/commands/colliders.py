@@ -4,11 +4,13 @@ python3 launch.py colliders room.scene.json --out room.made.scene.json
 """
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from shapeshift.app.command_line import POSITIONAL, Opt
+from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from shapeshift.scene.document.scene_file import SceneFile, SceneItem
 
 FOLDER = "colliders"  # beside the scene file that is written
+Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -37,19 +40,31 @@ class Options:
 
 
 def run(options: Options) -> int:
+    make_colliders(options)
+    say(f"{full(options.out)} names them.")
+    return 0
+
+
+def make_colliders(
+    options: Options, hear: Callable[..., object] = say, progress: Progress | None = None
+) -> dict[str, Path]:
+    """Makes and writes them and the scene file; the file of each object's, by its name.
+
+    hear: told of each; progress: (what, part 0..1) in place of stderr.  Raises BadFile, UsageError.
+    """
     from shapeshift.app.commands.simulate import refuse_model
-    from shapeshift.app.opening import ReadingOptions
     from shapeshift.app.scene_files import open_scene_file
     from shapeshift.scene.colliders.collider_files import collider_key
     from shapeshift.scene.document.scene_file import HULLS
     from shapeshift.scene.document.write_scene_file import write_scene_file
 
     refuse_model(options.scene, "colliders makes what is touched")
-    file, models, _ = open_scene_file(options.scene, ReadingOptions())
+    file, models, _ = open_scene_file(options.scene, ReadingOptions(), not progress, progress)
     paths = paths_of(file, options.out)
     refuse(options, file, list(paths.values()))
     shapes = shapes_of(options.shape, list(paths))
     made: dict[tuple, Path] = {}  # objects of one model at one x share a file
+    named: dict[str, Path] = {}
     for item in file.all_items:
         if item.collider != HULLS:
             continue
@@ -57,12 +72,12 @@ def run(options: Options) -> int:
         key = (*collider_key(item, models[item.name]), shape, *(item.wxyz if shape else ()))
         if key not in made:
             made[key] = paths[item.name]
-            written = write_one(make_one(file, item, models[item.name], shape), made[key])
-            say(f"{item.name}: {written} in {full(made[key])}")
+            collider = make_one(file, item, models[item.name], shape, progress)
+            hear(f"{item.name}: {write_one(collider, made[key])} in {full(made[key])}")
+        named[item.name] = made[key]
         file = naming(file, item.name, made[key])
     write_scene_file(file, options.out)
-    say(f"{full(options.out)} names them.")
-    return 0
+    return named
 
 
 def shapes_of(asked: tuple[str, ...], names: list[str]) -> dict[str, str]:
@@ -121,15 +136,23 @@ def refuse(options: Options, file: "SceneFile", paths: list[Path]) -> None:
             raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
 
 
-def make_one(file: "SceneFile", item: "SceneItem", model: "Model", shape: str | None) -> "Collider":
+def make_one(
+    file: "SceneFile", item: "SceneItem", model: "Model", shape: str | None,
+    progress: Progress | None,
+) -> "Collider":  # fmt: skip
+    """What "hulls" of an object stands for, or one piece of that shape; progress: None is stderr's
+    bar.  Raises BadFile.
+    """
+    from contextlib import nullcontext
+
     from shapeshift.app.opening import PATIENCE_S, progress_after
     from shapeshift.scene.colliders.collider import MOST_PARTS, Making
     from shapeshift.scene.colliders.collider_files import one_collider
     from shapeshift.scene.colliders.primitives import UP, collider_of_shape
 
-    with progress_after(PATIENCE_S) as progress:
+    with nullcontext(progress) if progress else progress_after(PATIENCE_S) as shown:
         most = 1 if shape else MOST_PARTS  # of a shape the mesh alone is asked
-        collider = one_collider(file, item, model, Making(most_parts=most, progress=progress))
+        collider = one_collider(file, item, model, Making(most_parts=most, progress=shown))
     if shape is None:
         return collider
     up_in_object = item.pose.matrix()[:3, :3].T @ UP

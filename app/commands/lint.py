@@ -1,5 +1,7 @@
 """launch.py lint: what is wrong with a file of splats or a scene file, and what opening repairs."""
 
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -37,20 +39,22 @@ def run(options: Options) -> int:
     return 0
 
 
-def examine(options: Options) -> dict:
-    """The findings of a scene and the numbers that they rest on.  Raises BadFile, UsageError."""
+def examine(options: Options, progress: Callable[[str, float], None] | None = None) -> dict:
+    """The findings of a scene and the numbers that they rest on; progress goes to stderr, or to
+    `progress`.  Raises BadFile, UsageError.
+    """
     from dataclasses import replace
 
     from shapeshift.scene.document.scene_file import is_scene_file
 
     if is_scene_file(options.scene):
-        return examine_objects(options)
+        return examine_objects(options, progress)
 
     from shapeshift.runtime_models.lint.lint_whole import fill_ratio, sample_of
     from shapeshift.runtime_models.read_scene import describe, read_model
 
-    with progress_after(PATIENCE_S) as progress:
-        model = read_model(options.scene, replace(options.reading(), progress=progress))
+    with nullcontext(progress) if progress else progress_after(PATIENCE_S) as shown:
+        model = read_model(options.scene, replace(options.reading(), progress=shown))
         moves = (*uneven(model, options.scene.name), *for_others(model, options.scene.name))
     facts = describe(model, options.scene)
     splats = splats_of(model)
@@ -95,14 +99,14 @@ def uneven(model, file: str) -> tuple:
     return (Finding(what, 0, done, file=file, repaired=False),)
 
 
-def examine_objects(options: Options) -> dict:
+def examine_objects(options: Options, progress: Callable[[str, float], None] | None) -> dict:
     """The same of a scene file and all that it names: models, collider meshes, reactions."""
     from shapeshift.runtime_models.lint.lint_whole import fill_ratio
     from shapeshift.runtime_models.read_scene import files_of
     from shapeshift.scene.colliders.read_mesh import read_mesh
     from shapeshift.scene.document.scene_file import FORMAT, HULLS, machine_of
 
-    file, models, scene = open_scene_file(options.scene, options, show_findings=False)
+    file, models, scene = open_scene_file(options.scene, options, False, progress)
     meshes = {item.collider: item for item in file.all_items if item.collider not in (None, HULLS)}
     for name, item in meshes.items():
         try:

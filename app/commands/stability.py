@@ -1,13 +1,19 @@
 """launch.py stability: a scene, and the renderer with it, in the cases where methods fail."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, say
+
+if TYPE_CHECKING:
+    from shapeshift.app.document import Document
+    from shapeshift.app.stability_cases.case_context import CaseContext
+    from shapeshift.app.stability_cases.table import Table
 
 FAILED = 1  # exit code: a case went past its bound
 
@@ -48,34 +54,52 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     from shapeshift.app.document import open_document
-    from shapeshift.app.drawing import make_folder, open_renderer, parse_size
-    from shapeshift.app.stability_cases.case_context import CaseContext
-    from shapeshift.app.stability_cases.table import open_table
-    from shapeshift.scene.appearance import plain_color
+    from shapeshift.app.drawing import parse_size
+    from shapeshift.app.progress import working
 
-    size = parse_size(options.size)
+    parse_size(options.size)  # refused before the scene is read
     names = choose_cases(options)
     scene = open_document(options.scene, options)
-    make_folder(options.out)
-
-    def reopen():
-        return open_renderer(options.context, options.drawing)
-
-    with reopen() as (renderer, ctx):
-        table = open_table(
-            options.out, command_line(), subject(options, renderer, scene), options.overwrite
-        )
-        case = CaseContext(
-            renderer, ctx, scene, size, reopen, plain_color(scene.background), options.steps,
-            options.rounds,
-        )  # fmt: skip
-        perform(case, names, table)
+    console = open_console()
+    with working("starting") as progress:
+        table = measure(options, scene, names, command_line(), progress, console.print, say)
     print_table(table, names)
     failed = [name for name in names if table.failed(name)]
     verdict = f"FAILED: {', '.join(failed)}" if failed else "all hold"
     count = f"{len(names)} case{'s' * (len(names) > 1)}"
     say(f"{count}, {verdict}; {full(table.path)} and pictures beside it")
     return FAILED if failed else 0
+
+
+def measure(
+    options: Options, scene: "Document", names: list[str], command: str,
+    progress: Callable[[str], object], hear: Callable[[str], object],
+    report: Callable[[str], None],
+) -> "Table":  # fmt: skip
+    """The cases of a scene, in the table and pictures of --out.
+
+    command: named in the table.  progress: hears what is under way, hear: how each case went,
+    report: what else there is to be said.  Raises UsageError, BadFile, NoContext, NoDevice.
+    """
+    from shapeshift.app.drawing import make_folder, open_renderer, parse_size
+    from shapeshift.app.stability_cases.case_context import CaseContext
+    from shapeshift.app.stability_cases.table import open_table
+    from shapeshift.scene.appearance import plain_color
+
+    make_folder(options.out)
+
+    def reopen():
+        return open_renderer(options.context, options.drawing, report)
+
+    with reopen() as (renderer, ctx):
+        about = subject(options, renderer, scene)
+        table = open_table(options.out, command, about, options.overwrite)
+        case = CaseContext(
+            renderer, ctx, scene, parse_size(options.size), reopen, plain_color(scene.background),
+            options.steps, options.rounds,
+        )  # fmt: skip
+        perform(case, names, table, progress, hear)
+    return table
 
 
 def choose_cases(options: Options) -> list[str]:
@@ -110,23 +134,22 @@ def command_line() -> str:
     return typed()
 
 
-def perform(case, names: list[str], table) -> None:
+def perform(
+    case: "CaseContext", names: list[str], table: "Table", progress: Callable[[str], object],
+    hear: Callable[[str], object],
+) -> None:  # fmt: skip
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
-
-    from shapeshift.app.progress import working
     from shapeshift.app.stability_cases.table import CASES, save_panels
 
-    console = open_console()
-    with working("starting") as progress:
-        for i, name in enumerate(names):
-            if name in table.rows:
-                continue
-            progress(f"{name} ({i + 1} of {len(names)})")
-            result = CASES[name](case)
-            save_panels(result.panels, table.folder / f"{name}.png")
-            table.add(name, result.findings)
-            failed = sum(f.verdict == "FAILS" for f in result.findings)
-            console.print(f"{name}: {f'{failed} past their bounds' if failed else 'holds'}")
+    for i, name in enumerate(names):
+        if name in table.rows:
+            continue
+        progress(f"{name} ({i + 1} of {len(names)})")
+        result = CASES[name](case)
+        save_panels(result.panels, table.folder / f"{name}.png")
+        table.add(name, result.findings)
+        failed = sum(f.verdict == "FAILS" for f in result.findings)
+        hear(f"{name}: {f'{failed} past their bounds' if failed else 'holds'}")
 
 
 def print_table(table, names: list[str]) -> None:

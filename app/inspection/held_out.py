@@ -1,6 +1,7 @@
 """How far a scene's values are from photos that it was not trained on."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,9 +23,11 @@ HALF = 128  # alpha of a photo's pixel that shows the scene, as of a value that 
 
 
 def held_out_error(
-    renderer: "Renderer", measured: MeasuredScene, document: Document, capture: Capture
-) -> HeldOutError:
-    """Over all pixels of the held-out photos where both know a value.
+    renderer: "Renderer", measured: MeasuredScene, document: Document, capture: Capture,
+    one_by_one: Callable[[Collection, str], Iterable[Any]] = tracked,
+) -> HeldOutError:  # fmt: skip
+    """Over all pixels of the held-out photos where both know a value; one_by_one: goes through
+    them, the usual one with a bar.
 
     Photos are made smaller as in the training.  Raises BadFile, UsageError.
     """
@@ -50,7 +53,7 @@ def held_out_error(
     assert measured.stop.value_range is not None  # measured_scene has seen to it
     low, high = measured.stop.value_range
     errors = []
-    for photo in tracked(photos, "comparing with held-out photos"):
+    for photo in one_by_one(photos, "comparing with held-out photos"):
         loaded = read(photo, factor, "auto")
         (view,) = moved([loaded.view], (np.array(capture.origin) - document.origin).tolist())
         values = draw_values(renderer, measured, view)

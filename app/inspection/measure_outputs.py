@@ -1,5 +1,6 @@
 """What the command measure leaves: lengths in the file of marks, and reports."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,8 +61,10 @@ def with_lengths_of(
     return replace(file, lengths=tuple(lengths), metres_per_unit=scale.factor, scale_error=error)
 
 
-def keep_file(scene: Path, file: MarksFile, origin: np.ndarray) -> None:
-    """Writes it beside the scene.  Raises UsageError."""
+def keep_file(
+    scene: Path, file: MarksFile, origin: np.ndarray, hear: Callable[[str], object] = say
+) -> None:
+    """Writes it beside the scene; hear: told where.  Raises UsageError."""
     path, scale = marks_path(scene), file.metres_per_unit
     if is_bundled(path):
         raise UsageError(f"{scene.name} came with the program; copy it into a folder of yours.")
@@ -69,7 +72,7 @@ def keep_file(scene: Path, file: MarksFile, origin: np.ndarray) -> None:
         raise UsageError(f"the scale is {scale:g}, expected 1e-6 to 1e6; check --known.")
     write_marks_file(moved_marks(file, origin), path)
     more = f", scale {scale:.6g}" if scale != 1 else ""
-    say(f"{len(file.lengths)} lengths{more} kept in {full(path)}")
+    hear(f"{len(file.lengths)} lengths{more} kept in {full(path)}")
 
 
 def picture_of(renderer: "Renderer", document: "Document", view: View) -> np.ndarray:
@@ -82,9 +85,9 @@ def picture_of(renderer: "Renderer", document: "Document", view: View) -> np.nda
 
 def write_length_reports(
     paths: tuple[Path, ...], scene: Path, picture: np.ndarray, view: View, file: MarksFile,
-    unit: str, origin: np.ndarray, x: str,
+    unit: str, origin: np.ndarray, x: str, hear: Callable[[str], object] = say,
 ) -> None:  # fmt: skip
-    """All lengths of a file in one view, as HTML or PDF.  Raises UsageError."""
+    """All lengths of a file in one view, as HTML or PDF; hear: told where.  Raises UsageError."""
     from shapeshift.app.drawing import make_folder
 
     seen = SeenLengths(picture, view, length_words(file, unit), file.scale)
@@ -95,4 +98,4 @@ def write_length_reports(
     for path in paths:
         make_folder(path.parent)
         write_report(report, path)
-        say(f"written to {full(path)}")
+        hear(f"written to {full(path)}")

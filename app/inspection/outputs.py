@@ -1,6 +1,6 @@
 """What the command thermal prints and writes: tables, a picture, CSV."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -118,8 +118,10 @@ def three_pictures(inspected: InspectedView, scale: ColorScale) -> list[tuple[st
     return pictures
 
 
-def write_picture(path: Path, shown: Sequence[InspectedView], scale: ColorScale) -> None:
-    """The pictures of every view, a row each, as one PNG."""
+def write_picture(
+    path: Path, shown: Sequence[InspectedView], scale: ColorScale, hear: Callable[[str], object]
+) -> None:
+    """The pictures of every view, a row each, as one PNG; hear: told where it is."""
     from shapeshift.app.drawing import make_folder, save_png
 
     make_folder(path.parent)
@@ -130,11 +132,15 @@ def write_picture(path: Path, shown: Sequence[InspectedView], scale: ColorScale)
         parts = [part for picture in pictures for part in (gap, picture)][1:]
         rows.append(np.concatenate(parts, axis=1))
     save_png(stacked(rows), path)
-    say(f"written to {full(path)}")
+    hear(f"written to {full(path)}")
 
 
-def write_tables(path: Path, shown: Sequence[InspectedView], origin: np.ndarray) -> None:
-    """All readings as CSV, and the profile of every line, as the first view sees it, beside it."""
+def write_tables(
+    path: Path, shown: Sequence[InspectedView], origin: np.ndarray, hear: Callable[[str], object]
+) -> None:
+    """All readings as CSV, and the profile of every line, as the first view sees it, beside it;
+    hear: told where they are.
+    """
     from shapeshift.app.drawing import make_folder
 
     make_folder(path.parent)
@@ -144,7 +150,7 @@ def write_tables(path: Path, shown: Sequence[InspectedView], origin: np.ndarray)
             name = f"{path.stem}.{file_name(reading.mark.name)}.csv"
             text = profile_csv(reading, shown[0].values.unit, shown[0].values.digits)
             write_whole(path.with_name(name), text.encode())
-    say(f"written to {full(path)}")
+    hear(f"written to {full(path)}")
 
 
 def stacked(rows: Sequence[np.ndarray]) -> np.ndarray:

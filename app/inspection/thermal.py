@@ -1,8 +1,9 @@
 """launch.py thermal: values of a scene at marks, alarms over its photo, tables and reports."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import ReadingOptions
@@ -10,18 +11,22 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from shapeshift.app.document import Document
     from shapeshift.app.inspection.draw_values import MeasuredScene
     from shapeshift.app.inspection.inspect_view import InspectedView
     from shapeshift.app.inspection.pictures import ColorScale
-    from shapeshift.scene.inspection.marks import Isotherm
+    from shapeshift.renderer.renderer import Renderer
+    from shapeshift.scene.captures.capture import Capture
     from shapeshift.scene.inspection.marks_file import MarksFile
     from shapeshift.scene.pose import View
 
 USUAL_SIZE = (640, 480)
 MOST_VIEWS = 50
+OF_OPENING = frozenset(  # options that a scene which is open does not take
+    {"scene", "camera", "size", "drawing", "context", "fov_y",
+     *(field.name for field in fields(ReadingOptions))}
+)  # fmt: skip
+OneByOne = Callable[[Collection, str], Iterable[Any]]  # through work that has a name
 
 
 @dataclass(frozen=True)
@@ -141,16 +146,22 @@ class Options(ReadingOptions):
     """Where the OpenGL context without a window comes from."""
 
 
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What was measured in some views."""
+
+    views: "tuple[InspectedView, ...]"  # with their readings
+    file: "MarksFile"  # marks, differences, isotherms, error: in metres of the document
+    measured: "MeasuredScene"
+    scale: "ColorScale"  # of its pictures
+
+
 def run(options: Options) -> int:
     from shapeshift.app.camera_files import named_cameras
     from shapeshift.app.document import open_document
     from shapeshift.app.drawing import open_renderer, parse_size
-    from shapeshift.app.inspection.draw_values import ValueChoice, measured_scene
-    from shapeshift.app.inspection.emission_options import choose_emission, with_emissivities
-    from shapeshift.app.inspection.held_out import held_out_error
-    from shapeshift.app.inspection.inspect_view import inspect_view, with_readings
-    from shapeshift.app.inspection.mark_options import with_remarks
-    from shapeshift.app.inspection.outputs import print_readings, write_picture, write_tables
+    from shapeshift.app.inspection.mark_options import open_marks
+    from shapeshift.app.inspection.outputs import print_readings
     from shapeshift.app.opening import open_capture
     from shapeshift.app.progress import tracked
 
@@ -161,36 +172,80 @@ def run(options: Options) -> int:
         cameras = named_cameras(options.camera, options.scene, options, size)
     path, file = open_marks(options)
     document = open_document(options.scene, options)
+    subject = subject_of(options, file, document)
+    capture = open_capture(options.capture, options.memory or None) if options.capture else None
+    views = choose_views(options, document, cameras, size)
+    with open_renderer(options.context, options.drawing) as (renderer, _):
+        found = inspect(renderer, options, subject, views, capture, tracked)
+    print_readings(found.views, found.file, found.measured, document.origin)
+    write_all(options, found, path, document, say)
+    return 0
+
+
+@dataclass(frozen=True, eq=False)
+class InspectionSubject:
+    """What is inspected, chosen before anything is drawn."""
+
+    document: "Document"
+    measured: "MeasuredScene"
+    file: "MarksFile"  # as it lies there, with the emission that was chosen
+    emissivities: dict[str, float]  # of marks, by name
+    photo: str  # the stop that is shown as the photo; "": none
+
+
+def subject_of(options: Options, file: "MarksFile", document: "Document") -> InspectionSubject:
+    """What the options say of a document and a file of marks.  Raises UsageError, BadFile."""
+    from shapeshift.app.inspection.draw_values import ValueChoice, measured_scene
+    from shapeshift.app.inspection.emission_options import choose_emission
+
     choice = ValueChoice(options.stop, options.range, options.unit, options.colors)
     measured = measured_scene(document, choice)
     emission, own = choose_emission(options, file, measured.stop.temperature_unit)
-    file = replace(file, emission=emission)
-    capture = open_capture(options.capture, options.memory or None) if options.capture else None
-    views = choose_views(options, document, cameras, size)
     photo = photo_stop(options, document, measured)
-    with open_renderer(options.context, options.drawing) as (renderer, _):
-        renderer.settings = replace(renderer.settings, background=document.background)
-        shown = [
-            inspect_view(renderer, document, measured, photo, view, emission)
-            for view in tracked(views, "measuring")
-        ]
-        file = with_emissivities(with_new_marks(options, file, shown[0], document), own)
-        file = with_remarks(file, options.remark, options.mark_photo)
-        if capture is not None:
-            error = held_out_error(renderer, measured, document, capture)
-            file = replace(file, held_out=error)
+    return InspectionSubject(document, measured, replace(file, emission=emission), own, photo)
+
+
+def inspect(
+    renderer: "Renderer", options: Options, subject: InspectionSubject, views: "Sequence[View]",
+    capture: "Capture | None", one_by_one: OneByOne,
+) -> Inspection:  # fmt: skip
+    """Draws the views and reads them at all marks.  Raises UsageError, BadFile, one sentence."""
+    from shapeshift.app.inspection.emission_options import with_emissivities
+    from shapeshift.app.inspection.held_out import held_out_error
+    from shapeshift.app.inspection.inspect_view import inspect_view, with_readings
+    from shapeshift.app.inspection.mark_options import with_new_marks, with_remarks
+
+    document, measured, file = subject.document, subject.measured, subject.file
+    renderer.settings = replace(renderer.settings, background=document.background)
+    shown = [
+        inspect_view(renderer, document, measured, subject.photo, view, file.emission)
+        for view in one_by_one(views, "measuring")
+    ]
+    new = with_new_marks(options, file, shown[0], document)
+    file = with_emissivities(new, subject.emissivities)
+    file = with_remarks(file, options.remark, options.mark_photo)
+    if capture is not None:
+        error = held_out_error(renderer, measured, document, capture, one_by_one)
+        file = replace(file, held_out=error)
     shown = [with_readings(each, file) for each in shown]
-    scale = choose_scale(options, measured, shown)
-    print_readings(shown, file, measured, document.origin)
+    return Inspection(tuple(shown), file, measured, choose_scale(options, measured, shown))
+
+
+def write_all(
+    options: Options, found: Inspection, marks: Path, document: "Document",
+    hear: Callable[[str], object],
+) -> None:  # fmt: skip
+    """The files that the options name; hear: told where each is.  Raises UsageError."""
+    from shapeshift.app.inspection.outputs import write_picture, write_tables
+
     if options.out is not None:
-        write_picture(options.out, shown, scale)
+        write_picture(options.out, found.views, found.scale, hear)
     if options.csv is not None:
-        write_tables(options.csv, shown, document.origin)
+        write_tables(options.csv, found.views, document.origin, hear)
     if options.report:
-        write_reports(options, measured, shown, file, scale, document.origin)
+        write_reports(options, found, document, hear)
     if options.save:
-        keep_marks(path, file, document.origin)
-    return 0
+        keep_marks(marks, found.file, document, hear)
 
 
 def check_outputs(options: Options) -> None:
@@ -222,29 +277,6 @@ def check_outputs(options: Options) -> None:
         raise UsageError(f"--view names {len(options.view)} cameras, expected 1 to {MOST_VIEWS}.")
 
 
-def open_marks(options: Options) -> "tuple[Path, MarksFile]":
-    """Where the marks lie, and what is there, without those that --forget names.
-
-    Raises BadFile, UsageError.
-    """
-    from shapeshift.app.errors import UsageError
-    from shapeshift.scene.inspection.marks_file import MarksFile, marks_path, read_marks_file
-
-    path = options.marks or marks_path(options.scene)
-    if options.marks and not path.exists() and not options.save:
-        raise UsageError(f"{path} does not exist; name a file of marks, or add --save to begin it.")
-    file = read_marks_file(path) if path.exists() else MarksFile()
-    names = [mark.name for mark in file.marks]
-    for name in options.forget:
-        if name not in names:
-            raise UsageError(
-                f"--forget: no mark is called '{name}'; there are {', '.join(names) or 'none'}."
-            )
-    kept = tuple(mark for mark in file.marks if mark.name not in options.forget)
-    pairs = tuple(pair for pair in file.differences if not set(pair) & set(options.forget))
-    return path, replace(file, marks=kept, differences=pairs)
-
-
 def choose_views(options: Options, document: "Document", cameras, size) -> "list[View]":
     """The views that --view names of --camera.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
@@ -253,7 +285,13 @@ def choose_views(options: Options, document: "Document", cameras, size) -> "list
         if options.view != (0,):
             raise UsageError("--view chooses cameras of a file; name one: --camera FILE.")
         return [document.view(size or USUAL_SIZE)]
-    views = cameras.views if document.file else document.sees(cameras).views
+    return picked(options, cameras.views if document.file else document.sees(cameras).views)
+
+
+def picked(options: Options, views: "Sequence[View]") -> "list[View]":
+    """Those of a file's cameras that --view names.  Raises UsageError."""
+    from shapeshift.app.errors import UsageError
+
     for number in options.view:
         if not 0 <= number < len(views):
             raise UsageError(f"--view is {number}; the file has cameras 0 to {len(views) - 1}.")
@@ -275,61 +313,6 @@ def photo_stop(options: Options, document: "Document", measured: "MeasuredScene"
             raise UsageError(f"--photo is '{options.photo}'; the scene has {names}.")
         return named[0]
     return first_photo(document, measured)
-
-
-def with_new_marks(
-    options: Options, file: "MarksFile", inspected: "InspectedView", document: "Document"
-) -> "MarksFile":
-    """The file's marks in the scene's own metres, with those of the options; one of the same name
-    is replaced.  Raises UsageError.
-    """
-    from shapeshift.app.errors import UsageError
-    from shapeshift.app.inspection.mark_texts import make_mark
-    from shapeshift.scene.inspection.marks import KINDS, MOST_MARKS
-    from shapeshift.scene.inspection.marks_file import moved_marks
-
-    marks = {mark.name: mark for mark in moved_marks(file, -document.origin).marks}
-    bounds = document.bounds()
-    for kind in KINDS:
-        for text in getattr(options, kind):
-            mark = make_mark(kind, text, marks, inspected.values, document.origin, bounds)
-            marks[mark.name] = mark
-    if len(marks) > MOST_MARKS:
-        raise UsageError(f"{len(marks):,} marks are too many; at most {MOST_MARKS:,} fit one file.")
-    pairs = list(file.differences)
-    for text in options.difference:
-        first, _, second = (word.strip() for word in text.partition(","))
-        for name in (first, second):
-            if name not in marks:
-                known = ", ".join(marks) or "none"
-                raise UsageError(
-                    f"--difference is '{text}': no mark is called '{name}'; there are {known}."
-                )
-        pairs.append((first, second))
-    isotherms = tuple(dict.fromkeys((*file.isotherms, *choose_isotherms(options))))
-    pairs = list(dict.fromkeys(pairs))
-    return replace(file, marks=tuple(marks.values()), differences=tuple(pairs), isotherms=isotherms)
-
-
-def choose_isotherms(options: Options) -> "list[Isotherm]":
-    """Those of the options.  Raises UsageError."""
-    from shapeshift.app.errors import UsageError
-    from shapeshift.scene.inspection.marks import Bound, Isotherm
-
-    asked: dict[Bound, dict[str, float]] = {}
-    if options.above is not None:
-        asked["above"] = {"low": options.above}
-    if options.below is not None:
-        asked["below"] = {"high": options.below}
-    if options.between is not None:
-        asked["between"] = {"low": options.between[0], "high": options.between[1]}
-    found = []
-    for kind, ends in asked.items():
-        try:
-            found.append(Isotherm(kind, **ends))
-        except ValueError as error:
-            raise UsageError(f"--{kind}: {error}") from None
-    return found
 
 
 def choose_scale(
@@ -367,31 +350,31 @@ def refuse_unknown_palette(name: str) -> None:
 
 
 def write_reports(
-    options: Options,
-    measured: "MeasuredScene",
-    shown: "list[InspectedView]",
-    file: "MarksFile",
-    scale: "ColorScale",
-    origin: "np.ndarray",
+    options: Options, found: Inspection, document: "Document", hear: Callable[[str], object]
 ) -> None:
     """--report, each with the cameras of its views."""
     from shapeshift.app.drawing import make_folder
     from shapeshift.app.inspection.report import ReportHead, report_of, usual_title
     from shapeshift.app.inspection.report_pdf import write_report
 
-    title = options.title or usual_title(measured.stop)
+    stop = found.measured.stop
+    title = options.title or usual_title(stop)
     head = ReportHead(title, options.date, options.client, options.inspector, options.note)
-    report = report_of(head, options.scene, measured.stop, shown, file, scale, origin)
+    report = report_of(
+        head, options.scene, stop, found.views, found.file, found.scale, document.origin
+    )
     for path in options.report:
         make_folder(path.parent)
         write_report(report, path)
-        say(f"written to {full(path)}")
+        hear(f"written to {full(path)}")
 
 
-def keep_marks(path: Path, file: "MarksFile", origin: "np.ndarray") -> None:
+def keep_marks(
+    path: Path, file: "MarksFile", document: "Document", hear: Callable[[str], object]
+) -> None:
     """Writes the file of marks, in the world of the scene's own file."""
     from shapeshift.scene.inspection.marks_file import moved_marks, write_marks_file
 
-    write_marks_file(moved_marks(file, origin), path)
+    write_marks_file(moved_marks(file, document.origin), path)
     count = len(file.marks)
-    say(f"{count} mark{'s' * (count != 1)} kept in {full(path)}")
+    hear(f"{count} mark{'s' * (count != 1)} kept in {full(path)}")

@@ -1,6 +1,6 @@
 """launch.py lod: levels of detail of a scene at one control value, as streamed SOG."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,8 +12,12 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
+    from shapeshift.app.document import Document
+    from shapeshift.app.streaming.package_levels import MadeLevels
+    from shapeshift.runtime_models.model import Model
     from shapeshift.runtime_models.splats.plain_splats import PlainSplats
     from shapeshift.runtime_models.splats.sog.write_streamed import StreamedSizes
+    from shapeshift.scene.scene import SceneObject
 
 LEAST_LEAF = 64  # splats: of smaller ones the tree would take more bytes than they
 MOST_LEAF = 1 << 19  # a leaf lies in one file
@@ -53,76 +57,85 @@ class Options(ClusterOptions, ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.commands.exported import check_output
-    from shapeshift.app.errors import UsageError
+    from shapeshift.app.document import open_document
     from shapeshift.app.streaming.lod_files import write_several
-    from shapeshift.app.training.saving import check_writable
+
+    check_numbers(options)
+    if options.more or options.cluster != NONE:
+        return write_several(options)
+    if options.out.suffix.lower() == PACKAGE_LEVELS:
+        return write_package_levels(options)
+    check_folder(options, [options.scene])
+    with progress_after(PATIENCE_S) as progress:
+        document = open_document(options.scene, options)
+        splats, sizes = stream(visible_objects(document, options), document, options, progress)
+    for finding in splats.findings:
+        say(sentence(finding))
+    counts = ", ".join(f"{count:,}" for count in sizes.levels)
+    say(
+        f"{full(options.out)}: {sizes.leaves:,} leaves, {len(sizes.levels)} levels of {counts} "
+        f"splats, {bytes_of(options.out):,} bytes."
+    )
+    return 0
+
+
+def check_numbers(options: Options) -> None:
+    """Raises UsageError."""
+    from shapeshift.app.errors import UsageError
 
     if not LEAST_LEAF <= options.leaf <= MOST_LEAF:
         raise UsageError(f"--leaf is {options.leaf}, expected {LEAST_LEAF} to {MOST_LEAF}.")
     if not 0 <= options.sh_degree <= 3:
         raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
-    if options.more or options.cluster != NONE:
-        return write_several(options)
-    if options.out.suffix.lower() == PACKAGE_LEVELS:
-        return write_package_levels(options)
+
+
+def check_folder(options: Options, inputs: list[Path], said: str = "--") -> None:
+    """Raises UsageError where streamed SOG cannot be written; said: before names, where typed."""
+    from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.saving import check_writable
+
     if options.out.suffix:
         raise UsageError(
             f"--out {options.out} is no folder's name; leave its ending out, or name one with "
             f"{PACKAGE_LEVELS} for a package."
         )
-    check_output(options.out, [options.scene], options.overwrite)
+    check_output(options.out, inputs, options.overwrite, said)
     check_writable(options.out)
-    with progress_after(PATIENCE_S) as progress:
-        splats, baked = bake_scene(options, progress)
-        for finding in splats.findings:
-            say(sentence(finding))
 
-        def report(part: float) -> None:
-            progress(
-                f"merging and writing {len(splats.means):,} splats", baked + (1 - baked) * part
-            )
 
-        sizes = write_folder(splats, options, report)
-    size = sum(file.stat().st_size for file in options.out.rglob("*") if file.is_file())
-    counts = ", ".join(f"{count:,}" for count in sizes.levels)
-    say(
-        f"{full(options.out)}: {sizes.leaves:,} leaves, {len(sizes.levels)} levels of {counts} "
-        f"splats, {size:,} bytes."
-    )
-    return 0
+def stream(
+    objects: "Sequence[SceneObject]", document: "Document", options: Options,
+    progress: Callable[[str, float], None],
+) -> "tuple[PlainSplats, StreamedSizes]":  # fmt: skip
+    """Writes these objects of a document as streamed SOG; all of their splats, with what was found
+    while they were baked, and the sizes.  Raises BadFile, UsageError.
+    """
+    splats, baked = bake_scene(objects, document, options, progress)
+
+    def report(part: float) -> None:
+        progress(f"merging and writing {len(splats.means):,} splats", baked + (1 - baked) * part)
+
+    return splats, write_folder(splats, options, report)
+
+
+def bytes_of(folder: Path) -> int:
+    """Of all files in it."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
 
 
 def write_package_levels(options: Options) -> int:
     """The same package with coarser levels of anchors.  Raises BadFile and UsageError."""
-    import math
     from time import process_time
 
-    from shapeshift.app.commands.exported import check_output
-    from shapeshift.app.errors import UsageError
     from shapeshift.app.opening import open_model
     from shapeshift.app.streaming.level_errors import WHERE
-    from shapeshift.app.streaming.package_levels import (
-        make_levels,
-        refuse_foreign_folder,
-        refuse_other,
-        write_made,
-    )
-    from shapeshift.app.training.saving import check_writable
 
-    if not 0 <= options.distill < math.inf:
-        raise UsageError(f"--distill is {options.distill}, expected processor seconds, 0 or more.")
-    if options.x:
-        raise UsageError("--x is of streamed SOG; levels of a package follow x, leave it out.")
-    check_output(options.out, [options.scene], options.overwrite)
-    refuse_foreign_folder(options.out)
-    check_writable(options.out)
+    check_package_levels(options)
     start = process_time()
-    model = refuse_other(open_model(options.scene, options), options.scene)
-    check_room(options.scene, options.out)
+    model = open_model(options.scene, options)
     with progress_after(PATIENCE_S) as progress:
-        made = make_levels(model, options.distill, progress)
-    size = write_made(made, options.scene, options.out)
+        made, size = package_levels(model, options, progress)
     for level in made.levels:
         errors, steps = level.errors, level.steps
         db = ", ".join(f"{value:.1f} dB {WHERE[at]}" for at, value in errors.db.items())
@@ -142,6 +155,36 @@ def write_package_levels(options: Options) -> int:
     return 0
 
 
+def check_package_levels(options: Options, said: str = "--") -> None:
+    """Raises UsageError before the package is read; said: before names, where they are typed."""
+    import math
+
+    from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.streaming.package_levels import refuse_foreign_folder
+    from shapeshift.app.training.saving import check_writable
+
+    if not 0 <= options.distill < math.inf:
+        raise UsageError(f"--distill is {options.distill}, expected processor seconds, 0 or more.")
+    if options.x:
+        raise UsageError("--x is of streamed SOG; levels of a package follow x, leave it out.")
+    check_output(options.out, [options.scene], options.overwrite, said)
+    refuse_foreign_folder(options.out)
+    check_writable(options.out)
+
+
+def package_levels(
+    model: "Model", options: Options, progress: Callable[[str, float], None]
+) -> "tuple[MadeLevels, int]":
+    """Makes and writes them: what they are, and the bytes of all.  Raises BadFile, UsageError."""
+    from shapeshift.app.streaming.package_levels import make_levels, refuse_other, write_made
+
+    package = refuse_other(model, options.scene)
+    check_room(options.scene, options.out)
+    made = make_levels(package, options.distill, progress)
+    return made, write_made(made, options.scene, options.out)
+
+
 def check_room(package: Path, out: Path) -> None:
     """Raises UsageError where not even the package itself would fit: now, not after minutes."""
     import shutil
@@ -159,26 +202,13 @@ def check_room(package: Path, out: Path) -> None:
         )
 
 
-def bake_scene(
-    options: Options, progress: Callable[[str, float], None]
-) -> "tuple[PlainSplats, float]":
-    """All that is visible as plain splats, where it stands, and how much of the time that was.
-
-    Raises BadFile and UsageError.
-    """
+def visible_objects(document: "Document", options: Options) -> "list[SceneObject]":
+    """What of a document is written, each object at its x.  Raises UsageError."""
     from dataclasses import replace
 
-    import numpy as np
-
     from shapeshift.app.commands.export import choose_x
-    from shapeshift.app.commands.exported import ExportLook, Part, bake_part
-    from shapeshift.app.document import open_document
     from shapeshift.app.errors import UsageError
-    from shapeshift.runtime_models.model import SplatLayers
-    from shapeshift.runtime_models.shapes import three
-    from shapeshift.runtime_models.splats.write_plain import merged
 
-    document = open_document(options.scene, options)
     objects = [obj for obj in document.scene.objects if obj.visible]
     if not objects:
         raise UsageError(f"{options.scene}: all objects are hidden; show one of them.")
@@ -188,6 +218,26 @@ def bake_scene(
         objects = [replace(obj, name=name, x=choose_x(options.x, obj.model))]
     elif options.x:
         objects = [obj for obj in document.placed(options.x).scene.objects if obj.visible]
+    return objects
+
+
+def bake_scene(
+    objects: "Sequence[SceneObject]", document: "Document", options: Options,
+    progress: Callable[[str, float], None],
+) -> "tuple[PlainSplats, float]":  # fmt: skip
+    """The objects as plain splats, where they stand, and how much of the time that was.
+
+    Raises BadFile and UsageError.
+    """
+    from dataclasses import replace
+
+    import numpy as np
+
+    from shapeshift.app.commands.exported import ExportLook, Part, bake_part
+    from shapeshift.runtime_models.model import SplatLayers
+    from shapeshift.runtime_models.shapes import three
+    from shapeshift.runtime_models.splats.write_plain import merged
+
     parts = []
     share = BAKED if all(isinstance(obj.model, SplatLayers) for obj in objects) else FITTED
     for number, obj in enumerate(objects):

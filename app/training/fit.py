@@ -15,6 +15,9 @@ from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings, suited
 
 if TYPE_CHECKING:
+    from shapeshift.rasterizer.device import Device
+    from shapeshift.runtime_models.model import AnchorModel
+    from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.fit.ablation import Ablation, Trial
     from shapeshift.training.fit.fit import FitReport, ReportProgress, TrainSeeds
 
@@ -80,14 +83,12 @@ def run(options: Options) -> int:
         say_of_clock,
     )
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.runtime_models.package.write_package import write_package
-    from shapeshift.runtime_models.stops.formula_stop import with_placed_formulas
-    from shapeshift.training.calibration.extrinsics import with_extrinsics
-    from shapeshift.training.fit.fit import Fit
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
 
     if options.only is not None:
         return run_trial(options)
     refuse_options(options)
+    refuse_foreign(options.out)
     settings = settings_of(options.asked | budget(options.iterations, options.seconds))
     longer = options.final_iterations, options.final_seconds
     last = (
@@ -102,19 +103,11 @@ def run(options: Options) -> int:
             settings = calibrated(device, capture, settings, options.calibrate)
         else:
             settings = calibrated_once(device, capture, settings, options)
-        capture = with_extrinsics(capture, settings.rig)
     say_of_clock(options)
     with trainings(options) as (show_progress, train_seeds):
-        fit = Fit(
-            device, capture, settings, options.tolerance_db, options.seeds, show_progress,
-            last=last, train_seeds=train_seeds,
-        )  # fmt: skip
-        need = fit.run()
-    result, model = need.as_dict(), need.fitted.models[0]
-    report = {**model.provenance, "need": without_times(result)}
-    noted = with_placed_formulas(replace(model, provenance=report), capture.formulas)
-    noted = with_pace(noted)
-    size = write_package(noted, options.out, need.fitted.storage)
+        need = searched(options, device, capture, (settings, last), show_progress, train_seeds)
+    result = need.as_dict()
+    size = write_fitted(with_pace(noted_model(need, capture)), need, options.out)
     print_report(need)
     say(f"{full(options.out)}: {size:,} bytes, {WRITTEN}")
     if options.json == Path("-"):
@@ -123,6 +116,44 @@ def run(options: Options) -> int:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")
     return 0
+
+
+def searched(
+    options: Options, device: "Device", capture: "Capture",
+    settings: "tuple[TrainSettings, TrainSettings | None]", report: "ReportProgress",
+    train_seeds: "TrainSeeds | None" = None,
+) -> "FitReport":  # fmt: skip
+    """The smallest model of a capture, and how it was found.
+
+    settings: of the largest, with the cameras' offset where one is known, and of the last run,
+    None: without one.  train_seeds: who trains; None: this process.  Raises BadFile.
+    """
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
+    from shapeshift.training.fit.fit import Fit
+
+    largest, last = settings
+    if options.calibrate is not None:
+        capture = with_extrinsics(capture, largest.rig)
+    return Fit(
+        device, capture, largest, options.tolerance_db, options.seeds, report, last=last,
+        train_seeds=train_seeds,
+    ).run()  # fmt: skip
+
+
+def noted_model(need: "FitReport", capture: "Capture") -> "AnchorModel":
+    """The fitted model of the first seed with the report in it, and the stops by formula."""
+    from shapeshift.runtime_models.stops.formula_stop import with_placed_formulas
+
+    model = need.fitted.models[0]
+    report = {**model.provenance, "need": without_times(need.as_dict())}
+    return with_placed_formulas(replace(model, provenance=report), capture.formulas)
+
+
+def write_fitted(model: "AnchorModel", need: "FitReport", out: Path) -> int:
+    """Its package, as small as the report found it may be; its bytes."""
+    from shapeshift.runtime_models.package.write_package import write_package
+
+    return write_package(model, out, need.fitted.storage)
 
 
 @contextmanager
@@ -146,11 +177,10 @@ def trainings(options: Options) -> "Iterator[tuple[ReportProgress, TrainSeeds | 
 
 
 def refuse_options(options: Options) -> None:
-    """Raises UsageError, BadFile for what cannot be done: now, not after the trials."""
+    """Raises UsageError for what cannot be done: now, not after the trials."""
     from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.errors import UsageError
     from shapeshift.app.training.trials.run_trials import check_places
-    from shapeshift.runtime_models.package.write_package import refuse_foreign
 
     if options.resume:
         raise UsageError("--resume goes on with one training; add --only, or leave it out.")
@@ -161,7 +191,6 @@ def refuse_options(options: Options) -> None:
     check_cluster(options)
     if options.cluster != NONE:
         check_places(options)
-    refuse_foreign(options.out)
 
 
 def budget(iterations: int | None, seconds: float | None) -> Asked:

@@ -14,4 +14,5 @@ Camera = str | PathLike[str] | View | CameraList | Sequence[View]
 Size = tuple[int, int]  # width, height in pixels
 Output = Literal["picture", "depth", "normal", "coverage"]
 Progress = Callable[[str, float], None]  # (what is being done, part done 0..1)
+Kind = Literal["cpu", "gpu"]  # of an OpenCL device
 DEFAULT_SIZE = (640, 360)

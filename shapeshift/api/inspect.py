@@ -1,16 +1,16 @@
 """What a scene measures: degrees, depths, marks, lengths; from its values, never from colours."""
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import fields
+from typing import Any, get_origin, get_type_hints
 
 import numpy as np
 
 from shapeshift.api.arguments import Camera, PathText, Progress, Size
 from shapeshift.api.opened import OpenedScene
-from shapeshift.api.read import opened
-from shapeshift.api.render import Context, Drawing, shared_renderer
+from shapeshift.api.read import in_words_of_python
+from shapeshift.api.render import shared_renderer
 from shapeshift.api.views import choose_views
-from shapeshift.app.change.find_change import ChangeChoice, SceneChange
 from shapeshift.app.errors import UsageError
 from shapeshift.app.inspection.draw_values import (
     MeasuredScene,
@@ -20,14 +20,25 @@ from shapeshift.app.inspection.draw_values import (
     measured_scene,
 )
 from shapeshift.app.inspection.facing import value_facing
+from shapeshift.app.inspection.measure_outputs import (
+    check_reports,
+    keep_file,
+    kept_lengths,
+    picture_of,
+    with_lengths_of,
+    write_length_reports,
+)
+from shapeshift.app.inspection.thermal import USUAL_SIZE, Inspection
 from shapeshift.app.paths import plain
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.stop_weights import control_text
 from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.lengths import Measurement, Point, Scale
 from shapeshift.scene.inspection.lengths import measure as measured_length
 from shapeshift.scene.inspection.marks import Mark, MarkReading, read_mark
 from shapeshift.scene.inspection.marks_file import (
+    MarksFile,
     kept_scale,
     marks_path,
     moved_marks,
@@ -35,9 +46,6 @@ from shapeshift.scene.inspection.marks_file import (
 )
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import View
-
-if TYPE_CHECKING:
-    from shapeshift.renderer.renderer import Renderer as FrameRenderer
 
 BLACK = (0.0, 0.0, 0.0)
 AirNumbers = Sequence[float]  # metres, per cent of humidity, °C
@@ -150,6 +158,42 @@ class InspectedScene(OpenedScene):
             picture = picture.corrected(emission)
         return tuple(read_mark(mark, picture) for mark in marks)
 
+    def thermal(
+        self,
+        camera: Camera = "front",
+        size: Size | None = None,
+        *,
+        out: PathText | None = None,
+        csv: PathText | None = None,
+        report: Sequence[PathText] = (),
+        marks: PathText | None = None,
+        capture: PathText | None = None,
+        save: bool = False,
+        overwrite: bool = False,
+        progress: Progress | None = None,
+        **how: Any,
+    ) -> Inspection:
+        """What `shapeshift thermal` measures and writes (docs/thermal.md): `views`, each with its
+        readings, differences and isotherms, `file`, the marks in metres of this scene, `scale`.
+
+        out: a .png of photo, heat and alarms.  csv: a table of all readings.  report: .html, .pdf.
+        marks: a file of them, None: NAME.marks.json beside the scene; save keeps new ones there.
+        capture: photos whose held-out ones give the error.  how: the command's other options:
+        spot, box, circle, line (texts or sequences of them), difference, above, below, between,
+        emissivity, reflected, air, level, span, auto, palette, stop, range, unit, view, title ...
+        progress: called with (what, part 0..1).  Raises UsageError, BadFile.
+
+            found = scene.thermal(spot="mid=240,180", above=60.0, out="alarms.png")
+            print(found.views[0].readings[0].mean, found.views[0].isotherms[0].share)
+        """
+        size = USUAL_SIZE if size is None and camera == "front" else size
+        files = {"out": out, "csv": csv, "marks": marks, "capture": capture}
+        how |= {name: plain(path) for name, path in files.items() if path is not None}
+        how |= {"report": tuple(map(plain, report)), "save": save, "overwrite": overwrite}
+        views = choose_views(self, camera, 1, size)
+        with in_words_of_python():
+            return _inspection(self, views, how, progress or silent)
+
     def measure(
         self,
         kind: str,
@@ -157,30 +201,104 @@ class InspectedScene(OpenedScene):
         camera: Camera = "front",
         size: Size | None = None,
         known: tuple[Place, Place, float] | None = None,
+        keep: bool = False,
+        report: Sequence[PathText] = (),
+        overwrite: bool = False,
     ) -> Measurement:
         """A distance, polyline, angle or area between places, with its uncertainty.
 
         places: (column, row) of a view, on the surface at the scene's x, or (x, y, z) metres in the
         world, which count as exact.  known: two places and the metres between them, from which the
         scale comes; None: the scale that NAME.marks.json beside the scene has, if it has one.
+        keep: in that file, scale and length.  report: .html, .pdf of the view with all lengths.
         Raises UsageError, BadFile.
 
             wide = scene.measure("distance", (120, 200), (420, 210))
             print(wide.value, wide.uncertainty, wide.unit)
         """
+        paths = tuple(map(plain, report))
+        if (keep or paths) and self.path is None:
+            raise UsageError("this scene lies in no file, so no lengths lie beside it.")
+        with in_words_of_python():
+            check_reports(paths, overwrite)
         picture = self._depths(camera, size)
         try:
             scale = kept_scale(self.path) if self.path is not None else Scale()
             if known is not None:
                 scale = Scale.of_known([_point(picture, p) for p in known[:2]], float(known[2]))
-            return measured_length(kind, [_point(picture, place) for place in places], scale)
+            points = [_point(picture, place) for place in places]
+            found = measured_length(kind, points, scale)
         except ValueError as error:
             raise UsageError(str(error)) from None
+        if self.path is not None and (keep or paths):
+            file = with_lengths_of(kept_lengths(self.path, self.origin), [(kind, points)], scale)
+            view = choose_views(self, camera, 1, size)[0]
+            if paths:
+                with shared_renderer("auto", "auto", RenderSettings(), BLACK) as renderer:
+                    drawn = renderer.inspect(lambda frames: picture_of(frames, self.subject, view))
+                x = "" if self.x is None else control_text(self.x)
+                how = (self.path, drawn, view, file, "m", self.origin, x)
+                write_length_reports(paths, *how, silent)
+            if keep:
+                with in_words_of_python():
+                    keep_file(self.path, file, self.origin, silent)
+        return found
 
     def _depths(self, camera: Camera, size: Size | None) -> ValuePicture:
         view = choose_views(self, camera, 1, size)[0]
         with shared_renderer("auto", "auto", RenderSettings(), BLACK) as renderer:
             return renderer.inspect(lambda frames: depth_picture(frames, self.drawn, view))
+
+
+def _inspection(
+    scene: OpenedScene, views: list[View], how: dict[str, Any], progress: Progress
+) -> Inspection:
+    """What `thermal` of a scene gives; how: options of the command."""
+    from shapeshift.app.inspection.mark_options import open_marks
+    from shapeshift.app.inspection.thermal import (
+        OF_OPENING,
+        Options,
+        check_outputs,
+        inspect,
+        picked,
+        subject_of,
+        write_all,
+    )
+    from shapeshift.scene.captures.read_capture import read_capture
+
+    known = {each.name for each in fields(Options)} - OF_OPENING
+    for name in how:
+        if name not in known:
+            raise UsageError(f"there is no option '{name}'; there are {', '.join(sorted(known))}.")
+    alone = {n for n, word in get_type_hints(Options).items() if get_origin(word) is tuple}
+    several = {
+        name: (word,) if isinstance(word, str | int) else tuple(word)
+        for name, word in how.items()
+        if name in alone
+    }
+    if how.get("taken_as") is not None:
+        how = how | {"taken_as": plain(how["taken_as"])}
+    options = Options(scene.path or plain("scene"), **(how | several))
+    check_outputs(options)
+    if scene.path is None and options.marks is None and options.save:
+        raise UsageError("this scene lies in no file; name a file of marks: marks=.")
+    at_all = scene.path is not None or options.marks is not None
+    path, file = open_marks(options) if at_all else (options.scene, MarksFile())
+    subject = subject_of(options, file, scene.subject)
+    photos = None if options.capture is None else read_capture(options.capture)
+
+    def one_by_one(work: Collection, what: str) -> Iterator[Any]:
+        for number, each in enumerate(work):
+            progress(what, number / len(work))
+            yield each
+
+    with shared_renderer("auto", "auto", RenderSettings(), BLACK) as renderer:
+        seen = picked(options, views)
+        found = renderer.inspect(
+            lambda frames: inspect(frames, options, subject, seen, photos, one_by_one)
+        )
+    write_all(options, found, path, scene.subject, silent)
+    return found
 
 
 def _drawn(measured: MeasuredScene, view: View) -> ValuePicture:
@@ -218,65 +336,5 @@ def _point(picture: ValuePicture, place: Place) -> Point:
     return picture.picked((numbers[0], numbers[1]))
 
 
-def silent(what: str, part: float) -> None:
+def silent(*said: object) -> None:
     """Nobody listens."""
-
-
-def change(
-    before: PathText | OpenedScene,
-    after: PathText | OpenedScene,
-    *,
-    degrees: float | None = None,
-    millimetres: float = 0.0,
-    stop: str = "",
-    values: str = "",
-    value_range: tuple[float, float] | None = None,
-    cameras: Camera | None = None,
-    size: Size = (320, 240),
-    out: PathText | None = None,
-    overwrite: bool = False,
-    drawing: Drawing = "auto",
-    context: Context = "auto",
-    progress: Progress | None = None,
-) -> SceneChange:
-    """Where an earlier and a later scene of one place differ: `places`, the largest first, each
-    with its kind (moved, appeared, vanished, hotter, colder, recoloured), centre and box in metres
-    of `before`, area_m2, amount and unit; and `registration`, how their worlds fit together.
-
-    degrees, millimetres: from where on values and shapes count; None is 5 of heat, of others a
-    twentieth of their range; 0 mm is a thirty-second of the
-    scene's radius.  stop: whose colours and shapes are compared; "": the first that shows no
-    values.  values: the stop whose values are; "": the first thermal one, else the first of others.
-    value_range: of such stops that do not say it.  cameras: views of `before`; None is all
-    around.  out: a folder, as the command writes it.  Raises UsageError, BadFile where the scenes
-    do not fit together.
-
-        for place in ss.change("march.shift", "june.shift").places:
-            print(place.kind, place.centre, place.amount, place.unit)
-    """
-    from shapeshift.api.views import choose_views
-    from shapeshift.app.change.draw_pairs import visit_of
-    from shapeshift.app.change.find_change import find_change
-    from shapeshift.app.change.outputs import check_folder, write_change
-
-    choice = ChangeChoice(0.0, millimetres / 1000, degrees, size=size)
-    choice.settings(1.0)  # refused before anything is read
-    folder = None if out is None else plain(out)
-    if folder is not None:
-        check_folder(folder, overwrite)
-    scenes = opened(before), opened(after)
-    names = (scenes[0].path or plain("before")).name, (scenes[1].path or plain("after")).name
-    visits = (
-        visit_of(scenes[0].subject, names[0], stop, value_range, values),
-        visit_of(scenes[1].subject, names[1], stop, value_range, values),
-    )
-    views = None if cameras is None else choose_views(scenes[0], cameras, 1, size)
-
-    def work(frames: "FrameRenderer") -> SceneChange:
-        found = find_change(frames, visits, names, choice, views, progress or silent)
-        if folder is not None:
-            write_change(frames, found, names, folder, progress or silent)
-        return found.change
-
-    with shared_renderer(drawing, context, RenderSettings(), BLACK) as renderer:
-        return renderer.inspect(work)

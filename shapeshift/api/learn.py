@@ -1,14 +1,14 @@
-"""Photos to poses and to a scene, and a scene compared with photos."""
+"""Photos to a scene, to a part of one anew, and to the smallest one that shows them as well."""
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from shapeshift.api.arguments import PathText
+from shapeshift.api.arguments import Kind, PathText
 from shapeshift.api.opened import OpenedScene
-from shapeshift.api.read import opened
+from shapeshift.api.read import in_words_of_python, opened
 from shapeshift.api.scene import Scene
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
@@ -17,7 +17,10 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
     from shapeshift.app.training.blocks.outcome import TrainOutcome
-    from shapeshift.decomposition.poses.pose_report import PoseReport
+    from shapeshift.app.training.fit import Options as FitOptions
+    from shapeshift.rasterizer.device import Device
+    from shapeshift.scene.captures.capture import Capture
+    from shapeshift.training.fit.fit import FitReport
     from shapeshift.training.run import Progress
     from shapeshift.training.settings import TrainSettings
     from shapeshift.training.train import Trainer
@@ -25,9 +28,6 @@ if TYPE_CHECKING:
 OF_BLOCKS = ("coarse_iterations", "block_photos", "cluster", "certificates", "gpus")
 NO_OUT = "resume goes on from the checkpoint beside out; give out, too."
 SAVE_EVERY_S = 60.0  # between checkpoints
-Kind = Literal["cpu", "gpu"]
-Masks = Literal["auto", "object", "valid", "ignore"]
-Background = Literal["auto", "black", "white", "gray"]
 
 
 class TrainedScene(Scene):
@@ -125,19 +125,16 @@ def trainer_of(
     device: Kind | None, calibrate: str | None, photo_mb: float | None,
 ) -> "Trainer":  # fmt: skip
     """The run before its first step."""
-    from shapeshift.app.training.saving import check_writable, memory_for_training, room_of
+    from shapeshift.app.training.saving import memory_for_training, room_of
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.scene.captures.read_capture import read_capture
-    from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
-    from shapeshift.training.calibration.extrinsics import rig_json, with_extrinsics
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.settings import suited
     from shapeshift.training.train import Trainer
 
     if path is not None:
-        check_writable(path)
-        refuse_foreign(path)
+        refuse_place(path)
     elif resume:
         raise UsageError(NO_OUT)
     room = room_of(path, photo_mb, "photo_mb")
@@ -150,10 +147,20 @@ def trainer_of(
     if calibrate is not None:
         if resume:
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
-        offset = calibrate_cameras(on, found, wished, calibrate, report=lambda what, part: None)
-        wished = replace(wished, rig=rig_json(calibrate, offset))
+        wished = calibrated(on, found, wished, calibrate)
     with memory_for_training():
         return Trainer(on, with_extrinsics(found, wished.rig), wished, before, room=room)
+
+
+def calibrated(
+    device: "Device", capture: "Capture", settings: "TrainSettings", modality: str
+) -> "TrainSettings":
+    """The settings with the offset of a modality's cameras.  Raises BadFile."""
+    from shapeshift.training.calibration.calibrate import calibrate
+    from shapeshift.training.calibration.extrinsics import rig_json
+
+    found = calibrate(device, capture, settings, modality, report=lambda what, part: None)
+    return replace(settings, rig=rig_json(modality, found))
 
 
 def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
@@ -264,10 +271,9 @@ def update(
         scene = ss.update("march.shift", "photos/june", change="changed", iterations=1000)
     """
     from shapeshift.app.commands.exported import check_output
-    from shapeshift.app.training.saving import check_writable, memory_for_training
+    from shapeshift.app.training.saving import memory_for_training
     from shapeshift.app.training.update_region import base_of, region_of
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.update.begin_update import begin_update
@@ -277,8 +283,7 @@ def update(
     path = None if out is None else plain(out)
     if path is not None:
         check_output(path, [given.path] if given.path else [], overwrite or resume, "")
-        check_writable(path)
-        refuse_foreign(path)
+        refuse_place(path)
     elif resume:
         raise UsageError(NO_OUT)
     boxes = (where,) if isinstance(where, str) else tuple(where)
@@ -295,86 +300,94 @@ def update(
     return finished(trainer, path, pace=False)
 
 
-def evaluate(
-    scene: PathText | OpenedScene,
-    capture: PathText,
-    *,
-    modality: str | None = None,
-    downscale: int | None = None,
-    masks: Masks = "auto",
-    background: Background = "auto",
-    vgg: PathText | None = None,
-    device: Kind | None = None,
-) -> dict[str, Any]:
-    """PSNR in dB and SSIM of a scene on the held-out photos of a capture, by modality: the result
-    of `shapeshift eval --json` (every 8th photo is held out, unless the capture says which).
+class FittedScene(Scene):
+    """The smallest scene that shows a capture as well as the largest one, and why.
 
-    modality: only that one.  downscale: divide the photos' sides by this; None is what the scene
-    was trained with, else such that neither exceeds 640 pixels.  masks: what a mask means; object:
-    nothing is outside it; auto: as it was trained, else as the capture says.  vgg: an ONNX file of
-    VGG16's first layers, for a distance of features.  Raises BadFile, UsageError, NoDevice.
-
-        scores = ss.evaluate("scene.shift", "capture")
-        scores["modalities"]["RGB"]["psnr_db"]
+    model = ss.fit("capture", "scene.shift")
+    [(part["part"], part["verdict"]) for part in model.need["parts"]]
     """
-    from shapeshift.app.training.evaluate import only, trained_downscale, trained_masks
+
+    def __init__(self, model: AnchorModel, path: Path | None, need: dict[str, Any]) -> None:
+        super().__init__(Document.of(model), path)
+        self.need = need  # the report, as `shapeshift fit --json` writes it
+
+
+def fit(
+    capture: PathText,
+    out: PathText | None = None,
+    *,
+    tolerance_db: float = 0.1,
+    seeds: int = 2,
+    iterations: int | None = None,
+    seconds: float | None = None,
+    final_iterations: int | None = None,
+    final_seconds: float | None = None,
+    calibrate: str | None = None,
+    device: Kind | None = None,
+    progress: "Callable[[str, float], None] | None" = None,
+    **settings: Any,
+) -> FittedScene:
+    """Takes away what a scene of a capture does not need: trains without one part after the other
+    and compares the held-out photos (docs/fit.md).  `need` of the result says what each was worth.
+
+    tolerance_db: dB that each modality may lose in all, error included.  seeds: trainings of every
+    trial.  iterations or seconds: how long each takes, 600 iterations without either; final_...: of
+    one more training of the chosen model.  out: a package that is written, the same bytes as the
+    command's.  settings: as of `train`, of the largest model.  progress: called with (what, part
+    0..1).  Raises BadFile, UsageError, NoDevice.
+
+        model = ss.fit("capture", "scene.shift", tolerance_db=0.1, max_anchors=4000)
+        print(model.need["fitted"]["bytes"], model.need["full"]["bytes"])
+    """
+    from shapeshift.app.training.fit import Options, budget, noted_model, write_fitted
+    from shapeshift.renderer.pace import measure_pace
+
+    path = None if out is None else plain(out)
+    options = Options(
+        plain(capture), path or Path("fitted.shift"), tolerance_db=tolerance_db, seeds=seeds,
+        calibrate=calibrate, device=device,
+    )  # fmt: skip
+    longer = final_iterations, final_seconds
+    with in_words_of_python():
+        if path is not None:
+            refuse_place(path)
+        given = {name: value for name, value in settings.items() if value is not None}
+        last = None if longer == (None, None) else given | budget(*longer)
+        asked = given | budget(iterations, seconds), last
+        need, found = fitted(options, given, asked, progress or (lambda what, part: None))
+    model = noted_model(need, found)
+    model = model if model.pace else replace(model, pace=measure_pace(model))
+    if path is not None:
+        write_fitted(model, need, path)
+    return FittedScene(model, path, need.as_dict())
+
+
+def fitted(
+    options: "FitOptions", given: dict[str, Any],
+    asked: tuple[dict[str, Any], dict[str, Any] | None], progress: "Callable[[str, float], None]",
+) -> "tuple[FitReport, Capture]":  # fmt: skip
+    """The search and the photos.  given: settings; asked: with the length of a trial, and of the
+    last training, None: without one.
+    """
+    from shapeshift.app.training.fit import refuse_options, searched
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.captures.read_capture import read_capture
-    from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
-    from shapeshift.training.evaluation.evaluate import evaluate_model, report
-    from shapeshift.training.evaluation.vgg_distance import VggDistance
+    from shapeshift.training.settings import suited
 
-    started = time.perf_counter()
-    scene = opened(scene)
-    if scene.subject.file is not None:
-        raise BadFile("photos are of one scene as it was trained; name the model of one object.")
-    model = scene.model
-    distance = None if vgg is None else VggDistance(plain(vgg))
-    photos = read_capture(plain(capture))
-    photos = photos if modality is None else only(photos, modality)
-    photos = with_extrinsics(photos, rig_of(model.provenance))
-    factor = downscale or trained_downscale(model.provenance)
-    meant = trained_masks(model.provenance, masks)
-    scores = evaluate_model(open_device(device), model, photos, factor, meant, background, distance)
-    result = report(scene.path, scores, started)
-    return result if distance is None else result | {"vgg_file": distance.name}
+    refuse_options(options)
+    wished, last = (None if each is None else settings_of(each, None) for each in asked)
+    assert wished is not None, "a trial has a length"
+    found, on = read_capture(options.capture), open_device(options.device)
+    wished = suited(wished, given, found)
+    if options.calibrate is not None:
+        wished = calibrated(on, found, wished, options.calibrate)
+    return searched(options, on, found, (wished, last), progress), found
 
 
-def poses(
-    photos: PathText,
-    out: PathText,
-    *,
-    every: int = 1,
-    masks: PathText | None = None,
-    progress: "Callable[[str, int, int], None] | None" = None,
-    **settings: Any,
-) -> "PoseReport":
-    """Finds where photos were taken from, upright, and writes a COLMAP folder for `train`.
+def refuse_place(path: Path) -> None:
+    """Where no package can be written, or something else would be lost.  UsageError, BadFile."""
+    from shapeshift.app.training.saving import check_writable
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
 
-    photos: a folder, its sub-folders modalities; thermal photos get the poses of the photos of
-    visible light with the same name.  out: a new or empty folder, or one with the same search
-    unfinished, which goes on.  every: each n-th photo of a folder.  settings: any field of
-    `shapeshift.decomposition.poses.find_poses.PoseSettings`, such as length, neighbours or
-    straight.
-    Lengths are arbitrary unless `length` names one.  Gives what was found: photos placed, left
-    out, or placed by few points; mean error in pixels.
-
-    Structure from motion: Schoenberger and Frahm 2016, by pycolmap.  Raises BadFile, UsageError.
-
-        found = ss.poses("photos", "capture")
-        model = ss.train("capture", seconds=60)
-    """
-    from shapeshift.decomposition.poses.find_poses import WORK, PoseSettings, find_poses
-    from shapeshift.decomposition.poses.photo_list import list_photos
-
-    if not every >= 1:
-        raise UsageError(f"every is {every}; give 1 or more.")
-    try:
-        wished = replace(PoseSettings(masks=None if masks is None else plain(masks)), **settings)
-    except (TypeError, ValueError) as error:
-        raise UsageError(f"{error}.") from None
-    folder = plain(out)
-    if folder.is_dir() and any(path.name != WORK for path in Path(folder).iterdir()):
-        raise UsageError(f"{folder} is not empty; name a new folder.")
-    listed = list_photos(plain(photos), every)
-    return find_poses(listed, folder, wished, progress or (lambda what, done, of: None))
+    check_writable(path)
+    refuse_foreign(path)

@@ -4,9 +4,12 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from shapeshift.api.arguments import PathText, Progress
-from shapeshift.api.read import opened, read_document
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.read import in_words_of_python, opened, read_document
 from shapeshift.api.scene import Scene
 from shapeshift.app.opening import DrawingOptions
+from shapeshift.app.paths import plain
+from shapeshift.runtime_models.model import BadFile
 
 
 def load(
@@ -51,11 +54,52 @@ def load(
 
 
 def info(scene: PathText | Scene) -> dict[str, Any]:
-    """What is in a scene: format, splats, stops, networks, objects; JSON types alone.
+    """What is in a scene: format, splats, stops, networks, objects; or what was found in posed
+    photos; JSON types alone, as `shapeshift info --json`.
 
     Of a scene that lies nowhere on disk, `bytes` is missing.  Raises BadFile.
 
         ss.info("workshop.shift")["splats"]
         [stop["name"] for stop in ss.info(scene)["stops"]]
     """
-    return opened(scene).info()
+    from shapeshift.app.inspection.capture_facts import capture_facts
+
+    if isinstance(scene, OpenedScene):
+        return scene.info()
+    try:
+        return opened(scene).info()
+    except BadFile:
+        if (capture := capture_facts(plain(scene))) is None:
+            raise
+        return capture
+
+
+def lint(
+    path: PathText,
+    *,
+    mode: Literal["", "cumulative", "exclusive"] = "",
+    up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = "",
+    flip: bool = False,
+    strict: bool = False,
+    allow_huge: bool = False,
+    memory_gb: float = 0.0,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """What is wrong with a file, and what opening it repairs: the result of `shapeshift lint
+    --json`, where `findings` has what, rows, count, done and repaired of each; nothing is drawn.
+
+    The rest: format, splats, bytes, extent_m (the 1st to 99th percentile, metres), origin_m,
+    splats_over_a_pixel.  Arguments as of `load`.  Raises UsageError, and BadFile for a file that is
+    refused.
+
+        for found in ss.lint("scan.ply")["findings"]:
+            print(found["what"], found["rows"], found["done"])
+    """
+    from shapeshift.app.commands.lint import Options, examine
+
+    options = Options(
+        plain(path), up=up, flip=flip, mode=mode, strict=strict, allow_huge=allow_huge,
+        memory=memory_gb,
+    )  # fmt: skip
+    with in_words_of_python():
+        return examine(options, progress or (lambda what, part: None))

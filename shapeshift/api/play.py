@@ -1,18 +1,22 @@
-"""Scenes in motion, and files of cameras."""
+"""Scenes in motion and what is touched in them; files of cameras, and where photos were taken."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from shapeshift.api.arguments import PathText, Progress, Size, X
 from shapeshift.api.opened import OpenedScene
-from shapeshift.api.read import opened
+from shapeshift.api.read import in_words_of_python, opened
 from shapeshift.api.scene import Scene
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
+
+if TYPE_CHECKING:
+    from shapeshift.decomposition.poses.pose_report import PoseReport
 
 HZ = 90
 AFTER_S = 2.0  # seconds that go on after the script's last line
@@ -82,6 +86,32 @@ def simulate(
     return steps_of(scene, simulation, math.ceil(seconds * HZ - 1e-6))
 
 
+def colliders(
+    scene: PathText,
+    out: PathText,
+    *,
+    shape: str | Mapping[str, str] = "",
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Path]:
+    """Makes what "hulls" of a scene file asks for once, into files beside a new scene file `out`,
+    NAME.scene.json, which names them; the file of each object's collider, by the object's name.
+
+    shape: one convex piece in place of up to 16: hull, box, cylinder, sphere or capsule; of all, or
+    of objects by their names.  progress: called with (what, part 0..1).  Raises BadFile,
+    UsageError.
+
+        made = ss.colliders("room.scene.json", "ready.scene.json", shape={"cup": "cylinder"})
+    """
+    from shapeshift.app.commands.colliders import Options, make_colliders
+
+    named = [f"{name}={each}" for name, each in shape.items()] if isinstance(shape, Mapping) else []
+    words = tuple(named) if isinstance(shape, Mapping) else (shape,) * bool(shape)
+    options = Options(plain(scene), plain(out), words, overwrite)
+    with in_words_of_python():
+        return make_colliders(options, lambda said: None, progress or (lambda what, part: None))
+
+
 def world_of(scene: OpenedScene, progress: Progress | None):
     """The bodies and physics of a scene file, each object's x as the scene has it."""
     from shapeshift.scene.colliders.collider_files import colliders_of
@@ -138,3 +168,43 @@ def cameras(
                 raise UsageError(f"{file} exists; choose another place.")
         write_cameras(found, plain(out), to)
     return found
+
+
+def poses(
+    photos: PathText,
+    out: PathText,
+    *,
+    every: int = 1,
+    masks: PathText | None = None,
+    progress: "Callable[[str, int, int], None] | None" = None,
+    **settings: Any,
+) -> "PoseReport":
+    """Finds where photos were taken from, upright, and writes a COLMAP folder for `train`.
+
+    photos: a folder, its sub-folders modalities; thermal photos get the poses of the photos of
+    visible light with the same name.  out: a new or empty folder, or one with the same search
+    unfinished, which goes on.  every: each n-th photo of a folder.  settings: any field of
+    `shapeshift.decomposition.poses.find_poses.PoseSettings`, such as length, neighbours or
+    straight.
+    Lengths are arbitrary unless `length` names one.  Gives what was found: photos placed, left
+    out, or placed by few points; mean error in pixels.
+
+    Structure from motion: Schoenberger and Frahm 2016, by pycolmap.  Raises BadFile, UsageError.
+
+        found = ss.poses("photos", "capture")
+        model = ss.train("capture", seconds=60)
+    """
+    from shapeshift.decomposition.poses.find_poses import WORK, PoseSettings, find_poses
+    from shapeshift.decomposition.poses.photo_list import list_photos
+
+    if not every >= 1:
+        raise UsageError(f"every is {every}; give 1 or more.")
+    try:
+        wished = replace(PoseSettings(masks=None if masks is None else plain(masks)), **settings)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{error}.") from None
+    folder = plain(out)
+    if folder.is_dir() and any(path.name != WORK for path in Path(folder).iterdir()):
+        raise UsageError(f"{folder} is not empty; name a new folder.")
+    listed = list_photos(plain(photos), every)
+    return find_poses(listed, folder, wished, progress or (lambda what, done, of: None))

@@ -1,5 +1,8 @@
 """Files to documents, for `load` and for whatever takes a scene or the path of one."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from shapeshift.api.arguments import PathText
@@ -11,6 +14,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.scene.document.scene_file import is_scene_file
 
+OPTION = re.compile(r"(?<![\w/.\\-])--(?:no-)?([a-z][a-z-]*[a-z]|[a-z])")  # as a sentence has it
 OF_OBJECTS = ("mode", "up", "flip")  # what a scene file says for each object
 
 
@@ -42,3 +46,16 @@ def opened(scene: PathText | OpenedScene) -> OpenedScene:
     return (
         scene if isinstance(scene, OpenedScene) else OpenedScene(*read_document(scene, Reading()))
     )
+
+
+@contextmanager
+def in_words_of_python() -> Iterator[None]:
+    """Where the work of a command refuses something: its sentence, with --sh-degree as sh_degree.
+
+    Raises UsageError, BadFile.
+    """
+    try:
+        yield
+    except (UsageError, BadFile) as refusal:
+        said = OPTION.sub(lambda found: found[1].replace("-", "_"), str(refusal))
+        raise type(refusal)(said) from None

@@ -6,10 +6,12 @@ The tutorials run whole in tests/slow/test_tutorials_run.py.
 import importlib
 import re
 import shlex
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
 
+import shapeshift as ss
 from shapeshift.app.cli import COMMANDS, LAUNCHED
 from shapeshift.app.command_line import parse, wants_help
 from shapeshift.app.errors import UsageError
@@ -84,6 +86,17 @@ def test_every_command_is_listed():
     words = [shlex.split(line, comments=True)[2:3] for line in commands_of(text)]
     listed = {word for found in words for word in found}
     assert set(COMMANDS) | set(LAUNCHED) <= listed
+
+
+def test_every_command_stands_beside_what_the_library_has():
+    text = (ROOT / "docs/commands.md").read_text().split("\n## From Python\n")[1].split("\n## ")[0]
+    rows = dict(re.findall(r"^\| `([a-z]+)` \| (.+) \|$", text, re.M))
+    assert list(rows) == [*COMMANDS, *LAUNCHED]
+    for words in rows.values():
+        names = re.findall(r"`([A-Za-z_.]+)`", words)
+        assert names or words.startswith("none")
+        for name in names:
+            assert name.split(".")[0] in ss.__all__ and attrgetter(name)(ss) is not None, name
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

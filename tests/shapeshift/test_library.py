@@ -100,7 +100,8 @@ def test_every_public_thing_says_what_it_does_and_shows_it(name, obj):
 
 def test_the_largest_things_have_an_example_of_two_lines():
     for name in ("load", "export", "compare", "bench", "chart", "simulate", "cameras", "train",
-                 "evaluate", "info", "poses"):  # fmt: skip
+                 "evaluate", "info", "poses", "lint", "lod", "fit", "colliders",
+                 "stability"):  # fmt: skip
         text = inspect.getdoc(getattr(ss, name))
         assert text.count(f"ss.{name}(") >= 1, name
         assert "Raises" in text, name

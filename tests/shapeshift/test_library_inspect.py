@@ -1,5 +1,6 @@
 """Degrees, depths, marks and lengths through the library, on a wall that is known."""
 
+import json
 import math
 
 import numpy as np
@@ -66,6 +67,55 @@ def test_lengths_come_with_their_uncertainty(scene):
     for places in (((0, 0), (48, 36)), ((48, 36),), ((1, 2, 3, 4), (48, 36))):
         with pytest.raises(ss.UsageError, match=r"^[^\n]+\.$"):
             scene.measure("distance", *places, camera=view)
+
+
+def test_an_inspection_is_that_of_the_command(scene, tmp_path, capsys):
+    from shapeshift.app import cli
+    from shapeshift.scene.cameras.camera_list import CameraList
+    from shapeshift.scene.cameras.write_cameras import write_cameras
+
+    cameras, table = tmp_path / "cameras.json", tmp_path / "a.csv"
+    write_cameras(CameraList((wall_view(),), ("",), "test"), cameras, "ours")
+    marks = {"spot": ("mid=48,36", "0.2,0,0"), "line": "10,36,86,36"}
+    words = ["--spot", *marks["spot"], "--line", marks["line"], "--above", "60", "--marks",
+             str(tmp_path / "a.marks.json"), "--save", "--csv", str(table)]  # fmt: skip
+    words = ["thermal", str(scene.path), "--camera", str(cameras), *words]
+    assert cli.main([*words, "--out", str(tmp_path / "a.png")]) == 0
+    capsys.readouterr()
+    kept = {"marks": tmp_path / "b.marks.json", "save": True, "csv": tmp_path / "b.csv"}
+    found = scene.thermal(cameras, **marks, **kept, above=60.0, out=tmp_path / "b.png")
+    assert capsys.readouterr() == ("", "")
+    for name in ("csv", "Li1.csv", "marks.json", "png"):
+        assert (tmp_path / f"b.{name}").read_bytes() == (tmp_path / f"a.{name}").read_bytes(), name
+    assert isinstance(found, ss.Inspection)
+    readings = {reading.mark.name: reading.mean for reading in found.views[0].readings}
+    assert readings["Sp1"] == pytest.approx(60, abs=PIXEL_C)
+    assert found.views[0].isotherms[0].share > 0
+
+
+def test_a_length_is_kept_and_reported_as_by_the_command(scene, tmp_path, capsys):
+    from shapeshift.app import cli
+
+    folder = scene.path.parent
+    beside, report = folder / "wall.marks.json", tmp_path / "l.html"
+    before = beside.read_bytes() if beside.exists() else None
+    ends, left = ("-0.2,0,0", "0.3,0,0"), []
+    words = ["measure", str(scene.path), "--distance", *ends, "--keep", "--overwrite", "--report"]
+    for by_command in (True, False):
+        beside.unlink(missing_ok=True)
+        if by_command:
+            assert cli.main([*words, str(report), "--json"]) == 0
+            (row,) = json.loads(capsys.readouterr().out)["measurements"]
+        else:
+            made = scene.measure("distance", (-0.2, 0, 0), (0.3, 0, 0), size=(640, 480), keep=True,
+                                 report=[report], overwrite=True)  # fmt: skip
+            assert capsys.readouterr() == ("", "")
+            assert row == {name: getattr(made, name) for name in row}
+        left.append(beside.read_bytes())
+    assert left[0] == left[1]
+    beside.unlink()
+    if before is not None:
+        beside.write_bytes(before)
 
 
 def test_scenes_without_heat_say_so(scene):

@@ -23,6 +23,12 @@ def demo():
         lambda demo, wrong: ss.evaluate(demo, wrong),
         lambda demo, wrong: ss.cameras(wrong),
         lambda demo, wrong: ss.poses(wrong, "capture"),
+        lambda demo, wrong: ss.lint(wrong),
+        lambda demo, wrong: ss.lod(demo, wrong),
+        lambda demo, wrong: ss.fit(wrong),
+        lambda demo, wrong: ss.colliders(wrong, "a.scene.json"),
+        lambda demo, wrong: ss.stability(demo, wrong),
+        lambda demo, wrong: demo.thermal(report=[wrong]),
     ],
 )
 @pytest.mark.parametrize("wrong", [None, 3, b"scene.shift", ["a.ply", "b.ply"]])
@@ -31,6 +37,36 @@ def test_what_is_no_path_is_refused(demo, call, wrong, tmp_path, monkeypatch):
     with pytest.raises(ss.UsageError, match="is no path; a text or a pathlib"):
         call(demo, wrong)
     assert not list(tmp_path.iterdir())  # export(None) wrote a file "None"
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda demo: ss.lint(ss.TOUCH, up="+Z"), "up is for one model; in touch"),
+        (lambda demo: ss.lint(ss.DEMO, memory_gb=-1), "memory is -1, expected GB"),
+        (lambda demo: ss.lod(demo, "a", leaf=63), "leaf is 63, expected 64"),
+        (lambda demo: ss.lod(demo, "a", sh_degree=4), "sh_degree is 4, expected 0"),
+        (lambda demo: ss.lod(demo, "a.lod", x=0.5), "x is of streamed SOG"),
+        (lambda demo: ss.lod(demo, "a.lod", distill=float("nan")), "distill is nan, expected"),
+        (lambda demo: ss.lod(demo.with_model(demo.model), "a.lod"), "save the scene first"),
+        (lambda demo: ss.fit("capture", seeds=0), "seeds is 0; it has to be"),
+        (lambda demo: ss.fit("capture", tolerance_db=float("nan")), "tolerance_db is nan; it"),
+        (lambda demo: ss.fit("capture", anchor=3), "did you mean"),
+        (lambda demo: ss.colliders(ss.TOUCH, "a.scene.json"), 'has "hulls" as its collider'),
+        (lambda demo: ss.stability(demo, "a", cases=["no"]), "cases: there is no case 'no'"),
+        (lambda demo: demo.thermal(out="a.jpg"), r"out is a\.jpg; a file \.png is wanted"),
+        (lambda demo: demo.thermal(spott="a"), "there is no option 'spott'; there are above"),
+        (lambda demo: demo.thermal(view=1), "view is 1; the file has cameras 0 to 0"),
+        (lambda demo: demo.with_model(demo.model).thermal(save=True), "lies in no file"),
+        (lambda demo: demo.measure("distance", report=["a.txt"]), r"report is a\.txt; a file"),
+        (lambda demo: demo.export("a.html", object="cup"), "a page shows a scene whole"),
+    ],
+)
+def test_a_refusal_of_a_commands_work_speaks_python(demo, call, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ss.UsageError, match=said) as refused:
+        call(demo)
+    assert "--" not in str(refused.value) and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import shapeshift as ss
 from shapeshift.app import cli
 from shapeshift.app.commands.colliders import Options, run
 from shapeshift.app.errors import UsageError
@@ -43,6 +44,13 @@ def test_the_new_scene_names_what_was_made(scene, tmp_path, capsys):
         assert len(read_pieces(file.path(named[name])).points) == 1
     assert {p.name for p in (out.parent / "colliders").iterdir()} == {"one.glb", "two.glb"}
     assert capsys.readouterr().err.count("1 convex piece,") == 2
+    made = ss.colliders(scene, tmp_path / "library" / "room.scene.json")
+    assert {name: path.name for name, path in made.items()} == {
+        name: Path(path).name for name, path in named.items() if path
+    }
+    for path in made.values():
+        assert path.read_bytes() == (out.parent / "colliders" / path.name).read_bytes()
+    assert capsys.readouterr() == ("", "")
     with pytest.raises(UsageError, match="exists; choose another --out"):
         run(Options(scene, out))
     assert run(Options(scene, out, overwrite=True)) == 0

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+import shapeshift as ss
 from shapeshift.app.commands.lint import Options, run, summary
 from shapeshift.runtime_models.model import BadFile
 from tests.support.program import assert_refused, launch
@@ -49,6 +50,8 @@ def test_json_for_programs(tmp_path, capsys):
     nan = facts["findings"][0]
     assert nan["count"] == 12 and nan["rows"] == [0, 2, 4, 6, 8, 10, 12, 14, 16, 18]
     assert nan["done"] == "dropped" and nan["repaired"] and nan["file"] == "a.ply"
+    assert json.loads(json.dumps(ss.lint(path))) == facts
+    assert capsys.readouterr() == ("", "")
 
 
 def test_a_good_file_is_good(tmp_path, capsys):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import shapeshift as ss
 from shapeshift.app.drawing import open_renderer
 from shapeshift.app.stability_cases.case_context import CaseContext
 from shapeshift.app.stability_cases.finding import at_least, at_most, broken_pixels, not_here
@@ -269,6 +270,10 @@ def test_the_command_writes_its_table_and_pictures_and_goes_on(package, tmp_path
         first, key=lambda r: list(CASES).index(r[0])
     )
     assert not list(tmp_path.glob("*.part"))
+    how = {"size": (48, 32), "steps": 6, "rounds": 2, "context": "none"}
+    found = ss.stability(package, tmp_path, cases=["needles", "counts"], **how)
+    assert [list(row.values()) for row in found] == [r for r in again if r[0] != "crowd"]
+    assert (tmp_path / "counts.png").stat().st_mtime_ns == kept, "the same rows go on"
 
 
 def test_a_case_that_fails_gives_exit_code_1_and_is_measured_again(package, tmp_path):

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import shapeshift as ss
 from shapeshift.app import cli
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
@@ -23,6 +24,14 @@ def test_a_folder_is_written_and_read_at_any_budget(scene, tmp_path, capsys):
     assert cli.main(["lod", str(scene), "--out", str(tmp_path / "b"), "--leaf", "100"]) == 0
     said = capsys.readouterr().err
     assert "4 leaves, 2 levels of 400, 200" in said
+    written = ss.lod(scene, tmp_path / "library", leaf=100)
+    assert [level["splats"] for level in written.levels] == [400, 200] and written.leaves == 4
+    files = sorted(path for path in (tmp_path / "b").rglob("*") if path.is_file())
+    assert written.bytes == sum(path.stat().st_size for path in files)
+    for path in files:
+        same = tmp_path / "library" / path.relative_to(tmp_path / "b")
+        assert same.read_bytes() == path.read_bytes()
+    assert capsys.readouterr() == ("", "")
     assert read_model(tmp_path / "b").splat_count == 400
     counts = read_model(tmp_path / "b").provenance["level_splats"]
     for count in counts:

@@ -6,6 +6,7 @@ import shutil
 
 import pytest
 
+import shapeshift as ss
 from shapeshift.app import cli
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.capture_files import files_below, photo_key
@@ -286,6 +287,7 @@ def test_info_shows_the_table(model, capsys):
     save_image(model / "images/rgb/new.png")
     assert cli.main(["info", str(model), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
+    assert json.loads(json.dumps(ss.info(model))) == told
     capture = read_capture(model)
     assert told["doubts"] == list(capture.doubts)
     assert [tuple(row.values()) for row in told["files"]] == [

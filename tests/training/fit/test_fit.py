@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import shapeshift as ss
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training import fit as command
 from shapeshift.rasterizer.device import open_device
@@ -89,6 +90,30 @@ def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkey
     assert row["saves_bytes"] > 0 and row["change"]["RGB"]["error"] > 0
     shown = capsys.readouterr().err
     assert "one splat of every anchor" in shown and "Outlines of RGB and Thermal" in shown
+
+
+def test_the_library_searches_as_the_command_does(captures, tmp_path, monkeypatch, capsys):
+    """The same search is asked for, and what is made of what it finds is the same to the byte."""
+    asked, need = [], needs(captures["shared"], (), replace(SMALL, iterations=20), tolerance=9.0)
+
+    def run(fit):
+        asked.append((fit.settings, fit.last, fit.tolerance_db, fit.seeds))
+        return need
+
+    monkeypatch.setattr(Fit, "run", run)
+    monkeypatch.setattr("shapeshift.renderer.pace.measure_pace", lambda *_: ())  # a second a call
+    folder, sizes = captures["shared"].folder, {"max_anchors": 90, "features": 4, "hidden": 8}
+    how = {"tolerance_db": 5.0, "seeds": 3, "iterations": 20, "final_iterations": 30}
+    files = tmp_path / "command.shift", tmp_path / "library.shift"
+    assert command.run(command.Options(folder, files[0], asked=sizes, **how)) == 0
+    capsys.readouterr()
+    fitted = ss.fit(folder, files[1], **sizes, **how)
+    assert capsys.readouterr() == ("", "")
+    assert asked[0] == asked[1] and asked[0][1].iterations == 30
+    assert files[0].read_bytes() == files[1].read_bytes() and fitted.need == need.as_dict()
+    np.testing.assert_array_equal(fitted.model.anchors, read_package(files[0]).anchors)
+    unwritten = ss.fit(folder, seeds=1)
+    assert unwritten.path is None and asked[2][0].iterations == 600 and asked[2][3] == 1
 
 
 def test_the_chosen_model_is_trained_once_more(captures):
