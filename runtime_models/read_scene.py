@@ -207,6 +207,8 @@ def describe(model: Model, path: str | Path) -> dict:
         "stops": [describe_stop(s) for s in model.stops],
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
+    if "step" in model.provenance:  # of a training run
+        facts["step"] = model.provenance["step"]
     if isinstance(model, SplatLayers):
         if "sh_degree" in model.provenance:  # bands that are zero in every splat were left out
             facts["sh_degree_in_file"] = model.provenance["sh_degree"]

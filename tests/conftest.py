@@ -1,10 +1,12 @@
-"""Options of the test run: --slow (long ones too), --regenerate (write the golden images anew)."""
+"""Options of the test run: --slow (long ones too), --slow-minutes (as many as there is time for),
+--regenerate (write the golden images anew)."""
 
 import gc
 import os
 import shutil
 import signal
 import subprocess
+import time
 import warnings
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
+BEGAN = pytest.StashKey[float]()  # by time.monotonic()
 
 pytest.register_assert_rewrite("tests.support")  # asserts there tell their values, too
 
@@ -29,6 +32,10 @@ settings.load_profile("shapeshift")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run the tests marked slow, too")
+    parser.addoption(
+        "--slow-minutes", type=float, default=float("inf"), metavar="N",
+        help="begin no test marked slow later than N minutes after the start",
+    )  # fmt: skip
     parser.addoption("--regenerate", action="store_true", help="write tests/golden/*.png anew")
 
 
@@ -41,6 +48,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if "slow" in item.keywords:
             item.add_marker(skip)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[BEGAN] = time.monotonic()
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    minutes = item.config.getoption("--slow-minutes")
+    if "slow" in item.keywords and time.monotonic() - item.config.stash[BEGAN] > 60 * minutes:
+        pytest.skip(f"slow, and {minutes:g} minutes are over; run with --slow alone")
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

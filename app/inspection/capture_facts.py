@@ -13,14 +13,19 @@ if TYPE_CHECKING:
 
 def capture_facts(path: Path) -> dict | None:
     """Of the capture at `path`; None where nothing there is posed photos.  Raises BadFile."""
-    from shapeshift.scene.captures.foreign.read_foreign import read_foreign
-    from shapeshift.scene.captures.read_capture import has_frames, has_poses, read_capture
+    from shapeshift.scene.captures.foreign.read_foreign import blank_beside, read_foreign
+    from shapeshift.scene.captures.read_capture import (
+        has_frames,
+        has_photos,
+        has_poses,
+        read_capture,
+    )
 
     if path.is_dir():
         posed = has_poses(path) or read_foreign(path) is not None
     else:
         posed = path.is_file() and (has_frames(path) or read_foreign(path) is not None)
-    if not posed:
+    if not posed and not (path.is_dir() and has_photos(path) and blank_beside(path)):
         return None
     capture = read_capture(path)
     return {

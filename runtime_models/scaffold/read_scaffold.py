@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.checkpoint.run_settings import text_of
 from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.lint.lint_whole import sample_of
 from shapeshift.runtime_models.model import (
@@ -65,7 +66,7 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
     file = cloud_of(path)
     reading = reading.within(file.parent)
     memory = reading.account
-    settings = read_settings(file.parent)
+    settings, unread = read_settings(file.parent)
     cloud = read_cloud(file, reading)
     findings = judge_rows(cloud.good, reading, file.name)
     octree = read_octree(cloud, settings) if len(cloud.levels) else None
@@ -93,7 +94,7 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
         octree,
         provenance_of(file, networks, octree, settings),
         three(rotation @ origin),
-        (*networks.findings, *findings, *far),
+        (*unread, *networks.findings, *findings, *far),
     )
     memory.charge(SHOWN * model.splat_count, f"{model.splat_count:,} splats")
     if not reading.allow_huge:
@@ -179,13 +180,16 @@ def boolean(text: str | None) -> bool | None:
     return None if text is None else text.lower() == "true"
 
 
-def read_settings(folder: Path) -> dict[str, str]:
-    """The run's settings by name, as text, where cfg_args or config.yaml lies in its folder."""
+def read_settings(folder: Path) -> tuple[dict[str, str], tuple[Finding, ...]]:
+    """The run's settings by name, as text, where cfg_args or config.yaml lies in its folder; a
+    finding where they cannot be read."""
     here = folder.absolute()
     places = [here, here.parents[1]] if len(here.parents) > 1 else [here]
     for file in (place / name for place in places for name in SETTINGS):
-        if file.is_file():
-            with file.open("rb") as opened:
-                text = opened.read(HEAD).decode("utf-8", "replace")
-            return dict(reversed(SETTING.findall(text)))  # of a name given twice the first counts
-    return {}
+        if file.exists():
+            text, why = text_of(file)
+            done = "not looked at; its background, fork and rule of levels are taken as usual"
+            found = (Finding(f"its run's {file.name} {why}", 0, done, file=CLOUD, repaired=False),)
+            # of a name given twice the first counts
+            return dict(reversed(SETTING.findall(text))), found if why else ()
+    return {}, ()

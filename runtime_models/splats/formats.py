@@ -33,7 +33,7 @@ def format_of(path: Path) -> Format | None:
 
 def read_raw(path: Path, reading: Reading) -> RawSplats:
     """One file of plain splats as it is written, with its labels.  Raises BadFile."""
-    from shapeshift.runtime_models.checkpoint.run_settings import GSPLAT_CLOUDS, with_settings
+    from shapeshift.runtime_models.checkpoint.run_settings import of_run, with_settings
     from shapeshift.runtime_models.splats.foreign_files import refusal
     from shapeshift.runtime_models.splats.read_labels import with_labels
     from shapeshift.runtime_models.splats.sog.sog_files import META
@@ -43,7 +43,7 @@ def read_raw(path: Path, reading: Reading) -> RawSplats:
     if form is None:
         raise BadFile(refusal(path, head_of(path), ", ".join(form.name for form in formats())))
     raw = with_labels(form.read(path, reading), path)
-    return with_settings(raw, path) if path.parent.name == GSPLAT_CLOUDS else raw
+    return with_settings(raw, path) if of_run(path) else raw
 
 
 def read_plain(path: Path, reading: Reading | None = None) -> PlainSplats:

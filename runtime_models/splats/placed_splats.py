@@ -116,6 +116,7 @@ def joined(parts: list[RawSplats], file: str) -> RawSplats:
         sh=np.concatenate(sh),
         file=file,
         format=" + ".join(sorted({part.format for part in parts})),
+        axes=" / ".join(dict.fromkeys(part.axes for part in parts if part.axes)),
         antialiased=any(part.antialiased for part in parts),
         findings=tuple(finding for part in parts for finding in part.findings),
     )

@@ -11,12 +11,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
+from shapeshift.runtime_models.checkpoint.run_settings import GSPLAT_CLOUDS
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
 from shapeshift.runtime_models.lint.lint import judge
-from shapeshift.runtime_models.model import BadFile, Model, SplatLayers, Stop
+from shapeshift.runtime_models.model import BadFile, Finding, Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import formats, read_plain, read_raw
 from shapeshift.runtime_models.splats.layers.read_layers import join_layers
 from shapeshift.runtime_models.splats.moving_splats import TIME_STOPS
@@ -25,45 +27,68 @@ from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.stop_names import is_thermal_name
 
 CLOUD = "point_cloud.ply"
-NUMBER = re.compile(r"(?:iteration|point_cloud)_([0-9]{1,18})", re.ASCII)
-STEP = re.compile(r"ckpt_([0-9]{1,18})_rank[0-9]+\.pt|step-([0-9]{1,18})\.ckpt", re.ASCII)
+ITERATIONS, STEPS = f"iteration_*/{CLOUD}", "point_cloud_*.ply"  # of INRIA's, of gsplat's
+STEP = re.compile(
+    r"iteration_([0-9]{1,18})|point_cloud_([0-9]{1,18})\.ply|"
+    r"ckpt_([0-9]{1,18})_rank[0-9]+\.pt|step-([0-9]{1,18})\.ckpt",
+    re.ASCII,
+)
 CHECKPOINTS = ("ckpts", "nerfstudio_models")  # folders of a run of gsplat and of nerfstudio
 RUN_DEPTH = 3  # outputs/NAME/METHOD/TIME
 PAIR = ("color", "thermal")
+FEW = 5  # steps that a finding names
+ModelOf = TypeVar("ModelOf", bound=Model)
 NO_SPLATS = {"input.ply", "points3d.ply"}  # what a run started from: points
 
 
 def newest_cloud(folder: Path) -> Path | None:
-    """The cloud of the largest iteration in a run's folder; None where it is no such folder."""
-    for name in ("point_cloud", "point_cloud_color", "point_cloud_thermal"):
-        if (cloud := newest_of(folder.glob(f"{name}/iteration_*/{CLOUD}"))) is not None:
+    """The cloud of the largest iteration in a run's folder, or in the folder of its clouds; None
+    where it is no such folder."""
+    for name in ("point_cloud", "point_cloud_color", "point_cloud_thermal", "."):
+        if (cloud := newest_of((folder / name).glob(ITERATIONS))) is not None:
             return cloud
-    return newest_of(folder.glob("ply/point_cloud_*.ply"))  # gsplat
+    clouds = folder if folder.name == GSPLAT_CLOUDS else folder / GSPLAT_CLOUDS
+    return newest_of(clouds.glob(STEPS))
 
 
 def newest_of(clouds: Iterable[Path]) -> Path | None:
-    """The one with the largest number in its own name or, as point_cloud.ply, in its folder's."""
-    by_number = {}
-    for cloud in clouds:
-        name = cloud.parent.name if cloud.name == CLOUD else cloud.stem
-        if (found := NUMBER.fullmatch(name)) and cloud.is_file():
-            by_number[int(found[1])] = cloud
-    return by_number[max(by_number)] if by_number else None
+    """The one of the last step."""
+    by_step = {step_of(cloud): cloud for cloud in clouds if cloud.is_file()}
+    by_step.pop(-1, None)
+    return by_step[max(by_step)] if by_step else None
+
+
+def step_of(file: Path) -> int:
+    """By its own name or, of point_cloud.ply, by its folder's; -1 where they name none."""
+    found = STEP.fullmatch(file.parent.name if file.name == CLOUD else file.name)
+    return int(next(filter(None, found.groups()))) if found else -1
+
+
+def steps_beside(file: Path) -> dict[int, list[Path]]:
+    """step -> its files, of the run that a file of splats is of."""
+    run = file.parent.parent
+    places = [run.glob(ITERATIONS)] if file.name == CLOUD else [file.parent.glob("*")]
+    if file.parent.name in (GSPLAT_CLOUDS, CHECKPOINTS[0]):
+        places = [(run / GSPLAT_CLOUDS).glob(STEPS), (run / CHECKPOINTS[0]).glob("*")]
+    found: dict[int, list[Path]] = {}
+    for other in (other for place in places for other in sorted(place)):
+        if (step := step_of(other)) >= 0 and other.is_file():
+            found.setdefault(step, []).append(other)
+    return found
 
 
 def newest_checkpoints(folder: Path) -> list[Path]:
     """Those of the last step in a run's folder of gsplat, where it is later than any cloud of it,
     or of nerfstudio, which may lie up to three folders below.  [] without.  Raises BadFile.
     """
-    found: dict[int, list[Path]] = {}
     for place in (folder, *(folder / name for name in CHECKPOINTS)):
+        found: dict[int, list[Path]] = {}
         for file in sorted(place.glob("*")) if place.is_dir() else ():
-            if (step := STEP.fullmatch(file.name)) and file.is_file():
-                found.setdefault(int(step[1] or step[2]), []).append(file)
+            if file.suffix in (".pt", ".ckpt") and step_of(file) >= 0 and file.is_file():
+                found.setdefault(step_of(file), []).append(file)
         if found:
-            cloud = newest_of(folder.glob("ply/point_cloud_*.ply"))
-            named = NUMBER.fullmatch(cloud.stem) if cloud else None
-            last = int(named[1]) if named else -1
+            cloud = newest_of((folder / GSPLAT_CLOUDS).glob(STEPS))
+            last = step_of(cloud) if cloud else -1
             return found[max(found)] if max(found) > last else []
     runs: list[Path] = []
     for depth in range(1, RUN_DEPTH + 1):
@@ -80,7 +105,7 @@ def read_checkpoints(files: list[Path], folder: Path, reading: Reading) -> Splat
     plain = judge(joined(parts, folder.name) if len(parts) > 1 else parts[0], reading)
     names = [str(file.relative_to(folder)) for file in files]
     stops = (Stop(folder.resolve().name or files[0].stem, 0.0, "layer"),)
-    return join_layers([plain], stops, reading.mode, names)
+    return with_steps(join_layers([plain], stops, reading.mode, names), files[:1])
 
 
 def thermal_pair(folder: Path) -> tuple[Path, Path] | None:
@@ -124,7 +149,8 @@ def read_pair(pair: tuple[Path, Path], folder: Path, reading: Reading) -> SplatL
     """RGB at x = 0 and Thermal at x = 1, each alone at its stop unless the mode says otherwise."""
     parts = [read_plain(path, reading) for path in pair]
     files = [str(path.relative_to(folder)) for path in pair]
-    return join_layers(parts, stops_of_pair(), reading.mode or "exclusive", files)
+    model = join_layers(parts, stops_of_pair(), reading.mode or "exclusive", files)
+    return with_steps(model, list(pair))
 
 
 def stops_of_pair() -> tuple[Stop, Stop]:
@@ -176,4 +202,36 @@ def in_run(model: Model, folder: Path, cloud: Path) -> Model:
     if isinstance(model, SplatLayers) and len(model.stops) == 1:
         name = folder.resolve().name or model.stops[0].name
         model = replace(model, stops=(replace(model.stops[0], name=name),))
-    return model
+    return with_steps(model, [cloud])
+
+
+def with_steps(model: ModelOf, files: list[Path]) -> ModelOf:
+    """The same with the step that it is of, one a file; a finding where the run has others, too,
+    where the files are of different ones, and where another step has more files, as of more cards.
+    """
+    files = [file for file in files if step_of(file) >= 0]
+    steps = [step_of(file) for file in files]
+    if not steps:
+        return model
+    said = {"step": " and ".join(dict.fromkeys(map(str, steps)))}
+    found = []
+    for file, step in zip(files, steps, strict=True):
+        run = steps_beside(file)
+        others = [str(other) for other in sorted(run) if other != step]
+        if others:
+            more = f"{len(others) - FEW} more and " if len(others) > FEW else ""
+            what = f"its run has splats of step{'s' * (len(others) > 1)} {more}"
+            found.append((file, what + f"{', '.join(others[-FEW:])} as well", f"{step} is read"))
+        parts = {n: sum(part.suffix == file.suffix for part in rows) for n, rows in run.items()}
+        if parts[step] < max(parts.values()):
+            what = f"step {step} has {parts[step]} of {max(parts.values())} files of another step"
+            found.append((file, what, "read without the others"))
+    if len(set(steps)) > 1:
+        found.append(
+            (files[0], f"its two clouds are of steps {said['step']}", "shown as one scene")
+        )
+    told = tuple(
+        Finding(what, 0, done, file=file.name, repaired=False) for file, what, done in found
+    )
+    provenance = model.provenance | said
+    return replace(model, provenance=provenance, findings=(*model.findings, *told))

@@ -365,8 +365,7 @@ def split_every_8th(photos: list[Photo]) -> list[Photo]:
         paths = {p.path for p in photos if p.modality == name}  # once of a panorama
         mine = sorted(paths, key=lambda path: path.parts)
         tests |= set(mine[::TEST_EVERY]) if len(mine) >= 3 else set()
-    splits = ["test" if p.path in tests else "train" for p in photos]
-    rows = zip(photos, splits, strict=True)
+    rows = [(p, "test" if p.path in tests else "train") for p in photos]
     return [p if p.split == split else replace(p, split=split) for p, split in rows]
 
 

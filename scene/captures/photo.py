@@ -35,7 +35,7 @@ from shapeshift.scene.captures.radiometric.number_photos import (
     open_grid,
     radiometric_celsius,
 )
-from shapeshift.scene.captures.radiometric.tiff_bands import band_header, open_band
+from shapeshift.scene.captures.radiometric.tiff_bands import band_header, is_misread, open_band
 from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27
@@ -63,9 +63,13 @@ def open_image(path: Path, band: int = 0) -> Image.Image:
             return open_grid(path)
         with quiet():
             image = Image.open(path, formats=USUAL)
-        if not is_rare(image):
+        misread = is_misread(image)
+        if not (misread or is_rare(image)):
             return image
         image.close()
+        if misread:
+            with quiet():
+                return open_band(path, 1)
     except FileNotFoundError:
         raise BadFile(
             f"{path}: the image file is missing; put it there or drop the frame"

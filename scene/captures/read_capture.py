@@ -8,6 +8,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.colmap_tables import find_model
 from shapeshift.scene.captures.foreign.read_foreign import (
+    blank_beside,
     is_table_of_lenses,
     known_beside,
     read_foreign,
@@ -63,9 +64,13 @@ def read_capture(path: Path) -> Capture:
         raise minimal_form(path)
     if (posed := read_foreign(path)) is not None:
         return capture_from(posed)
-    if any(p.suffix.lower() in PICTURES for p in path.rglob("*")):
+    if has_photos(path):
         raise BadFile(f"{path}: photos without poses; {how_to_pose(path)}.")
     raise BadFile(f"{path}: neither photos nor poses in this folder; see docs/capture.md")
+
+
+def has_photos(folder: Path) -> bool:
+    return any(path.suffix.lower() in PICTURES for path in folder.rglob("*"))
 
 
 def minimal_form(path: Path) -> BadFile:
@@ -115,4 +120,6 @@ def how_to_pose(photos: Path) -> str:
     if known := known_beside(photos):
         return known
     command = shlex.join(["python3", "launch.py", "poses", str(photos), "--out", "CAPTURE"])
+    if blank := blank_beside(photos):
+        return f"{blank}: export it again, or find the poses, `{command}`, and name that folder"
     return f"find them first, `{command}`, and name that folder then"

@@ -1,16 +1,17 @@
 """How fast files open, and in how much memory, beside reading their bytes and beside other readers.
 
-    python tools/runtime_models/open.py --out docs/bench/open.csv [FILE ...]
+    python tools/runtime_models/open.py --out docs/bench/open.csv [--before FOLDER] [FILE ...]
 
-Made here: 3DGS PLY of 100,000 and 1,000,000 splats (SH degree 0 and 3), and 100,000 splats of
-degree 3 in every format that we write; FILE: others, as they are.  In one process, in turns, each
-reader opens the file (warm: in the system's cache) beside path.read_bytes() of it; the ratios are
-medians of those of each turn, "cpu" of the process with all its threads.  The peak is that of a
-process of its own while it opens the file, over the bytes of the arrays that come out.
-Readers: ours is read_scene.read_model, from the path to a checked scene in our axes and units.
-plyfile with all columns copied into one float32 array, as 3DGS's own load_ply does; gsply (views
-into the file's bytes, in its codes); gaussforge.  Who is not installed, or refuses the file, is
-left out.
+Made here: 3DGS PLY of 100,000 and 1,000,000 splats (SH degree 0 and 3), 100,000 splats of degree 3
+in every format that we write, and .spz (versions 3 and 4) and .sog of 1,000,000 of degree 1; FILE:
+others, as they are.  In turns, each reader, in a process of its own, opens the file (warm: in the
+system's cache) beside path.read_bytes() of it; the ratios are medians of those of each turn, "cpu"
+of the process with all its threads.  The peak is that of another process while it opens the file
+for the second time, over the bytes of the arrays that come out.
+Readers: ours is read_scene.read_model, from the path to a checked scene in our axes and units;
+before the same of the checkout FOLDER.  plyfile with all columns copied into one float32 array, as
+3DGS's own load_ply does; gsply (of a PLY views into the file's bytes, in its codes); gaussforge.
+Who is not installed, or refuses the file, is left out.
 """
 
 import argparse
@@ -22,13 +23,16 @@ import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1])]
+ROOT = Path(__file__).resolve().parents[2]
+# A reader's process may be that of another checkout.
+sys.path[:0] = [sys.argv[sys.argv.index("--root") + 1] if "--root" in sys.argv else str(ROOT)]
 
 TURNS, MOST_S = 15, 15.0  # openings by each reader, fewer where they take longer
 FIELDS = (
@@ -58,8 +62,10 @@ def by_plyfile(path: Path) -> list[np.ndarray]:
 
 def by_gsply(path: Path) -> list[np.ndarray]:
     import gsply
+    from gsply.sog_reader import sogread
 
-    data = gsply.plyread(path)
+    read = {".spz": gsply.read_spz, ".sog": sogread}.get(path.suffix, gsply.plyread)
+    data = read(str(path))
     return [data.means, data.scales, data.quats, data.opacities, data.sh0, data.shN]
 
 
@@ -75,11 +81,12 @@ def by_gaussforge(path: Path) -> list[np.ndarray]:
 
 
 READERS: dict[str, Callable[[Path], list[np.ndarray]]] = {
-    "ours": ours, "plyfile": by_plyfile, "gsply": by_gsply, "gaussforge": by_gaussforge,
+    "ours": ours, "before": ours, "plyfile": by_plyfile, "gsply": by_gsply,
+    "gaussforge": by_gaussforge,
 }  # fmt: skip
 PEERS = {  # the endings that each reads
     "plyfile": (".ply",),
-    "gsply": (".ply",),
+    "gsply": (".ply", ".spz", ".sog"),
     "gaussforge": (".ply", ".compressed.ply", ".splat", ".ksplat", ".spz", ".sog"),
 }
 
@@ -89,7 +96,7 @@ def readers_for(path: Path) -> list[str]:
     import importlib.util
 
     ending = ".compressed.ply" if path.name.endswith(".compressed.ply") else path.suffix
-    return ["ours"] + [
+    return [
         name for name, kinds in PEERS.items() if ending in kinds and importlib.util.find_spec(name)
     ]
 
@@ -103,41 +110,78 @@ def clock(work: Callable[[], object]) -> tuple[float, float]:
     return took
 
 
-def reads(name: str, path: Path) -> bool:
-    """Whether a reader opens the file; ours has to."""
+def serve(name: str, path: Path) -> None:
+    """In a process of its own: a line of JSON for each line that comes, which names a figure."""
+    reader = READERS[name]
+    say = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # peers print, too
     try:
-        READERS[name](path)
-    except (ValueError, RuntimeError) as error:
-        if name == "ours":
+        reader(path)  # imports, pools
+    except (ValueError, RuntimeError, ImportError) as error:
+        if name in ("ours", "before"):
             raise
         print(f"{name} refuses {path.name}: {error}", file=sys.stderr)  # noqa: T201
-        return False
-    return True
+        return
+    for line in sys.stdin:
+        figure = (
+            [*clock(path.read_bytes), *clock(lambda: reader(path))]
+            if line.strip() == "turn"
+            else peak_of(path, reader)
+        )
+        print(json.dumps(figure), file=say, flush=True)
 
 
-def take_turns(path: Path) -> dict[str, list]:
-    """(bytes wall, bytes cpu, wall, cpu) of each turn of each reader."""
-    names, found = [name for name in readers_for(path) if reads(name, path)], {}
+class ReaderProcess:
+    """A reader of one file, which opens it whenever it is asked to."""
+
+    def __init__(self, name: str, path: Path, root: Path) -> None:
+        command = [sys.executable, "-P", __file__, "--serve", name, "--root", str(root), str(path)]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def ask(self, figure: str) -> Any:
+        """[bytes wall, bytes cpu, wall, cpu] of a "turn", or the "peak"; None: it refuses."""
+        assert self._process.stdin and self._process.stdout
+        try:
+            self._process.stdin.write(figure + "\n")
+            self._process.stdin.flush()
+            return json.loads(self._process.stdout.readline() or "null")
+        except BrokenPipeError:
+            return None
+
+    def end(self) -> None:
+        self._process.communicate()
+
+
+def take_turns(path: Path, before: Path | None) -> dict[str, tuple[list, float]]:
+    """The turns of each reader of a file, and its peak."""
+    roots = {"ours": ROOT} | ({"before": before} if before else {})
+    roots |= dict.fromkeys(readers_for(path), ROOT)
+    readers = {name: ReaderProcess(name, path, root) for name, root in roots.items()}
+    found: dict[str, list] = {name: [] for name in readers}
     began = time.monotonic()
     for turn in range(TURNS):
-        for name in names:
-            read = clock(path.read_bytes)
-            opened = clock(lambda reader=READERS[name]: reader(path))
-            found.setdefault(name, []).append((*read, *opened))
+        for name, reader in readers.items():
+            if (took := reader.ask("turn")) is not None:
+                found[name].append(took)
         if turn > 2 and time.monotonic() - began > MOST_S:
             break
-    return found
+    for reader in readers.values():
+        reader.end()
+    peaks = {name: peak for name, turns in found.items() if turns
+             and (peak := ReaderProcess(name, path, roots[name]).ask("peak"))}  # fmt: skip
+    return {name: (found[name], peak) for name, peak in peaks.items()}
 
 
-def peak_of(path: Path, name: str) -> float:
+def peak_of(path: Path, reader: Callable[[Path], list[np.ndarray]]) -> float:
     """Most memory that opening took over the bytes of the arrays; Linux alone tells."""
-    READERS[name](path)  # imports, pools
     try:
         Path("/proc/self/clear_refs").write_text("5")  # the mark goes down to what is there now
     except OSError:
         return float("nan")
     before = memory("VmRSS")
-    arrays = READERS[name](path)
+    arrays = reader(path)
     return (memory("VmHWM") - before) / sum(array.nbytes for array in arrays)
 
 
@@ -147,23 +191,13 @@ def memory(what: str) -> int:
     return int(line.split()[1]) * 1024
 
 
-def child(*arguments: object) -> object:
-    """What this program says in a process of its own."""
-    command = [sys.executable, __file__, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{' '.join(command)}\n{done.stderr}")
-    sys.stderr.write(done.stderr)
-    return json.loads(done.stdout.splitlines()[-1])  # peers print, too
-
-
-def measure(path: Path) -> list[dict]:
+def measure(path: Path, before: Path | None) -> list[dict]:
     """The rows of one file."""
     from shapeshift.runtime_models.read_scene import describe, read_model
 
     facts = describe(read_model(path), path)
     size, splats, rows = path.stat().st_size, facts["splats"], []
-    for name, turns in child("--turns-of", path).items():
+    for name, (turns, peak) in take_turns(path, before).items():
         read, _, wall, _ = times = np.array(turns).T
         ratio, cpu_ratio = wall / read, times[3] / times[1]
         row = (
@@ -171,8 +205,7 @@ def measure(path: Path) -> list[dict]:
             name, len(turns), *(f"{1e3 * np.median(x):.1f}" for x in (read, wall)),
             f"{1e3 * np.percentile(wall, 90):.1f}", f"{1e3 * np.median(times[3]):.1f}",
             f"{np.median(ratio):.2f}", f"{np.percentile(ratio, 90):.2f}",
-            f"{np.median(cpu_ratio):.2f}", f"{child('--peak-of', path, '--reader', name):.2f}",
-            f"{splats / np.median(wall) / 1e6:.2f}",
+            f"{np.median(cpu_ratio):.2f}", f"{peak:.2f}", f"{splats / np.median(wall) / 1e6:.2f}",
         )  # fmt: skip
         rows.append(dict(zip(FIELDS, row, strict=True)))
         print(*row)  # noqa: T201
@@ -194,6 +227,29 @@ def splats_of(count: int, degree: int):
     )
 
 
+def write_spz(splats, path: Path, version: int) -> None:
+    from shapeshift.runtime_models.splats.spz.write_spz import write_spz
+
+    write_spz(splats, path, version)
+
+
+def write_sog(splats, path: Path) -> None:
+    from shapeshift.runtime_models.splats.sog.write_sog import write_sog
+
+    with tempfile.TemporaryDirectory() as folder:
+        write_sog(splats, Path(folder), "open.py")
+        with zipfile.ZipFile(path, "w") as packed:  # stored: WebP is packed already
+            for part in Path(folder).iterdir():
+                packed.write(part, part.name)
+
+
+LARGE = {  # of a million splats
+    "1000k_sh1_v3.spz": lambda splats, path: write_spz(splats, path, 3),
+    "1000k_sh1_v4.spz": lambda splats, path: write_spz(splats, path, 4),
+    "1000k_sh1.sog": write_sog,
+}
+
+
 def made_files(folder: Path):
     """Writes one file after the other; each is gone before the next."""
     from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -211,35 +267,37 @@ def made_files(folder: Path):
             writer.write(splats_of(100_000, degree), path)
             yield path
             path.unlink()
+    splats = splats_of(1_000_000, 1)
+    for name, write in LARGE.items():
+        path = folder / name
+        write(splats, path)
+        yield path
+        path.unlink()
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--out", type=Path)
-    parser.add_argument("--turns-of", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--peak-of", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--reader", default="ours", help=argparse.SUPPRESS)
+    parser.add_argument("--before", type=Path, help="a checkout whose reader takes turns, too")
+    parser.add_argument("--serve", help=argparse.SUPPRESS)
+    parser.add_argument("--root", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.turns_of or options.peak_of:
-        say = (
-            take_turns(options.turns_of)
-            if options.turns_of
-            else peak_of(options.peak_of, options.reader)
-        )
-        print(json.dumps(say))  # noqa: T201
+    if options.serve:
+        serve(options.serve, options.files[0])
         return
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for path in made_files(Path(folder)):
-            rows += measure(path)
+            rows += measure(path, options.before)
     for path in options.files:
-        rows += measure(path)
+        rows += measure(path, options.before)
     if options.out:
         names = " ".join(path.name for path in options.files)
         with options.out.open("w", newline="") as file:
             program = "tools/runtime_models/open.py"
-            file.write(f"# python {program} --out docs/bench/{options.out.name} {names}\n")
+            before = "--before FOLDER " if options.before else ""
+            file.write(f"# python {program} --out docs/bench/{options.out.name} {before}{names}\n")
             load = f"load average {os.getloadavg()[0]:.1f} at the end" if os.name != "nt" else ""
             file.write(f"# {platform.machine()}, {os.cpu_count()} units; {load}\n")
             writer = csv.DictWriter(file, FIELDS, lineterminator="\n")

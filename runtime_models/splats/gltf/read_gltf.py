@@ -1,6 +1,6 @@
 """glTF 2.0 (.glb, .gltf) with KHR_gaussian_splatting, release candidate of 2026, to plain splats.
 
-Its compression by spz (KHR_gaussian_splatting_compression_spz_2) is read, too.
+Its compression by spz (KHR_gaussian_splatting_compression_spz_2) and its drafts are read, too.
 """
 
 from dataclasses import replace
@@ -11,20 +11,22 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.splats.gltf.gltf_files import Asset
-from shapeshift.runtime_models.splats.gltf.gltf_nodes import OBEYED, Placed, placed_nodes
+from shapeshift.runtime_models.splats.gltf.gltf_nodes import OBEYED, Placed, extension, placed_nodes
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, ours_from_file
 from shapeshift.runtime_models.splats.placed_splats import instances, joined, moved
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, fourth_degree
 
 SPLATS = "KHR_gaussian_splatting"
-SPZ = "KHR_gaussian_splatting_compression_spz_2"
+SPZ = ("KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz")
+OLD_SPZ = "KHR_spz_gaussian_splats_compression"  # of early 2025, without SPLATS
 PREFIX = f"{SPLATS}:"
 ROTATION, SCALE, OPACITY = f"{PREFIX}ROTATION", f"{PREFIX}SCALE", f"{PREFIX}OPACITY"
 FIRST, COLOR = f"{PREFIX}SH_DEGREE_0_COEF_0", "COLOR_0"
+FOURTH = tuple(f"{PREFIX}SH_DEGREE_4_COEF_{n}" for n in range(9))  # not drawn
 NAME = "glTF"
 # Required extensions that do not touch what is read here: materials are ignored by the extension.
-HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_",
-            *OBEYED)  # fmt: skip
+HARMLESS = (SPLATS, OLD_SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_",
+            "KHR_lights_", *OBEYED)  # fmt: skip
 ROW = 44  # bytes of a splat without its harmonics
 
 
@@ -57,6 +59,8 @@ def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
         parts += instances(read_primitive(asset, primitive, reading), node.worlds)
     raw = joined(parts, path.name)
     findings = (*raw.findings, *unseen([node for _, node in found], path.name))
+    if not reading.flip:
+        findings += overturned(raw)
     return replace(raw, front=not asset.in_our_axes, findings=findings)
 
 
@@ -98,24 +102,46 @@ def unseen(nodes: list[Placed], file: str) -> list[Finding]:
     ]  # fmt: skip
 
 
+def overturned(raw: RawSplats) -> tuple[Finding, ...]:
+    """That what an spz within holds stands on its head, as far as a floor tells: programs that pack
+    any .spz as it is pack those in a PLY's axes, too.
+    """
+    from shapeshift.runtime_models.lint.lint_whole import spaced
+    from shapeshift.runtime_models.splats.spz.spz_axes import PLY_AXES, axes_by_floor
+
+    if not raw.axes:
+        return ()
+    rows = spaced(len(raw.means))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = np.log(raw.scales[rows])
+    few = replace(raw, means=raw.means[rows], scales=logs, opacity=raw.opacity[rows])
+    floor = axes_by_floor(few)
+    if floor is None or floor.name != PLY_AXES:
+        return ()
+    done = "read with +Y up, as glTF has it; --up=-Y turns it over"
+    return (Finding(f"upside down, {floor.reason}", 0, done, file=raw.file, repaired=False),)
+
+
 def splat_primitives(asset: Asset, mesh: object) -> list[dict]:
     """The primitives of a mesh that are splats."""
     rows = asset.item(asset.entry("meshes", mesh), "primitives", list, [])
     if not all(isinstance(row, dict) for row in rows):
         raise asset.refuse(f"mesh {mesh} has a primitive that is no object.")
-    return [row for row in rows if SPLATS in asset.item(row, "extensions", dict, {})]
+    splats = {SPLATS, OLD_SPZ}
+    return [row for row in rows if splats & asset.item(row, "extensions", dict, {}).keys()]
 
 
 def compressed_view(asset: Asset, primitive: dict) -> int | None:
     """The buffer view of the spz file that a primitive's splats are in, if they are."""
-    splats = asset.item(primitive["extensions"], SPLATS, dict, {})
-    inner = asset.item(splats, "extensions", dict, {})
-    return asset.item(asset.item(inner, SPZ, dict, {}), "bufferView", int)
+    inner = extension(asset, primitive, SPLATS)
+    places = [(primitive, OLD_SPZ), *((inner, name) for name in SPZ)]
+    found = (asset.item(extension(asset, owner, name), "bufferView", int) for owner, name in places)
+    return next((view for view in found if view is not None), None)
 
 
 def read_primitive(asset: Asset, primitive: dict, reading: Reading) -> RawSplats:
     """The splats of one primitive in its mesh's own axes."""
-    splats = asset.item(primitive["extensions"], SPLATS, dict, {})
+    splats = extension(asset, primitive, SPLATS)
     findings = unusual(asset, splats)
     view = compressed_view(asset, primitive)
     if view is not None:
@@ -171,6 +197,12 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
     sh = np.empty((count, len(names), 3), np.float32)
     for coefficient, name in enumerate(names):
         sh[:, coefficient] = (read(name, 4)[:, :3] - 0.5) / C0 if name == COLOR else read(name, 3)
+    left_out = [name for name in FOURTH if name in attributes]
+    findings: tuple[Finding, ...] = ()
+    if left_out:
+        share = sum(float(np.square(read(name, 3), dtype=np.float64).sum()) for name in left_out)
+        drawn = float(np.square(sh[:, 1:], dtype=np.float64).sum())
+        findings = (fourth_degree(len(left_out), share, share + drawn, asset.path.name),)
     return RawSplats(
         means=np.array(means),  # out of the file: who judges them may write into them
         scales=np.array(scales),
@@ -182,6 +214,7 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
         log_scales=False,
         logits=False,
         up="+Y",
+        findings=findings,
         memory=asset.memory,
     )
 
@@ -225,8 +258,10 @@ def read_spz_view(asset: Asset, view: int, turned: bool, reading: Reading) -> Ra
     matrix = np.eye(4)
     upright = ours_from_file(raw.up, front=raw.front)
     matrix[:3, :3] = (HALF_TURN_Y if turned else np.eye(3)) @ upright
+    said = "" if turned else ", half a turn about the vertical away, as drafts store it"
+    axes = f"of the spz within: {raw.axes}{said}" if raw.axes else ""
     metres = replace(
-        raw, scales=np.exp(raw.scales), log_scales=False, up="+Y", front=False, axes=""
+        raw, scales=np.exp(raw.scales), log_scales=False, up="+Y", front=False, axes=axes
     )
     return replace(moved(metres, matrix), format=f"{NAME} with {raw.format}")
 

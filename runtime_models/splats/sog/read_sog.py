@@ -269,7 +269,10 @@ def read_colors(sog: Sog) -> tuple[np.ndarray, np.ndarray]:
 
 def look_up(palette: np.ndarray, labels: np.ndarray, into: np.ndarray) -> None:
     """Puts the sets of harmonics that labels (n,) name into (n, M - 1, 3)."""
-    into[:] = palette[np.minimum(labels, len(palette) - 1)]
+    sets = palette.reshape(
+        len(palette), -1
+    )  # take() copies a row at once, an index number by number
+    into[:] = sets.take(labels, axis=0, mode="clip").reshape(into.shape)
 
 
 def read_palette(sog: Sog) -> np.ndarray:

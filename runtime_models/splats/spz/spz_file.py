@@ -6,7 +6,9 @@ after another; version 4 is a plain header of 32 bytes, extensions, a table, and
 
 import struct
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.model import BadFile
@@ -54,6 +56,7 @@ class Spz:
 
     def __init__(self, header: SpzHeader, source: "Inflate | Raw | Zstd", extensions: bytes | None):
         self.header, self._source, self._extensions, self._taken = header, source, extensions, 0
+        self._last: bytes | bytearray = b""  # taken before the extensions
 
     def read(self, size: int) -> bytes | bytearray:
         """Exactly `size` bytes.  Raises BadFile."""
@@ -65,34 +68,45 @@ class Spz:
                 f"{self.header.file} is cut off: {count:,} splats need {needed:,} bytes, not "
                 f"{self._taken:,}."
             )
+        if self._extensions is None and self.header.flags & EXTENSIONS:
+            self._last = (self._last + part[-MOST_EXTENSION_BYTES:])[-MOST_EXTENSION_BYTES:]
         return part
 
     def extensions(self) -> dict[int, bytes]:
-        """{type: content}; to be asked when all streams have been taken."""
+        """{type: content}; to be asked when all streams have been taken.  Raises BadFile."""
         data: bytes | bytearray | None = self._extensions
-        if data is None and not self.header.flags & EXTENSIONS:
-            self._refuse_another_body()
-            return {}
         if data is None:  # after the streams
-            data = self._source.read(MOST_EXTENSION_BYTES)
+            data = self._what_follows()
         return read_extensions(data) if self.header.flags & EXTENSIONS else {}
 
-    def _refuse_another_body(self) -> None:
-        """BadFile where as many bytes follow as a later version's splats have more.
+    def _what_follows(self) -> bytearray:
+        """The first bytes after the streams.  Raises BadFile where the splats of another version,
+        and whole records if any, take just as many as there are.
 
         The format's own writer puts the version that it is asked for over the body of another one.
         """
-        header, more = self.header, 0
-        most = sum(replace(header, version=3).sizes) - sum(header.sizes)
-        while more <= most and (part := self._source.read(min(PIECE, most + 1 - more))):
+        header, size = self.header, sum(self.header.sizes)
+        said = bool(header.flags & EXTENSIONS)
+        ends = {v: sum(replace(header, version=v).sizes) - size for v in (1, 2, 3)}  # from ours
+        least = -MOST_EXTENSION_BYTES if said else 1
+        ends = {v: end for v, end in sorted(ends.items(), key=itemgetter(1)) if end >= least}
+        kept = {v: bytearray(self._last[end:] if end < 0 else b"") for v, end in ends.items()}
+        more, most = 0, max(ends.values()) + MOST_EXTENSION_BYTES if ends else 0
+        while more < most and (part := self._source.read(min(PIECE, most - more))):
+            for version, end in ends.items():
+                after = part[max(end - more, 0) :]
+                kept[version] += after[: MOST_EXTENSION_BYTES - len(kept[version])]
             more += len(part)
-        for version in range(header.version + 1, 4):
-            if more and more == sum(replace(header, version=version).sizes) - sum(header.sizes):
-                raise BadFile(
-                    f"{header.file} says version {header.version} and has as many bytes as "
-                    f"{header.count:,} splats of version {version} take; its header is wrong, "
-                    "export it again."
-                )
+        whole = [version for version, rest in kept.items() if are_records(rest)]  # first the first
+        as_many = [version for version, end in ends.items() if 0 < more == end]
+        found = (whole or as_many or [header.version])[0]
+        if found != header.version:
+            raise BadFile(
+                f"{header.file} says version {header.version} and has as many bytes as "
+                f"{header.count:,} splats of version {found} take; its header is wrong, export it "
+                "again."
+            )
+        return kept.get(found, bytearray())
 
 
 def count_in(head: bytes, file: str) -> int:
@@ -273,13 +287,26 @@ class Zstd:
 
 def read_extensions(data: bytes | bytearray) -> dict[int, bytes]:
     """{type: content} of records back to back, as far as they are whole."""
-    found: dict[int, bytes] = {}
+    return {kind: bytes(data[at : at + size]) for kind, at, size in records(data)}
+
+
+def are_records(data: bytes | bytearray) -> bool:
+    """Whether it is whole records and zeros behind them; 0 is no type to begin with."""
+    end, first = 0, 0
+    for kind, at, size in records(data):
+        end, first = at + size, first or kind
+        if not first:
+            return False
+    return end > 0 and not any(data[end:])
+
+
+def records(data: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
+    """(type, where its content begins, bytes of it) of each whole record."""
     at = 0
     while at + EXTENSION.size <= len(data):
         kind, size = EXTENSION.unpack_from(data, at)
         at += EXTENSION.size
         if size > len(data) - at:
             break
-        found[kind] = bytes(data[at : at + size])
+        yield kind, at, size
         at += size
-    return found

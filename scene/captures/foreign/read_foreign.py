@@ -161,10 +161,40 @@ def photos_of(path: Path) -> PhotoIndex:
     return above if above.by_name else photos
 
 
+def is_blank(path: Path) -> bool:
+    """Whether a file that may be of poses begins with nothing: it has no bytes, or blanks and
+    zeros, as a disk leaves one that was full.
+    """
+    if path.suffix.lower() not in ENDINGS or not path.is_file():
+        return False
+    return not head_of(path).removeprefix(b"\xef\xbb\xbf").strip(b"\0 \t\r\n")
+
+
 def refuse_known(path: Path) -> None:
-    """Raises BadFile for a file that holds, or stands for, poses in a form that is not read."""
+    """Raises BadFile for a file that holds, or stands for, poses in a form that is not read, or
+    holds nothing.
+    """
+    if is_blank(path):
+        raise BadFile(f"{path} is empty: it has {blank_bytes(path)}; copy or export it again.")
     if path.is_file() and (program := program_of(path, head_of(path))) is not None:
         raise BadFile(f"{path} is {program.what}, which is not read here; {program.advice}.")
+
+
+def blank_bytes(path: Path) -> str:
+    size = path.stat().st_size
+    return f"{size:,} bytes, all blanks or zeros" if size else "0 bytes"
+
+
+def blank_beside(folder: Path) -> str:
+    """What to do about an empty file that may have been of poses, where forms are looked for: in
+    a folder, below it, above it; "" where there is none.
+    """
+    inside = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+    for place in (folder, *inside[:MOST_LOOKED_AT], folder.absolute().parent):
+        for path in files_of(place):
+            if is_blank(path):
+                return f"{path_end(path)} is empty, it has {blank_bytes(path)}"
+    return ""
 
 
 def known_beside(folder: Path) -> str:

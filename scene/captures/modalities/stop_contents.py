@@ -10,8 +10,14 @@ MOST = 4  # cameras and folders of a stop that are listed
 
 
 def contents_of(capture: Capture) -> list[str]:
-    """A sentence a stop, in the order of the slider, with a photo of it as an example."""
-    return [sentence_of(capture, stop.name) for stop in capture.stops]
+    """A sentence a stop, in the order of the slider, with a photo of it as an example; of a stop
+    by formula, which has no photos, the formula.
+    """
+    return [
+        f"{stop.name}: by formula, {stop.formula}" if stop.formula
+        else sentence_of(capture, stop.name)
+        for stop in sorted((*capture.stops, *capture.formulas), key=lambda stop: stop.x)
+    ]  # fmt: skip
 
 
 def sentence_of(capture: Capture, stop: str) -> str:

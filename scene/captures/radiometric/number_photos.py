@@ -34,6 +34,14 @@ MOST_BYTES = 1 << 26  # of a CSV or a radiometric JPEG
 NO_NUMBER = frozenset(
     ("", "-", "--", "---", "nan", "na", "n/a", "#n/a", "#na", "null", "none", "nodata", "no data")
 )
+# And forms of such words: errors of spreadsheets in any language (#VALUE!, #DIV/0!, #¿NOMBRE?,
+# #N/D, Err:502), what Microsoft's C writes for NaN and Inf (1.#QNAN, -1.#IND00, -nan(ind)), what
+# lies beyond a camera's range (>150), and signs that fill a cell.
+NO_NUMBER_FORM = re.compile(
+    r"#[¡¿]?[^\W\d_][^\W_/]*(/0)?[!?]|#[^\W\d_]/[^\W\d_]!?|#nv|err(or)?:\d+"
+    r"|[+-]?1[.,]#(qnan|snan|ind|inf)\d*|[+-]?nan(\([\w# ]*\))?|[+-]?∞"
+    r"|n\.? ?[ad]\.?|[<>]=? ?[+-]?\d+([.,]\d+)?|-[-. ]*|\*+|#+|\?+"
+)
 HEAD_LINES = 20  # of words that programs write before a grid
 FLIR = re.compile(rb"\xff\xe1..FLIR\x00", re.DOTALL)  # where such a segment begins
 # Of FLIR's segments and of the directory in them; ExifTool documents both.
@@ -82,21 +90,26 @@ def _csv(path: Path) -> np.ndarray:
     rows: list[np.ndarray] = []
     lines: list[int] = []
     used: list[int] = []  # cells of each row up to the last one that is not blank
-    words = False
+    words, head = False, (0, "")
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip(" \r"):
             continue
         row, filled = _row(line)
+        if not any(used) and filled == 1 == len(_cells(line)) and _is_no_number(line):
+            row = None  # a line of **** or ---- in the head
         if row is None and not any(used) and number <= HEAD_LINES:
-            rows, lines, used, words = [], [], [], True
+            rows, lines, used, words, head = [], [], [], True, (number, line)
             continue
         if row is None:
-            raise BadFile(f"{where}: line {number} is not numbers between commas; save it again")
+            raise _no_numbers(where, number, line)
         if filled or not words or any(used):  # blanks between words and numbers are no row
             rows.append(row)
             lines.append(number)
             used.append(filled)
     width = _width([len(row) for row in rows], used)
+    cells = _cells(head[1])
+    if width == len(cells) < 2 * sum(map(_is_number, cells)) and _is_number(cells[0]):
+        raise _no_numbers(where, *head)  # a row of the grid, and no head as "y,1,2,3" is one
     for row, number in zip(rows, lines, strict=True):
         if len(row) < width:
             raise BadFile(f"{where}: line {number} is not {width} numbers; save the grid again")
@@ -119,14 +132,43 @@ def _row(line: str) -> tuple[np.ndarray | None, int]:
     """The numbers of a line, NaN where a cell has none, and how many cells there are up to the last
     that is not blank; None: there are other words.
     """
-    between = next((sign for sign in ";\t" if sign in line), ",")
-    line = line.replace(",", ".") if between != "," else line
-    cells = [cell.strip() for cell in line.split(between)]
+    cells = _cells(line)
     filled = max((i for i, cell in enumerate(cells, 1) if cell), default=0)
     try:
         return np.array([math.nan if c.lower() in NO_NUMBER else float(c) for c in cells]), filled
     except ValueError:
+        pass
+    try:
+        return np.array([math.nan if _is_no_number(c) else float(c) for c in cells]), filled
+    except ValueError:
         return None, filled
+
+
+def _no_numbers(where: str, number: int, line: str) -> BadFile:
+    strange = next((c for c in _cells(line) if not (_is_number(c) or _is_no_number(c))), "")
+    return BadFile(
+        f"{where}: line {number} is not numbers between commas, it holds {strange[:40]!r}; save it "
+        "again, or leave a cell empty where nothing was measured"
+    )
+
+
+def _cells(line: str) -> list[str]:
+    between = next((sign for sign in ";\t" if sign in line), ",")
+    line = line.replace(",", ".") if between != "," else line
+    return [cell.strip() for cell in line.split(between)]
+
+
+def _is_no_number(cell: str) -> bool:
+    """Whether a cell says that nothing was measured."""
+    word = cell.strip("\"' ").lower()
+    return word in NO_NUMBER or NO_NUMBER_FORM.fullmatch(word) is not None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False
 
 
 def is_radiometric(path: Path) -> bool:

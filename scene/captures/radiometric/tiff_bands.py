@@ -81,7 +81,7 @@ class Page:
         bits = (*self.tags.get(BITS, (1,)), *[0] * sample)[sample] or self.one(BITS, 1)
         formats = self.tags.get(FORMAT, (1,))
         kind = DTYPES.get(formats[sample] if sample < len(formats) else formats[0], "")
-        known = {"u": (8, 16, 32), "i": (16, 32), "f": (32, 64)}.get(kind, ())
+        known = {"u": (8, 16, 32), "i": (8, 16, 32), "f": (32, 64)}.get(kind, ())
         return np.dtype(f"{kind}{bits // 8}") if bits in known else None
 
 
@@ -162,19 +162,33 @@ def bands_of(path: Path, pages: list[Page]) -> list[tuple[Page, int]]:
 
 def band_header(path: Path) -> Image.Image | None:
     """The size of a TIFF that Pillow does not open, as an image without pixels, whose info has
-    "bands"; None: it is none.  Raises BadFile.
+    "bands", or its only band; None: it is none.  Raises BadFile.
     """
     if not is_tiff(path):
         return None
     found = bands_of(path, read_pages(path)[1])
     page, sample = found[0]
     dtype = page.dtype(sample)
+    if len(found) == 1 and dtype is not None:  # of 64 bits
+        return open_band(path, 1)
     header = Image.Image()
     header._size = page.size
     header._mode = "F" if dtype is not None and dtype.kind == "f" else "I;16"
     header.info["bands"] = len(found)
     header.__dict__["tag_v2"] = {GDAL_NODATA: page.no_data}  # where Pillow's TIFFs have it
     return header
+
+
+def is_misread(image: Image.Image) -> bool:
+    """Whether Pillow takes the only band of a TIFF for other numbers: -1 of 8 bits for 255, the
+    upper half of 32 bits without a sign for less than 0, and of a band that is said to lie apart
+    from none other the bytes.
+    """
+    if image.format != "TIFF" or image.mode not in ("L", "I", "I;16", "I;16B"):
+        return False
+    tags = getattr(image, "tag_v2", {})
+    kind, bits, planes = (np.ravel(tags.get(tag, 1))[0] for tag in (FORMAT, BITS, PLANES))
+    return (kind, bits) in ((2, 8), (1, 32)) or (bits > 8 and planes == APART)
 
 
 def open_band(path: Path, band: int) -> Image.Image:

@@ -149,6 +149,12 @@ def test_found_from_the_run_its_cloud_and_the_folder_between(tmp_path):
         assert describe(model, path)["bytes"] == sizes
         compare(model, raw, EYE)
         assert model.provenance["background"] == (1.0, 1.0, 1.0)
+    (run / "cfg_args").write_text("Namespace(white_background=True)", encoding="utf-16")
+    assert read_model(new).provenance["background"] == (1.0, 1.0, 1.0)
+    (run / "cfg_args").write_bytes(bytes(9))
+    unread = read_model(new)
+    assert "cfg_args is no text" in unread.findings[0].what
+    assert "background" not in unread.provenance
     facts = describe(read_model(run), run)
     assert facts["bytes"] == sizes == sum(f.stat().st_size for f in files_of(model, new))
     assert facts["format"] == "Scaffold-GS"

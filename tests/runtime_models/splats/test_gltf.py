@@ -11,13 +11,18 @@ import pytest
 from shapeshift.runtime_models.colors.spherical_harmonics import C0, shade
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.runtime_models.splats.formats import format_of, read_plain
-from shapeshift.runtime_models.splats.gltf.read_gltf import display_from_linear, read_raw_gltf
+from shapeshift.runtime_models.splats.gltf.read_gltf import (
+    OLD_SPZ,
+    display_from_linear,
+    read_raw_gltf,
+)
 from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from tests.support.splats.gltf_files import (
     P,
     as_data_uri,
+    asset_of_spz,
     attributes_in,
     glb,
     make_asset,
@@ -63,6 +68,21 @@ def test_attributes_are_read_by_name_and_order(tmp_path):
     assert splats.up == "+Y" and not splats.log_scales and not splats.logits
     for array in (splats.means, splats.scales, splats.wxyz, splats.opacity, splats.sh):
         array += 1  # the reader's own: who judges them may write
+
+
+@pytest.mark.parametrize("prefix", [P, "_"])
+def test_degree_four_is_drawn_as_three_and_its_share_is_told(tmp_path, prefix):
+    arrays = splat_arrays(7, 4)
+    squares = {
+        band: sum(float(np.square(a, dtype=float).sum()) for n, a in arrays.items() if band in n)
+        for band in ("DEGREE_1", "DEGREE_2", "DEGREE_3", "DEGREE_4")
+    }
+    named = {name.replace(P + "SH", prefix + "SH"): array for name, array in arrays.items()}
+    got = raw(write_glb(tmp_path / "a.glb", *make_asset(named)))
+    assert got.sh.shape == (7, 16, 3)
+    (found,) = got.findings
+    share = f"{100 * squares['DEGREE_4'] / sum(squares.values()):.2g} %"
+    assert "9 coefficients of SH degree 4" in found.what and share in found.done
 
 
 @pytest.mark.parametrize("kind", ["i1", "<i2"])
@@ -219,23 +239,23 @@ def test_primitives_of_other_degrees_and_other_kinds_are_merged(tmp_path):
     np.testing.assert_array_equal(splats.means[4:], low["POSITION"])
 
 
-@pytest.mark.parametrize("draft", [False, True])
-def test_spz_within(tmp_path, draft):
+@pytest.mark.parametrize(
+    "draft, name", [(False, f"{P[:-1]}_compression_spz_2"), (True, f"{P[:-1]}_compression_spz_2"),
+                    (True, f"{P[:-1]}_compression_spz"), (True, OLD_SPZ)],
+)  # fmt: skip
+def test_spz_within(tmp_path, draft, name):
     """The extension stores it half a turn about +Y away; drafts, without a colour space, do not."""
     from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 
     splats = plain_splats(30, 2)
     write_spz(splats, tmp_path / "a.spz", version=2)
-    alone, data = read_plain(tmp_path / "a.spz"), (tmp_path / "a.spz").read_bytes()
-    asset, _ = make_asset(splat_arrays(1))
-    asset["bufferViews"] = [{"buffer": 0, "byteLength": len(data)}]
-    asset["buffers"] = [{"byteLength": len(data)}]
-    asset["accessors"] = [{"componentType": 5126, "count": 30, "type": "VEC3"}] * 5
+    alone = read_plain(tmp_path / "a.spz")
+    asset, data = asset_of_spz((tmp_path / "a.spz").read_bytes(), 30, name)
     extension = asset["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]
-    extension["extensions"] = {"KHR_gaussian_splatting_compression_spz_2": {"bufferView": 0}}
     if draft:
         del extension["colorSpace"]
-    asset["extensionsRequired"] = ["KHR_gaussian_splatting_compression_spz_2"]
+    if name == OLD_SPZ:
+        asset["meshes"][0]["primitives"][0]["extensions"] = extension["extensions"]
     asset["nodes"][0]["translation"] = [0, 5, 0]
     within = read_plain(write_glb(tmp_path / "a.glb", asset, data))
     turned = (
@@ -248,6 +268,8 @@ def test_spz_within(tmp_path, draft):
     likeness = np.abs((within.wxyz * turned.wxyz).sum(1))
     np.testing.assert_allclose(likeness, 1, atol=1e-6)
     assert within.format == "glTF with spz v2"
+    assert within.axes.startswith("of the spz within: right, down, forward; its extension says so")
+    assert ("as drafts store it" in within.axes) is draft
 
 
 # Colour spaces, other kernels

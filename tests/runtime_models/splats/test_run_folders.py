@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.runtime_models.checkpoint.run_settings import settings_beside
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.splats.formats import read_plain, read_raw
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -33,6 +33,8 @@ def test_a_gsplat_run_opens_whole_and_is_drawn_as_it_was_trained(tmp_path, said,
     assert model.splat_count == 65 and model.antialiased is drawn
     assert model.stops[0].name == "results"
     assert any("cfg.yml" in finding.what for finding in model.findings) is drawn
+    assert model.findings[-1].what == "its run has splats of step 6999 as well"
+    assert model.findings[-1].done == "29999 is read" and describe(model, run)["step"] == "29999"
     assert model.provenance["files"] == [f"ckpts/ckpt_29999_rank{i}.pt" for i in range(2)]
     alone = read_plain(run / "ckpts" / "ckpt_29999_rank0.pt", HUGE)
     assert alone.antialiased is drawn, "the file alone is of the same run"
@@ -51,6 +53,15 @@ def test_a_world_that_was_not_turned_is_colmap_s(tmp_path):
     assert read_raw(one / "ply" / "point_cloud_30000.ply", Reading()).up == "+Z"
     newer = read_model(one, HUGE)  # its cloud is later than its checkpoint
     assert newer.provenance["files"] == ["ply/point_cloud_30000.ply"]
+
+
+def test_a_last_step_with_fewer_files_than_another_is_said(tmp_path):
+    write_gsplat_run(tmp_path / "a", [arrays_of(4), arrays_of(5)], step=10)
+    write_gsplat_run(tmp_path / "a", [arrays_of(4)], step=20)
+    model = read_model(tmp_path / "a", HUGE)
+    assert [f.what for f in model.findings[-2:]] == [
+        "its run has splats of step 10 as well", "step 20 has 1 of 2 files of another step",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("mode, drawn", [("antialiased", True), ("classic", False)])
@@ -86,6 +97,53 @@ def test_settings_that_contradict_themselves_or_never_end_are_said(tmp_path):
         assert told in raw.findings[0].what and len(raw.findings) == 1
 
 
+TEXT = "# caf\xe9\nantialiased: true\n"
+
+
+@pytest.mark.parametrize("name", ["cfg.yml", "config.yml", "config.yaml"])
+@pytest.mark.parametrize("data", [TEXT.encode(code) for code in (
+    "utf-8", "utf-8-sig", "utf-16", "utf-32", "cp1252")] + [
+    b"\xfe\xff" + TEXT.encode("utf-16-be")])  # fmt: skip
+def test_settings_in_any_encoding_that_says_its_name_are_read(tmp_path, name, data):
+    run = write_gsplat_run(tmp_path / "a", [arrays_of(9)])
+    (run / "cfg.yml").unlink()
+    (run / name).write_bytes(data)
+    raw = read_raw(run / "ckpts" / "ckpt_29999_rank0.pt", Reading())
+    assert raw.antialiased and len(raw.findings) == 1 and name in raw.findings[0].what
+
+
+@pytest.mark.parametrize("data, told", [
+    (b"\xff\xfe\0", "cfg.yml is no UTF-16, though it begins so"),
+    (TEXT.encode("utf-16-le"), "cfg.yml is no text"), (bytes(99), "cfg.yml is no text"),
+    (b"\x80\x81caf\xe9", "cfg.yml is no UTF-8"), (None, "cfg.yml is no file"),
+    (b"antialiased: maybe", "cfg.yml says antialiased maybe, which is unknown"),
+    (b"rasterize_mode: fancy", "cfg.yml says rasterize_mode fancy, which is unknown"),
+])  # fmt: skip
+def test_settings_that_cannot_be_read_are_said(tmp_path, data, told):
+    run = write_gsplat_run(tmp_path / "a", [arrays_of(9)])
+    (run / "cfg.yml").unlink()
+    (run / "cfg.yml").mkdir() if data is None else (run / "cfg.yml").write_bytes(data)
+    raw = read_raw(run / "ckpts" / "ckpt_29999_rank0.pt", Reading())
+    assert [finding.what for finding in raw.findings] == [f"its run's {told}"]
+    assert not raw.antialiased and not raw.findings[0].repaired
+
+
+@pytest.mark.parametrize("data, drawn, told", [
+    (b"Namespace(sh_degree=3, antialiasing=True, eval=False)", True, "was trained antialiased"),
+    (b"Namespace(sh_degree=3, antialiasing=False)", False, ""),
+    (b"Namespace(sh_degree=3)", False, ""),
+    (bytes(9), False, "cfg_args is no text"),
+])  # fmt: skip
+def test_arguments_of_a_3dgs_run_are_obeyed(tmp_path, data, drawn, told):
+    cloud = tmp_path / "point_cloud" / "iteration_7" / "point_cloud.ply"
+    cloud.parent.mkdir(parents=True)
+    write_ply(some_splats(9, 1), cloud)
+    (tmp_path / "cfg_args").write_bytes(data)
+    model = read_model(tmp_path, HUGE)
+    assert model.antialiased is drawn
+    assert [told in finding.what for finding in model.findings] == [True] * bool(told)
+
+
 def test_settings_lie_beside_what_a_checkpoint_is_packed_in(tmp_path):
     run = write_gsplat_run(tmp_path / "a", [arrays_of(30)], antialiased="true")
     file = run / "ckpts" / "ckpt_29999_rank0.pt"
@@ -105,7 +163,7 @@ def test_a_png_folder_that_lacks_a_file_names_it(tmp_path, name):
 def test_settings_of_another_folder_are_not_looked_at(tmp_path):
     (tmp_path / "cfg.yml").write_text("antialiased: true")
     (tmp_path / "scans" / "mine").mkdir(parents=True)
-    assert settings_beside(tmp_path / "scans" / "mine" / "a.pt") == ("", {})
+    assert settings_beside(tmp_path / "scans" / "mine" / "a.pt") == ("", {}, "")
     assert settings_beside(tmp_path / "a.pt")[1] == {"antialiased": ["true"]}
 
 

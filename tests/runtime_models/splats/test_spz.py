@@ -135,6 +135,31 @@ def test_a_body_of_another_version_than_the_header_s_is_refused(said, body, degr
     assert len(read(legacy(50, body, degree, streams)).means) == 50
 
 
+UNKNOWN, AXES = struct.pack("<II", 7, 5) + b"abcde", axes_extension("RDF")
+
+
+@pytest.mark.parametrize("records", [AXES, UNKNOWN, UNKNOWN + AXES, AXES + bytes(21)])
+@pytest.mark.parametrize("count", [1, 2, 4, 7, 50, 70_000])  # the last takes several pieces
+def test_a_body_of_another_version_with_extensions_behind_it_is_refused(count, records):
+    """Whole records lie where the other version's splats end, and none where its own do."""
+    for body in (1, 2, 3):
+        sizes = (6 if body == 1 else 9, 1, 3, 3, 4 if body == 3 else 3)
+        streams = [np.random.default_rng(0).bytes(size * count) for size in sizes]
+        for said in (1, 2, 3):
+            data = legacy(count, said, 0, streams, flags=2, extensions=records, raw=True)
+            if said == body:
+                raw = read(data)
+                assert len(raw.means) == count and (raw.up == "-Y") == (AXES in records)
+                continue
+            with pytest.raises(BadFile, match=f"(version {body} take|cut off)"):
+                read(data)
+
+
+def test_extensions_that_end_in_what_is_none_are_read_as_far_as_they_are_whole():
+    data = legacy(50, 2, 0, random_streams(50, 2, 0), flags=2, extensions=AXES + b"\xff" * 99)
+    assert read(data).up == "-Y"
+
+
 @pytest.mark.parametrize("more", [1, 49, 51, 149, 151, 100_000])
 def test_what_follows_the_splats_is_passed_over(more):
     data = legacy(50, 1, 0, random_streams(50, 1, 0), extensions=bytes(more))

@@ -17,6 +17,7 @@ from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.spz.spz_axes import NAMED_AXES
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
+from tests.support.splats.gltf_files import asset_of_spz, write_glb
 from tests.support.splats.ply_files import some_splats
 from tests.support.splats.spz_files import spz_of
 
@@ -198,3 +199,30 @@ def test_a_packed_file_is_read_as_the_plain_one_with_what_lies_beside(tmp_path, 
         plain.write_bytes(data)
         said = describe(read_model(plain), plain)["axes"]
         assert describe(read_model(path), path)["axes"] == said
+
+
+@pytest.mark.parametrize("version", [3, 4])
+@pytest.mark.parametrize("axes, named", [("RUB", False), ("RUB", True), ("RDF", True)])
+def test_within_a_gltf_it_is_the_same_scene_and_info_says_its_axes(tmp_path, axes, named, version):
+    want, path = ground(0.5), tmp_path / "a.glb"
+    data = spz_of(want, axes, version, NAMED_AXES.index(axes) + 1 if named else None)
+    write_glb(path, *asset_of_spz(data, len(want.means)))
+    got = read_plain(path)
+    assert np.abs(got.means + np.array(got.origin) - want.means).max() < 1e-3
+    reason = "its extension says so" if named else "as what it lies in says"
+    said = describe(read_model(path), path)["axes"]
+    assert said.startswith("of the spz within: right, ") and said.endswith(reason)
+    assert got.findings == ()
+
+
+@pytest.mark.parametrize("version", [3, 4])
+def test_within_a_gltf_one_that_stands_on_its_head_is_said(tmp_path, version):
+    """glTF says +Y is up; who packs a PLY's axes as they are says another thing."""
+    want, path = ground(0.5), tmp_path / "a.glb"
+    write_glb(path, *asset_of_spz(spz_of(want, "RDF", version), len(want.means)))
+    (found,) = read_plain(path).findings
+    assert found.what == "upside down, as its floor lies" and "--up=-Y" in found.done
+    for asked in (Reading(up="-Y"), Reading(flip=True)):
+        got = read_plain(path, asked)
+        assert got.findings == ()
+        assert (got.means + got.origin)[:, 1].min() == pytest.approx(0.5, abs=1e-3)

@@ -34,6 +34,8 @@ FORMS = {
     "csv": (".csv", np.nan, "nan", {}),
     "csv of blanks": (".csv", np.nan, "", {}),
     "csv of dashes": (".csv", np.nan, "--", {}),
+    "csv of errors": (".csv", np.nan, "#VALUE!", {}),
+    "csv of C": (".csv", np.nan, "-1.#IND", {}),
 }
 
 

@@ -63,6 +63,20 @@ def make_asset(arrays: dict[str, np.ndarray], normalized: tuple = ()) -> tuple[d
     return asset, data
 
 
+def asset_of_spz(
+    data: bytes, count: int, name: str = "KHR_gaussian_splatting_compression_spz_2"
+) -> tuple[dict, bytes]:
+    """The JSON and the binary chunk of one node whose splats are an .spz, by an extension."""
+    asset, _ = make_asset(splat_arrays(1))
+    asset["bufferViews"] = [{"buffer": 0, "byteLength": len(data)}]
+    asset["buffers"] = [{"byteLength": len(data)}]
+    asset["accessors"] = [{"componentType": 5126, "count": count, "type": "VEC3"}] * 5
+    extension = asset["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]
+    extension["extensions"] = {name: {"bufferView": 0}}
+    asset["extensionsRequired"] = [name]
+    return asset, data
+
+
 def glb(asset: dict | bytes, data: bytes = b"") -> bytes:
     text = asset if isinstance(asset, bytes) else json.dumps(asset).encode()
     text += b" " * (-len(text) % 4)

@@ -112,7 +112,12 @@ def spz_of(splats, axes: str, version: int, named: int | None = None, bits: int 
     for wxyz in splats.wxyz:
         matrix = turn @ matrix_of(wxyz)
         matrix[:, 0] *= np.linalg.det(turn)  # an axis of a splat and its minus are the same
-        words.append(pack_quaternion(xyzw_of(matrix)))
+        xyzw = xyzw_of(matrix)
+        if version < 3:  # x y z of the one whose w is positive
+            codes = np.rint((xyzw[:3] * np.copysign(1, xyzw[3]) + 1) * 127.5)
+            words.append(codes.astype(np.uint8).tobytes())
+        else:
+            words.append(struct.pack("<I", pack_quaternion(xyzw)))
     rest = b""
     if splats.sh.shape[1] == 4:  # degree 1 is -y, z, -x, times the same number
         vectors = splats.sh[:, [3, 1, 2]] * [[-1], [-1], [1]]
@@ -124,7 +129,7 @@ def spz_of(splats, axes: str, version: int, named: int | None = None, bits: int 
         np.rint(splats.opacity * 255).astype(np.uint8).tobytes(),
         np.rint((splats.sh[:, 0] * 0.15 + 0.5) * 255).clip(0, 255).astype(np.uint8).tobytes(),
         np.rint((np.log(splats.scales) + 10) * 16).clip(0, 255).astype(np.uint8).tobytes(),
-        struct.pack(f"<{count}I", *words),
+        b"".join(words),
         rest,
     ]
     said = b"" if named is None else struct.pack("<III", 0xADBE0003, 4, named)

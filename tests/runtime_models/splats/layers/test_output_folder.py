@@ -69,8 +69,30 @@ def test_the_newest_cloud_of_a_run_is_opened_and_its_points_are_not(tmp_path):
     (run / "cameras.json").write_text("[]")
     model = read_model(run)
     assert model.splat_count == 4 and [s.name for s in model.stops] == ["my run é"]
+    assert describe(model, run)["step"] == "30000"
+    assert [f.what for f in model.findings] == ["its run has splats of steps 7000, 9000 as well"]
     (file,) = files_of(model, run)
     assert file == newest_cloud(run) == run / "point_cloud/iteration_30000/point_cloud.ply"
+
+
+@pytest.mark.parametrize("folder, form", [
+    ("point_cloud", "iteration_{}/point_cloud.ply"), ("ply", "point_cloud_{}.ply"),
+])  # fmt: skip
+def test_the_folder_of_a_run_s_clouds_is_opened_at_its_newest(tmp_path, folder, form):
+    """Not as layers.  Of many steps the last few are named."""
+    for step in range(0, 80, 10):
+        put(tmp_path / folder / form.format(step), 2 + step)
+    model = read_model(tmp_path / folder)
+    assert model.splat_count == 72 and model.findings[0].done == "70 is read"
+    assert "of steps 2 more and 20, 30, 40, 50, 60 as well" in model.findings[0].what
+
+
+def test_clouds_of_a_pair_of_different_steps_are_said(tmp_path):
+    put(tmp_path / "point_cloud_color/iteration_9/point_cloud.ply", 3)
+    put(tmp_path / "point_cloud_thermal/iteration_7/point_cloud.ply", 3)
+    model = read_model(tmp_path)
+    assert describe(model, tmp_path)["step"] == "9 and 7"
+    assert model.findings[-1].what == "its two clouds are of steps 9 and 7"
 
 
 def test_one_half_of_a_thermal_run_opens_alone(tmp_path):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.formats import read_plain, read_raw
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -45,8 +46,9 @@ def test_mip_splatting_s_filter_is_in_sizes_and_opacities(tmp_path, encoding, ki
 
 
 def test_a_filter_at_the_ends_of_its_numbers(tmp_path):
-    """0 with a scale of -Inf stays flat and seen; what is no number is no size and goes."""
-    rows = random_rows(9, [*names_of(1), "filter_3D"])
+    """0 with a scale of -Inf stays flat and seen; what is no number or over 1e12 m is no size and
+    goes; a negative one counts without its sign; what hides its splat is said."""
+    rows = random_rows(11, [*names_of(1), "filter_3D"])
     for row in rows:
         row["filter_3D"] = 0.01
     rows[0]["filter_3D"], rows[0]["scale_2"] = 0.0, float("-inf")
@@ -55,8 +57,21 @@ def test_a_filter_at_the_ends_of_its_numbers(tmp_path):
     rows[3]["filter_3D"] = -0.01
     rows[4]["opacity"] = float("inf")
     rows[5]["opacity"] = float("-inf")
-    got = read_plain(write_rows(tmp_path / "a.ply", rows), HUGE)
-    assert len(got.means) == 7
+    rows[8]["filter_3D"], rows[9]["filter_3D"], rows[10]["filter_3D"] = 1e30, 1e12, -1e12
+    path = write_rows(tmp_path / "a.ply", rows, {"filter_3D": "double"})
+    got = read_plain(path, HUGE)
+    assert len(got.means) == 8 and (got.opacity[6:] < 1e-30).all()
+    assert [(f.what, f.rows) for f in got.findings[1:4]] == [
+        ("3 splats with a filter_3D that is no size in metres", (1, 2, 8)),
+        ("2 splats with a negative filter_3D", (3, 10)),
+        ("2 splats with a filter_3D that leaves them too faint to be seen", (9, 10)),
+    ]
+    with pytest.raises(BadFile, match="a filter_3D that is no size in metres"):
+        read_plain(path, Reading(strict=True, allow_huge=True))
+    for row in rows:
+        row["filter_3D"] = 1e30
+    with pytest.raises(BadFile, match="11 splats with a filter_3D that is no size"):
+        read_plain(write_rows(path, rows), HUGE)
     assert got.scales[0, 2] == 0 and got.opacity[0] > 0
     sigma, seen = filtered(rows[3], 0.01)
     np.testing.assert_allclose(got.scales[1], sigma, rtol=3e-6)

@@ -13,6 +13,7 @@ from shapeshift.scene.captures.modalities.stop_contents import contents_of
 from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.scene.strangers.modality import SITUATIONS, colmap_of, frames_of, heat, light
 from tests.support.scene.strangers.situations import Shot, write_colmap
+from tests.support.scene.strangers.values import band_folders
 
 HERE = Path("capture")
 
@@ -179,6 +180,12 @@ def test_what_a_stop_holds_is_said(tmp_path):
         "thermal: 4 photos of 12x10 pixels in images/rig1/thermal; for example "
         "images/rig1/thermal/0.png",
     ]
+
+
+def test_an_index_is_said_with_its_formula(tmp_path):
+    said = contents_of(read_capture(band_folders(tmp_path)))
+    assert said[2:] == ["NDVI: by formula, (nir - red) / (nir + red)"]
+    assert [sentence.partition(":")[0] for sentence in said] == ["Red", "NIR", "NDVI"]
 
 
 def test_many_folders_of_a_stop_are_counted(tmp_path):

@@ -39,7 +39,7 @@ def assert_bands(path, wanted) -> None:
         np.testing.assert_array_equal(found, held)
 
 
-@pytest.mark.parametrize("dtype", ["u1", "u2", "i2", "u4", "i4", "f4", "f8"])
+@pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8"])
 @pytest.mark.parametrize("beside", [False, True])
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_every_type_and_order(tmp_path, dtype, beside, order):
@@ -49,8 +49,19 @@ def test_every_type_and_order(tmp_path, dtype, beside, order):
         assert_bands(path, wanted)
 
 
-@pytest.mark.parametrize(("dtype", "predictor"), [("u1", 2), ("u2", 2), ("i4", 2), ("f4", 3),
-                                                  ("f8", 3), ("u2", 1)])  # fmt: skip
+@pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8"])
+def test_one_band_needs_no_number(tmp_path, dtype):
+    """Pillow takes some of these for other numbers, or does not open them."""
+    wanted = numbers(dtype, 1)
+    held = wanted[0].astype(np.float32) if dtype in ("u4", "f8") else wanted[0]
+    for beside in (False, True):
+        path = write_bands(tmp_path / "a.tif", wanted, beside=beside)
+        with open_image(path) as image:
+            np.testing.assert_array_equal(np.asarray(image), held)
+
+
+@pytest.mark.parametrize(("dtype", "predictor"), [("u1", 2), ("i1", 2), ("u2", 2), ("i4", 2),
+                                                  ("f4", 3), ("f8", 3), ("u2", 1)])  # fmt: skip
 @pytest.mark.parametrize("beside", [False, True])
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("tile", [None, (16, 16), (32, 16)])

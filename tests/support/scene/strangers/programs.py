@@ -127,6 +127,10 @@ SITUATIONS += [
         ("Metashape's project alone", "site.psx", "site.psx", b"<document/>",
          "a project of Metashape"),
         ("Pix4D's project alone", "flight.p4d", "flight.p4d", b"<pix4d/>", "a project of Pix4D"),
+        ("an empty file of Metashape", "cameras.xml of 0 bytes, an export that broke off",
+         "cameras.xml", b"", "empty, it has 0 bytes"),
+        ("a table of zeros", "poses.csv as a full disk leaves it", "poses.csv", bytes(600),
+         "empty, it has 600 bytes, all blanks or zeros"),
         ("COLMAP's data base alone", "database.db", "database.db", b"SQLite format 3\0",
          "COLMAP's data base, which has photos and matches and no poses"),
     )

@@ -67,6 +67,8 @@ SITUATIONS = [
     form("lowest", "heat with the least float, untold", "no data -3.4e38, no tag", INSIDE),
     form("nan", "heat with NaN", "float TIFF with NaN where nothing was measured", INSIDE),
     form("csv of blanks", "a CSV with blanks", "cells without a number", INSIDE),
+    form("csv of errors", "a CSV with errors", "cells with #VALUE! of a spreadsheet", INSIDE),
+    form("csv of C", "a CSV of Microsoft's C", "NaN written as -1.#IND, 1.#QNAN", INSIDE),
     form("tag of counts", "counts with no data", "16-bit TIFF, 0 is no data by GDAL's tag", INSIDE),
     form("said", "no data that only you know", "'no_data': -32767 in capture.json", INSIDE),
     form(

@@ -68,7 +68,7 @@ def band_suffixes(folder: Path) -> Path:
     return beside(folder, said_of(*chosen, value_range=[0, 1], counts=[0, 65535]))
 
 
-def many_bands(folder: Path, modalities: list[dict], **form) -> Path:
+def many_bands(folder: Path, modalities: list[dict], dtype: str = "u2", **form) -> Path:
     """Frames of one TIFF of five bands each, of 16 bits."""
     write_frames(folder, [Shot(f"{i}.png") for i in range(FRAMES)])
     text = (folder / "transforms.json").read_text().replace(".png", ".tif")
@@ -76,7 +76,7 @@ def many_bands(folder: Path, modalities: list[dict], **form) -> Path:
     for i in range(FRAMES):
         (folder / f"{i}.png").unlink()
         bands = random.integers(0, 60000, (5, 12, 16), dtype=np.uint16)
-        write_bands(folder / f"{i}.tif", bands, **form)
+        write_bands(folder / f"{i}.tif", bands.astype(dtype), **form)
     said = json.loads(text) | {"modalities": modalities}
     (folder / "transforms.json").write_text(json.dumps(said))
     return folder
@@ -85,6 +85,11 @@ def many_bands(folder: Path, modalities: list[dict], **form) -> Path:
 def five_bands(folder: Path) -> Path:
     said = said_of({"band": 3}, {"band": 4}, counts=[0, 60000], value_range=[0, 1])
     return many_bands(folder, said, beside=True)
+
+
+def signed_bytes(folder: Path) -> Path:
+    said = said_of({"band": 3}, {"band": 4}, counts=[-100, 100])
+    return many_bands(folder, said, "i1", beside=True)
 
 
 def no_band(folder: Path) -> Path:
@@ -172,6 +177,8 @@ SITUATIONS = [
          "Red 4 (0 to 1), NIR 4 (0 to 1), NDVI by formula"),
         ("bands in one TIFF", "five bands of 16 bits side by side, `band` in capture.json",
          five_bands, "Red 4 (0 to 1), NIR 4 (0 to 1), NDVI by formula"),
+        ("bands of signed bytes", "five bands of 8 bits with a sign, `band` in capture.json",
+         signed_bytes, "Red 4 (-100 to 100), NIR 4 (-100 to 100), NDVI by formula"),
         ("a converted camera", "red and near infrared as channels of one picture",
          infrared_camera, "Red 4 (0 to 255), NIR 4 (0 to 255), NDVI by formula"),
         ("bands without `band`", "a TIFF of five bands, nothing said", no_band,
