@@ -148,8 +148,8 @@ def test_who_sleeps_is_ended_after_twenty_times_its_time(served, monkeypatch):
 
 
 def test_memory_has_an_end(served, monkeypatch):
-    """Half of the budget is given, twice of it refused, in either direction, however slow a page."""
-    monkeypatch.setitem(gate.DOORS, "test", replace(gate.DOORS["test"], seconds=30.0))
+    """Half of the budget is given, twice of it is refused, in either direction of the pipe."""
+    monkeypatch.setitem(gate.DOORS, "test", replace(gate.DOORS["test"], seconds=30.0))  # slow pages
     assert ask("test", served, ["allocate", 50 * MB]) == 50 * MB
     for words in (["allocate", 200 * MB], ["answer", 25 * MB]):
         with pytest.raises(BadFile, match="more memory"):
