@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from shapeshift.scene.document.scene_file import SceneFile
     from shapeshift.scene.scene import Scene
 
+OF_MODELS = ("step", "axes")  # what `info` says of an object's model where it is not plain
 OF_OBJECTS = ("mode", "up", "flip")  # options that the file has for each object of its own
 
 
@@ -77,7 +78,13 @@ def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) ->
                 "collider": item.collider,
                 "static": item.static,
                 "reactions": len(item.reactions),
+                **said_of(models[item.name]),
             }
             for item in file.all_items
         ],
     }
+
+
+def said_of(model: "Model") -> dict:
+    """Those of OF_MODELS that it says."""
+    return {key: model.provenance[key] for key in OF_MODELS if key in model.provenance}

@@ -7,7 +7,7 @@ again, images/a.jpg.mask.png (RealityScan) or a_mask.png (Metashape).
 import os
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,16 +18,19 @@ from shapeshift.scene.capture_files import (
     is_picture,
     photo_key,
 )
+from shapeshift.scene.captures.capture_rules import is_grey
+from shapeshift.scene.captures.photo import ASPECT, open_image
+from shapeshift.scene.captures.radiometric.no_value import FLOATS, GREY_16
+from shapeshift.scene.other_pictures import FOLDERS, INSIDE, INVERTED, OF_PHOTO, SILHOUETTES
 
-# Folders of masks in which white counts, for photos of images/.
-FOLDERS = ("masks", "mask", "image_masks", "images_masks", "images_mask", "mask_images")
-INSIDE = (*FOLDERS, "_mask")  # within the folder of photos; RealityScan's layers
-OF_PHOTO = re.compile(r"(.+)[._-]mask$", re.DOTALL | re.IGNORECASE)  # before the ending
-# instant-ngp's hide what is white; others hold classes, in which white is one of many.
-INVERTED = re.compile(r"^dynamic_mask_")
+# Of classes, in which white is one of many.
 OTHER_FOLDERS = re.compile(r"(mask|segment|semantic)", re.IGNORECASE)
 SMALLER_PHOTOS = re.compile(r"images(_\d+)$")
 NO_NAME = "no photo has their name"
+NO_MASK = (
+    "they have colours, or another shape than their photos, or their photos are grey or have masks "
+    "elsewhere; call their folder masks/ if white counts"
+)
 
 
 class FoundMasks(NamedTuple):
@@ -37,14 +40,21 @@ class FoundMasks(NamedTuple):
     others: list[Path]  # masks of no photo
     beside: set[str]  # names below the folder of photos that are masks, not photos
     unread: list[Path]  # files of folders and forms whose white means something else
+    spare: list[Path]  # called as photos are, in folders of SILHOUETTES, and not taken
 
 
-def find_masks(base: Path, photos: Path, names: Sequence[str], listed: Sequence[str]) -> FoundMasks:
+def find_masks(
+    base: Path,
+    photos: Path,
+    names: Sequence[str],
+    listed: Sequence[str],
+    posed: Collection[str] = (),
+) -> FoundMasks:
     """names: of the photos, below the folder `photos`; listed: all files below it; base: where
-    folders of masks lie beside that one.
+    folders of masks lie beside that one; posed: photo_key of listed ones that are known as masks.
     """
     known = {photo_key(name) for name in names}
-    files = masks_inside(photos, listed, known)
+    files = masks_inside(photos, listed, known, posed)
     beside = {path.relative_to(photos).as_posix() for _, path in files}
     unread = [photos / name for name in listed if INVERTED.match(name.rpartition("/")[2])]
     there = entries_of(base, base.stat().st_mtime_ns) if base.is_dir() else {}
@@ -61,23 +71,73 @@ def find_masks(base: Path, photos: Path, names: Sequence[str], listed: Sequence[
         if other and (base / name).is_dir() and base / name != photos:
             unread += [base / name / below for below in files_below(base / name)]
     of, others = matched(names, [(name, path) for name, path in files if is_picture(name)])
-    return FoundMasks(of, others, beside, [path for path in unread if is_picture(path.name)])
+    spare: list[Path] = []
+    for name in SILHOUETTES:
+        folder = base / there.get(name, name)
+        below = photo_key(f"{os.path.relpath(folder, photos)}/")
+        if folder.is_dir() and folder != photos and not any(k.startswith(below) for k in known):
+            found, alone = masks_in(folder, names)
+            taken = {} if of else silhouettes(found, {photo_key(n): photos / n for n in names})
+            of |= taken
+            if taken:
+                others += alone
+            else:
+                spare += found.values()
+    unread = [path for path in unread if is_picture(path.name)]
+    return FoundMasks(of, others, beside, unread, spare)
 
 
-def masks_in(folder: Path, names: Sequence[str]) -> tuple[dict[str, Path], list[Path]]:
-    """Of the photos with these names in one folder of masks, and those of no photo."""
+def silhouettes(found: dict[str, Path], photos: Mapping[str, Path]) -> dict[str, Path]:
+    """The masks of a folder that may hold others: those of the photos' shape, where the first has
+    no colours and its photo has.  found, photos: by photo_key.
+    """
+    first = next(iter(found), "")
+    if not first or not is_grey_file(found[first]) or is_grey_file(photos[first]):
+        return {}
+    out = {}
+    for key, path in found.items():
+        with open_image(path) as mask, open_image(photos[key]) as photo:
+            shape = mask.width * photo.height / (mask.height * photo.width)
+        if abs(shape - 1) <= ASPECT:
+            out[key] = path
+    return out
+
+
+def is_grey_file(path: Path) -> bool:
+    """Whether a picture has no colours; one that is not there has."""
+    if not os.path.isfile(path):
+        return False
+    with open_image(path) as image:
+        mode = image.mode
+    return mode in GREY_16 or mode == FLOATS or is_grey(path)
+
+
+def masks_in(
+    folder: Path, names: Sequence[str], photos: Collection[Path] = ()
+) -> tuple[dict[str, Path], list[Path]]:
+    """Of the photos with these names in one folder of masks, and those of no photo.
+
+    photos: files that are none, where they lie in that folder, too.
+    """
     files = [(name, folder / name) for name in files_below(folder) if is_picture(name)]
-    return matched(names, files)
+    return matched(names, [file for file in files if file[1] not in photos])
 
 
-def masks_inside(photos: Path, listed: Sequence[str], known: set[str]) -> list[tuple[str, Path]]:
-    """Among the photos: called like masks, or in folders of them; with the names without these."""
+def masks_inside(
+    photos: Path, listed: Sequence[str], known: set[str], posed: Collection[str] = ()
+) -> list[tuple[str, Path]]:
+    """Among the photos: called like masks, or in folders of them; with the names without these.
+
+    posed: as of find_masks.
+    """
     found = []
     for name in listed:
         *folders, last = name.split("/")
-        outer = [part for part in folders if part.lower() not in INSIDE]
+        key = photo_key(name)
+        inside = (*INSIDE, *SILHOUETTES) if key in posed else INSIDE
+        outer = [part for part in folders if part.lower() not in inside]
         marked = len(outer) < len(folders) or OF_PHOTO.match(os.path.splitext(last)[0])
-        if marked and photo_key(name) not in known:
+        if marked and key not in known:
             found.append(("/".join([*outer, last]), photos / name))
     return found
 

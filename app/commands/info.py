@@ -108,4 +108,5 @@ def object_line(item: dict) -> str:
     words = [item["model"], *part, f"{item['splats']:,} splats", f"x {item['x']:g}", body]
     words += ["static"] if item["static"] else []
     words += [f"{item['reactions']} reactions"] if item["reactions"] else []
+    words += [f"{key} {item[key]}" for key in ("step", "axes") if key in item]
     return f"{item['name']}: " + ", ".join(words)

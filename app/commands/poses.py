@@ -78,6 +78,8 @@ def run(options: Options) -> int:
         video = options.photos.suffix.lower() in VIDEOS
         folder = frames_of(options, progress) if video else options.photos
         photos = list_photos(folder, options.every)
+        for sentence in photos.sentences:
+            say(sentence)
         try:
             report = find_poses(photos, options.out, settings, progress)
         except KeyboardInterrupt:

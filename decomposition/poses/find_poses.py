@@ -110,6 +110,7 @@ def find_poses(
         scale=scale,
         up=up,
         paired=sum(name in placed for name in photos.paired.values()),
+        others=[name for name, _ in photos.others],
     )  # fmt: skip
     write_posed(photos, placed, out, work, settings.straight, report)
     return report
@@ -181,7 +182,8 @@ def copy_masks(photos: PhotoList, masks: Path, work: Path) -> Path:
     """Masks under the names that COLMAP looks for, NAME.jpg.png.  Raises BadFile."""
     if not masks.is_dir():
         raise BadFile(f"{masks}: no folder of masks; name one with a PNG for each photo.")
-    of, _ = masks_in(masks, [photo.name for photo in photos.photos])
+    names = [photo.name for photo in photos.photos]
+    of, _ = masks_in(masks, names, {photos.root / name for name in names})
     if not of:
         raise BadFile(
             f"{masks}: no mask has a photo's name; a mask of a.jpg is called a.jpg.png or a.png."

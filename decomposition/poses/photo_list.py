@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shapeshift.decomposition.poses.pairs import PhotoFile, camera_letter, find_pairs
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import sort_of_name
 from shapeshift.scene.captures.capture_rules import stops_from
@@ -15,6 +16,8 @@ from shapeshift.scene.captures.modalities.said_modalities import said_modality_o
 from shapeshift.scene.captures.modalities.two_sorts import Opened, refuse_two_sorts
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_capture import PICTURES, has_poses
+from shapeshift.scene.mask_files import is_grey_file
+from shapeshift.scene.other_pictures import MASKS, other_pictures
 
 TIFFS = {".tif", ".tiff"}  # of heat alone: what else is a TIFF is the twin of a JPEG as a rule
 FEWEST = 3  # photos; two give a pair, and no third that says whether it is right
@@ -32,6 +35,18 @@ class PhotoList:
     stops: tuple[Stop, ...] = ()
     stop_of: tuple[tuple[str, str], ...] = ()  # name of a photo, name of its stop
     said: tuple[dict, ...] = ()  # 'modalities' of the capture.json that lay with them
+    others: tuple[tuple[str, str], ...] = ()  # name of a picture that is no photo, its kind
+
+    @property
+    def sentences(self) -> list[str]:
+        """What of the pictures is left out, and why."""
+        out = []
+        for kind in dict.fromkeys(kind for _, kind in self.others):
+            mine = [name for name, each in self.others if each == kind]
+            use = "; --masks with their folder hides what is black" if kind == MASKS else ""
+            out.append(f"{len(mine)} pictures are {kind} by their names, and no photos, for "
+                       f"example {path_end(mine[0])}{use}.")  # fmt: skip
+        return out
 
     @property
     def groups(self) -> list[list[str]]:
@@ -55,9 +70,12 @@ def list_photos(root: Path, every: int = 1) -> PhotoList:
     paths = sorted(path for path in root.rglob("*") if is_taken(path, root) and path.is_file())
     if len({path.parent for path in paths}) == 1:
         root = paths[0].parent  # one folder, however deep: its name says nothing
+    names = [path.relative_to(root).as_posix() for path in paths]
+    others = other_pictures(names, lambda row: is_grey_file(paths[row]))
     folders: dict[Path, list[Path]] = defaultdict(list)
-    for path in paths:
-        folders[path.parent].append(path)
+    for row, path in enumerate(paths):
+        if row not in others:
+            folders[path.parent].append(path)
     chosen = [read_photo(path, root) for group in folders.values() for path in group[::every]]
     stops, of, said = stops_of_photos(chosen, root, above)
     hot = {stop.name for stop in stops if stop.kind == HEAT}
@@ -71,8 +89,9 @@ def list_photos(root: Path, every: int = 1) -> PhotoList:
             f"at least {FEWEST} that overlap are needed, better 30."
         )
     refuse_copies(root, photos)
-    names = [photo.name for photo in chosen]
-    return PhotoList(root, photos, paired, stops, tuple(zip(names, of, strict=True)), said)
+    stop_of = tuple(zip((photo.name for photo in chosen), of, strict=True))
+    kinds = tuple((names[row], kind) for row, kind in others.items())
+    return PhotoList(root, photos, paired, stops, stop_of, said, kinds)
 
 
 def read_photo(path: Path, root: Path) -> PhotoFile:

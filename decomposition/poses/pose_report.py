@@ -1,6 +1,6 @@
 """What a search for poses found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -17,3 +17,4 @@ class PoseReport:
     scale: str  # where metres come from
     up: str  # where upright comes from
     paired: int = 0  # photos of a second camera that got the poses of those they were taken with
+    others: list[str] = field(default_factory=list)  # pictures that are masks, depth ... by name

@@ -33,6 +33,7 @@ from shapeshift.scene.captures.colmap.colmap_files import (
     left_beside,
     listed_split,
     masks_of,
+    photos_alone,
     photos_folder,
     points_of,
 )
@@ -56,17 +57,18 @@ def read_colmap(folder: Path) -> Capture:
     root = photos_folder(base)
     lenses, images = read_tables(model, ending, root)
     posed, unpaired = with_twins(sorted(images, key=lambda image: image.name), root)
+    table, said, known_masks = FileTable(folder), said_beside(folder), set[str]()
+    if not said.get("modalities"):
+        posed, known_masks = photos_alone(posed, root, table)
     names = [image.name for image in posed]
     paths = [find_file(root, name, ("",)).path for name in names]
-    said = said_beside(folder)
     stops, modality_of = modalities(said, posed, paths, folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
     world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
-    table = FileTable(folder)
-    masks = masks_of(base, root, list(compress(paths, there)), table)
+    masks = masks_of(base, root, list(compress(paths, there)), table, known_masks)
     means = stated_meaning(Fields(said, f"{folder}/capture.json"))
     photos: list[Photo] = []
     rescaled: list[str] = []

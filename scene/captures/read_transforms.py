@@ -35,7 +35,9 @@ from shapeshift.scene.captures.depth_photo import in_millimetres, refuse_other_u
 from shapeshift.scene.captures.lenses.frame_lens import lens_of
 from shapeshift.scene.captures.lenses.panorama import is_panorama, stereo_sentences
 from shapeshift.scene.captures.modalities.frame_modalities import (
+    named_file,
     read_capture_json,
+    said_beside,
     stops_of_frames,
 )
 from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
@@ -48,7 +50,8 @@ from shapeshift.scene.captures.radiometric.stated_bands import (
     stated_bands,
 )
 from shapeshift.scene.captures.read_points import read_points
-from shapeshift.scene.mask_files import find_masks
+from shapeshift.scene.mask_files import find_masks, is_grey_file
+from shapeshift.scene.other_pictures import other_pictures
 from shapeshift.scene.pose import OPENCV_FROM_EYE
 
 POSES = ("transform_matrix", "c2w_opencv", "c2w")
@@ -99,6 +102,7 @@ def capture_of(
     that frames name are worth a word.  Raises BadFile.
     """
     table = table or FileTable(folder)
+    entries = frames_of_photos(folder, data, entries, table)
     stops, usual, told = stops_of_frames(folder, data, entries, where)
     listed = data.get("modalities") or told
     rows, bands = enumerate(zip(entries, usual, strict=True)), stated_bands(listed, where)
@@ -143,6 +147,25 @@ def capture_of(
     refuse_other_units(capture, where)
     refuse_other_axes(capture, where)
     return capture
+
+
+def frames_of_photos(
+    folder: Path, data: dict, entries: Sequence[Mapping], table: FileTable
+) -> Sequence[Mapping]:
+    """The frames without those whose picture shows depth, normals, masks or classes, where nobody
+    says which stops there are.
+    """
+    if data.get("modalities") or any("modality" in entry for entry in entries):
+        return entries
+    names = [named_file(entry) for entry in entries]
+    found = other_pictures(names, lambda row: is_grey_file(find_file(folder, names[row]).path))
+    if not found or said_beside(folder).get("modalities"):
+        return entries
+    for kind in dict.fromkeys(found.values()):
+        mine = [find_file(folder, names[row]).path for row in found if found[row] == kind]
+        table.left_out(kind, mine, "they have frames as photos do; 'modality' makes a stop of them")
+        table.accounted |= {photo_key(str(path)) for path in mine}
+    return [entry for row, entry in enumerate(entries) if row not in found]
 
 
 def photos_and_doubts(
@@ -195,7 +218,7 @@ def unnamed_files(folder: Path, photos: Sequence[Photo], table: FileTable) -> No
         ]
         base = folder if root != folder and root.is_relative_to(folder) else root.parent
         found = find_masks(base, root, names, listed)
-        lying = [*found.of.values()]
+        lying = [*found.of.values(), *found.spare]
         table.left_out("masks", lying, "no frame names one ('mask_path')")
         named |= {photo_key(str(path)) for path in lying}
     table.unnamed("photos", places, named)

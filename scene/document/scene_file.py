@@ -4,6 +4,7 @@ This is the file's own content, models still being paths; `read_models` opens th
 gives what the renderer draws.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from shapeshift.scene.selectors.selector import UPRIGHT, Painted, Selector
 from shapeshift.scene.world.reactions import Machine, Reaction, State, TwoAxes
 
 FORMAT = "shapeshift-scene 1"
+UP_OPTION = re.compile(r"--up=([+-][XYZ])")
 ENDING = ".scene.json"
 HULLS = "hulls"  # as a collider: made from the splats
 BACKGROUND = "background"  # the name of the background's object
@@ -135,7 +137,7 @@ def read_models(
         if key not in opened:
             own = replace(reading, mode=item.mode, up=item.up, flip=item.flip)
             try:
-                opened[key] = read_model(file.path(item.model), own)
+                opened[key] = advised_in_file(read_model(file.path(item.model), own))
             except BadFile as error:
                 raise BadFile(f"object '{item.name}': 'model': {error}") from None
         if item.part is None:
@@ -151,6 +153,15 @@ def read_models(
         items.append(item if item.placed else replace(item, position=position, placed=True))
     background = items.pop(0) if file.background else None
     return replace(file, items=tuple(items), background=background), models
+
+
+def advised_in_file(model: Model) -> Model:
+    """The model, its findings with keys of the file for options that a scene does not take."""
+    told = (
+        replace(found, done=UP_OPTION.sub(r'"up": "\1" of its object', found.done))
+        for found in model.findings
+    )
+    return replace(model, findings=tuple(told)) if model.findings else model
 
 
 def scene_of(file: SceneFile, models: Mapping[str, Model]) -> Scene:

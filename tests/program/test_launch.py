@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -288,6 +289,24 @@ def test_the_whole_suite_runs_in_two_processes_and_a_choice_of_it_in_one(launch,
     for cores in (1, None):  # None: not known
         monkeypatch.setattr(launch.os, "cpu_count", lambda cores=cores: cores)
         assert launch.pytest_words(["-q"]) == ["-m", "pytest", "-q"]
+
+
+@pytest.mark.parametrize(
+    ("slow", "minutes", "begins"),
+    [(True, 1.0, False), (True, 2.0, True), (True, float("inf"), True), (False, 0.0, True)],
+)
+def test_slow_tests_begin_within_their_minutes(request, slow, minutes, begins):
+    """61 seconds after the start."""
+    (conftest,) = (p for p in request.config.pluginmanager.get_plugins() if hasattr(p, "BEGAN"))
+    config = SimpleNamespace(
+        getoption={"--slow-minutes": minutes}.get, stash={conftest.BEGAN: time.monotonic() - 61}
+    )
+    item = SimpleNamespace(keywords=["slow"] if slow else [], config=config)
+    if begins:
+        conftest.pytest_runtest_setup(item)
+    else:
+        with pytest.raises(pytest.skip.Exception, match="1 minutes are over"):
+            conftest.pytest_runtest_setup(item)
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals of POSIX")

@@ -1,7 +1,7 @@
 """The files that lie with a COLMAP model: photos, masks, points, lists; and what is not read."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from shapeshift.scene.capture_files import (
     SMALLER,
     entries_of,
     files_below,
+    find_file,
     is_picture,
     photo_key,
 )
@@ -21,11 +22,20 @@ from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.capture_rules import split_every_8th
 from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
 from shapeshift.scene.captures.colmap.text_lines import lines_of
-from shapeshift.scene.captures.colmap_tables import ending_of, images_in, models_in
-from shapeshift.scene.mask_files import NO_NAME, find_masks
+from shapeshift.scene.captures.colmap_tables import Posed, ending_of, images_in, models_in
+from shapeshift.scene.mask_files import NO_MASK, NO_NAME, find_masks, is_grey_file
+from shapeshift.scene.other_pictures import (
+    CLASSES,
+    DEPTH,
+    MASKS,
+    NORMALS,
+    kind_of_folder,
+    other_pictures,
+)
 
-BESIDE = {"depth photos": ("depth", "depths", "depth_maps"), "normal maps": ("normal", "normals")}
+NORMAL = "normal"  # a folder of normal maps beside that of photos, where it is no state of a thing
 OTHER_MASKS = "their white hides, or stands for a class; masks/ is for those whose white counts"
+POSED = "they are posed as photos; a transforms.json can name them, capture.json can make a stop"
 FEW = 4  # models that a sentence names
 # nerfstudio's, beside the model
 LISTS = {"train_list.txt": "train", "validation_list.txt": "test", "test_list.txt": "test"}
@@ -48,8 +58,34 @@ def photos_folder(base: Path) -> Path:
     return next((base / name for name in names if (base / name).is_dir()), base)
 
 
-def masks_of(base: Path, root: Path, paths: Sequence[Path], table: FileTable) -> dict[Path, Path]:
-    """The masks of photos; what else lies among these and these masks is left out."""
+def photos_alone(posed: list[Posed], root: Path, table: FileTable) -> tuple[list[Posed], set[str]]:
+    """The images without those that show depth, normals, masks or classes; photo_key of the masks.
+
+    Where nobody says which stops there are: a model may be of everything below images/.
+    """
+    paths = [find_file(root, image.name, ("",)).path for image in posed]
+    found = other_pictures([image.name for image in posed], lambda row: is_grey_file(paths[row]))
+    for kind in (DEPTH, NORMALS, CLASSES):
+        mine = [paths[row] for row, each in found.items() if each == kind]
+        table.left_out(kind, mine, POSED)
+        table.accounted |= {photo_key(str(path)) for path in mine}
+    masks = [paths[row] for row, kind in found.items() if kind == MASKS]
+    if masks:
+        table.sentences.append(
+            f"{len(masks)} images of the model are called as masks are, and taken for that, for "
+            f"example {table.short(masks[0])}; capture.json makes a stop of them."
+        )
+    rest = [image for row, image in enumerate(posed) if row not in found]
+    return rest, {photo_key(name_below(root, path)) for path in masks}
+
+
+def masks_of(
+    base: Path, root: Path, paths: Sequence[Path], table: FileTable, posed: Collection[str] = ()
+) -> dict[Path, Path]:
+    """The masks of photos; what else lies among these and these masks is left out.
+
+    posed: masks that the model has, as of photos_alone.
+    """
     name_of = {path: name_below(root, path) for path in paths}
     names = list(name_of.values())
     if root == base:  # beside the model: only folders that have photos of it
@@ -61,13 +97,15 @@ def masks_of(base: Path, root: Path, paths: Sequence[Path], table: FileTable) ->
         ]
     else:
         listed = files_below(root)
-    found = find_masks(base, root, names, listed)
+    found = find_masks(base, root, names, listed, posed)
     known = {photo_key(name) for name in names}
     no_photos = {*found.unread, *(root / name for name in found.beside)}
     others = [root / name for name in listed if is_picture(name) and photo_key(name) not in known]
+    others = [path for path in others if photo_key(str(path)) not in table.accounted]
     table.unposed(path for path in others if path not in no_photos)
     table.left_out("masks", found.others, NO_NAME)
     table.left_out("masks", found.unread, OTHER_MASKS)
+    table.left_out("masks", found.spare, NO_MASK)
     return {path: found.of[key] for path in paths if (key := photo_key(name_of[path])) in found.of}
 
 
@@ -137,14 +175,13 @@ def said_of_models(model: Path, ending: str) -> tuple[str, ...]:
 
 def unread_folders(base: Path, table: FileTable) -> None:
     """Depth photos and normal maps beside COLMAP's model, whose tables name none."""
-    there = entries_of(base, base.stat().st_mtime_ns)
-    for kind, names in BESIDE.items():
-        files = [
-            base / there[name] / below
-            for name in names
-            if name in there and (base / there[name]).is_dir()
-            for below in files_below(base / there[name])
-        ]
+    found: dict[str, list[Path]] = {DEPTH: [], NORMALS: []}
+    for name in entries_of(base, base.stat().st_mtime_ns).values():
+        kind = NORMALS if name.lower() == NORMAL else kind_of_folder(name)
+        if kind in found and (base / name).is_dir():
+            files = [base / name / below for below in files_below(base / name)]
+            found[kind] += [p for p in files if photo_key(str(p)) not in table.accounted]
+    for kind, files in found.items():
         table.left_out(kind, files, "a COLMAP model names none, a transforms.json can")
 
 

@@ -20,6 +20,7 @@ from shapeshift.scene.capture_photos import image_size
 from shapeshift.scene.captures.capture_rules import LARGEST_NUMBER
 from shapeshift.scene.captures.colmap_tables import BROWN, ColmapCamera
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
+from shapeshift.scene.other_pictures import kind_of_folder
 from shapeshift.scene.pose import OPENCV_FROM_EYE
 
 MOST_ENTRIES = 50_000  # files below a folder among which photos are looked for
@@ -72,6 +73,8 @@ class PhotoIndex:
         alike = best([ends_alike(path, parts) for path in alike or ()], alike or [])
         if len(alike) > 1 and hint:
             alike = best([folded(hint) in folded(path) for path in alike], alike)
+        if len(alike) > 1:  # alpha/1.png beside images/1.png
+            alike = best([not any(map(kind_of_folder, p.split("/")[:-1])) for p in alike], alike)
         if len(alike) > 1:  # copies that OpenSfM makes; what it writes of them names them itself
             alike = best([STRAIGHT not in folded(path) for path in alike], alike)
         if len(alike) > 1 and size is not None:

@@ -11,6 +11,8 @@ from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.support.models import STOPS, make_random_model
 from tests.support.splat_scenes import shell
+from tests.support.splats.ply_files import some_splats
+from tests.support.splats.spz_files import spz_of
 
 KEYS = {"format", "anchors", "splats", "sh_degree", "stops", "bytes"}
 
@@ -76,6 +78,19 @@ def test_the_table_says_the_same(tmp_path, capsys):
     table = capsys.readouterr().out
     for words in ("anchors", "3,000", "0.000  RGB (rgb)", "1.000  Thermal (thermal)", "color:"):
         assert words in table
+
+
+def test_a_scene_file_says_axes_and_its_own_key_for_another_one(tmp_path, capsys):
+    (tmp_path / "a.spz").write_bytes(spz_of(some_splats(300, 4), "RUB", 3))
+    path = tmp_path / "a.scene.json"
+    objects = [{"name": "a", "model": "a.spz"}, {"name": "b", "model": "a.spz", "up": "-Y"}]
+    path.write_text(json.dumps({"format": "shapeshift-scene 1", "objects": objects}))
+    assert info(path, "--json") == 0
+    told = capsys.readouterr()
+    first, second = json.loads(told.out)["objects"]
+    assert first["axes"].startswith("right, up, back; a guess") and "axes" not in second
+    assert 'text of version 3 has it; "up": "-Y" of its object turns it over' in told.err
+    assert info(path) == 0 and "axes right, up," in capsys.readouterr().out
 
 
 def test_names_with_brackets_are_no_markup(capsys):

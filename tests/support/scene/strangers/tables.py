@@ -1,9 +1,11 @@
 """Situations of tables and files: what is written oddly, and what is not read without a word."""
 
 import shutil
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from shapeshift.decomposition.poses.photo_list import list_photos
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.scene.strangers.situations import (
@@ -13,6 +15,7 @@ from tests.support.scene.strangers.situations import (
     short,
     write_colmap,
     write_frames,
+    write_photos,
 )
 
 Change = Callable[[Path], object]
@@ -30,11 +33,18 @@ def files_in(path: Path) -> str:
     return "; ".join([", ".join(used), *left])
 
 
-def colmap_with(*changes: Change, names: str = "{}.png") -> Callable[[Path], Path]:
-    """Six photos of one camera, then changed."""
+def searched(path: Path) -> str:
+    """What `poses` takes for photos, and for what it takes the other pictures."""
+    found = list_photos(path)
+    kinds = Counter(kind for _, kind in found.others)
+    return ", ".join([f"{len(found.photos)} photos", *(f"{n} {k}" for k, n in kinds.items())])
+
+
+def photos_with(*changes: Change) -> Callable[[Path], Path]:
+    """Three photos that nobody has posed."""
 
     def make(folder: Path) -> Path:
-        write_colmap(folder, [Shot(names.format(i)) for i in range(6)])
+        write_photos(folder, [Shot(f"{i}.jpg") for i in range(3)])
         for change in changes:
             change(folder)
         return folder
@@ -42,9 +52,29 @@ def colmap_with(*changes: Change, names: str = "{}.png") -> Callable[[Path], Pat
     return make
 
 
-def frames_with(*changes: Change, **more) -> Callable[[Path], Path]:
+def colmap_with(
+    *changes: Change, names: str = "{}.png", more: str = "", mode: str = "RGB"
+) -> Callable[[Path], Path]:
+    """Six photos of one camera, then changed; more: names of as many pictures of another kind and
+    mode that the model has, too.
+    """
+
     def make(folder: Path) -> Path:
-        write_frames(folder, [Shot(f"images/{i}.png") for i in range(6)], **more)
+        others = [Shot(more.format(i), mode) for i in range(6)] if more else []
+        write_colmap(folder, [*(Shot(names.format(i)) for i in range(6)), *others])
+        for change in changes:
+            change(folder)
+        return folder
+
+    return make
+
+
+def frames_with(*changes: Change, other: str = "", **more) -> Callable[[Path], Path]:
+    """other: names of as many depth photos that have frames of their own."""
+
+    def make(folder: Path) -> Path:
+        others = [Shot(other.format(i), "I;16") for i in range(6)] if other else []
+        write_frames(folder, [*(Shot(f"images/{i}.png") for i in range(6)), *others], **more)
         for change in changes:
             change(folder)
         return folder
@@ -103,6 +133,10 @@ def zero(data: bytes) -> bytes:
 
 
 ALL = "6 photos"
+NO_MASK = (
+    "they have colours, or another shape than their photos, or their photos are grey or have masks "
+    "elsewhere; call their folder masks/ if white counts"
+)
 SITUATIONS = [
     Situation("lines of Windows", "images.txt with CR LF, as RealityScan exports it",
               colmap_with(table(lambda data: data.replace(b"\n", b"\r\n"))), ALL, files_in),
@@ -165,6 +199,50 @@ SITUATIONS = [
               colmap_with(pictures("depth/0.png")),
               "6 photos; left out: 1 depth photos, a COLMAP model names none, a transforms.json "
               "can", files_in),
+    *(Situation(f"{word}/ beside images/", f"{word}/0.png of one channel, of the same names",
+                colmap_with(masks(f"{word}/{{}}.png")), "6 photos, 6 masks", files_in)
+      for word in ("alpha", "matte", "silhouette", "silhouettes")),
+    Situation("alpha/ in colours", "alpha/0.png that is a photo",
+              colmap_with(pictures("alpha/0.png")),
+              f"6 photos; left out: 1 masks, {NO_MASK}", files_in),
+    Situation("two places of heat", "images/alpha/ and images/beta/ of one channel",
+              lambda folder: write_colmap(folder, [Shot(f"{place}/{i}.png", "L") for i in range(3)
+                                                   for place in ("alpha", "beta")]),
+              "6 photos", files_in),
+    Situation("silhouettes beside masks", "masks/ and silhouettes/ for the same photos",
+              colmap_with(masks("masks/{}.png"), masks("silhouettes/{}.png")),
+              f"6 photos, 6 masks; left out: 6 masks, {NO_MASK}", files_in),
+    *(Situation(f"{word} posed as photos", f"images/{form.format(0)} in COLMAP's table",
+                colmap_with(names=name, more=form, mode=mode),
+                f"6 photos; left out: 6 {kind}, they are posed as photos; a transforms.json can "
+                "name them, capture.json can make a stop", files_in)
+      for word, name, form, mode, kind in (
+          ("depth photos", "rgb/{}.png", "depth/{}.png", "I;16", "depth photos"),
+          ("depth in false colours", "{}.png", "depth_maps/{}.png", "RGB", "depth photos"),
+          ("depth photos by name", "r_{}.png", "r_{}_depth_0001.png", "L", "depth photos"),
+          ("normal maps", "rgb/{}.png", "normals/{}.png", "RGB", "normal maps"),
+          ("classes", "rgb/{}.png", "segmentation/{}.png", "RGB", "pictures of classes"))),
+    *(Situation(f"{word} posed as photos", f"images/{form.format(0)} in COLMAP's table",
+                colmap_with(names="rgb/{}.png", more=form, mode="L"), "6 photos, 6 masks", files_in)
+      for word, form in (("masks", "masks/{}.png"), ("silhouettes", "silhouettes/{}.png"),
+                         ("masks of RealityScan", "rgb/{}.png.mask.png"))),
+    *(Situation(f"photos in {word}/", f"images/rgb/ and images/{word}/ of colours",
+                colmap_with(names="rgb/{}.png", more=f"{word}/{{}}.png"), "12 photos", files_in)
+      for word in ("depth_of_field", "masks", "alpha", "normal")),
+    Situation("depth photos with frames", "images/0.png and depth/0.png in transforms.json",
+              frames_with(other="depth/{}.png"),
+              "6 photos; left out: 6 depth photos, they have frames as photos do; 'modality' makes "
+              "a stop of them", files_in),
+    *(Situation(f"poses of photos beside {word}", f"0.jpg and {form.format(0)} in one folder",
+                photos_with(masks(form, 3)), f"3 photos, 3 {kind}", searched)
+      for word, form, kind in (
+          ("masks of RealityScan", "{}.jpg.mask.png", "masks"),
+          ("masks of Metashape", "{}_mask.png", "masks"), ("masks/", "masks/{}.png", "masks"),
+          ("silhouettes/", "silhouettes/{}.png", "masks"),
+          ("instant-ngp's masks", "dynamic_mask_{}.png", "masks"),
+          ("depth/", "depth/{}.png", "depth photos"))),
+    Situation("poses of photos of masks", "photos in colours in masks/ and in vases/",
+              photos_with(pictures(*(f"masks/{i}.jpg" for i in range(3)))), "6 photos", searched),
     Situation("frames beside other photos", "a photo that no frame names",
               frames_with(pictures("images/9.png")),
               "6 photos; left out: 1 photos, they have no pose", files_in),
