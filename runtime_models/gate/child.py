@@ -50,6 +50,7 @@ def main(program: str) -> None:
             return
         if "memory" in answer:
             return  # a process that has run out of memory is in no known state
+        del request, answer  # they are no part of what the next file takes
 
 
 def heed_limits() -> None:
@@ -62,7 +63,7 @@ def heed_limits() -> None:
 
 def private_pipes() -> tuple[BinaryIO, BinaryIO]:
     """The pipes of the parent, where no library's print can reach them."""
-    given, answers = os.fdopen(os.dup(0), "rb", buffering=0), os.fdopen(os.dup(1), "wb")
+    given, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1):
         os.dup2(nowhere, standard)

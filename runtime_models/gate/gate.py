@@ -32,6 +32,7 @@ CHILD = Path(__file__).with_name("child.py")
 TICK_S = 0.05  # between looks at a process that works
 WAIT = 20  # times its processor time that a process may take on a busy machine
 START_S = 120  # to start and to load a package
+PIPE = 1 << 20  # bytes that may wait in a pipe
 IDLE = 1  # processes of a door that are kept
 MOST_FILES = 500  # that one process serves: what libraries leave behind goes with it
 OWN = ("PXR_", "USD_", "TF_", "OMP_", "FFREPORT", "GDK_")  # words that change a library
@@ -68,25 +69,27 @@ class Process:
                 f"the process that would read the file does not start ({why.strerror or why}); "
                 f"it would be {python or 'of no Python that is known'}"
             ) from None
+        widen(self.child.stdin)
+        widen(self.child.stdout)
         self.served = 0
         self.owner = os.getpid()
+        self.wanted: queue.SimpleQueue[int | None] = queue.SimpleQueue()
+        self.answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        heard = (self.child.stdout, self.wanted, self.answers)
+        threading.Thread(target=listen, args=heard, daemon=True).start()
 
     def ask(self, request: dict, patience: float, most: int, hear: Tell | None) -> dict:
         """The answer to a request.  Raises Ended, BadFile where nothing can be limited."""
-        assert self.child.stdin is not None and self.child.stdout is not None
-        answers: queue.Queue[Any] = queue.Queue()
+        assert self.child.stdin is not None
         try:
             send(self.child.stdin, request)  # type: ignore[arg-type]
         except OSError:
             raise Ended("crash") from None
-        listener = threading.Thread(
-            target=listen, args=(self.child.stdout, answers, most), daemon=True
-        )
-        listener.start()
+        self.wanted.put(most)
         limit, deadline = 0, time.monotonic() + START_S
         while True:
             try:
-                said = answers.get(timeout=TICK_S)
+                said = self.answers.get(timeout=TICK_S)
             except queue.Empty:
                 if time.monotonic() > deadline:
                     raise Ended("time") from None
@@ -132,6 +135,7 @@ class Process:
             return
         self.child.kill()
         self.child.wait()
+        self.wanted.put(None)
         for stream in (self.child.stdin, self.child.stdout):
             try:
                 if stream is not None:
@@ -140,17 +144,34 @@ class Process:
                 pass
 
 
-def listen(pipe: BinaryIO, answers: "queue.Queue[Any]", most: int) -> None:
-    """Puts what a process says into the queue, up to its answer; None where it ends before."""
-    while True:
-        try:
-            said = receive(pipe, most)
-        except (EOFError, ValueError, OSError, KeyError, TypeError, IndexError):
-            answers.put(None)
-            return
-        answers.put(said)
-        if "armed" not in said and "tell" not in said:
-            return
+def widen(stream: Any) -> None:
+    """Lets more wait in a pipe where the system can: fewer turns of the processor for a file."""
+    try:
+        import fcntl
+
+        fcntl.fcntl(stream, fcntl.F_SETPIPE_SZ, PIPE)
+    except (ImportError, AttributeError, OSError):  # not Linux, or more pipes than a user may have
+        pass
+
+
+def listen(
+    pipe: BinaryIO, wanted: "queue.SimpleQueue[int | None]", answers: "queue.SimpleQueue[Any]"
+) -> None:
+    """Puts what a process says into the queue, up to its answer; None where it ends before.
+
+    wanted: the most bytes of each; what nobody asked for stays in the pipe.
+    """
+    while (most := wanted.get()) is not None:
+        more = True
+        while more:
+            try:
+                said = receive(pipe, most)
+                more = "armed" in said or "tell" in said
+            except Exception:  # of what a process says that its file has taken over: any
+                answers.put(None)
+                return
+            answers.put(said)
+            del said  # its arrays are the reader's
 
 
 idle_processes: dict[str, list[Process]] = {}

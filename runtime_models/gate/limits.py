@@ -70,7 +70,8 @@ def own_bytes() -> int:
     if sys.platform == "darwin":
         return resident(os.getpid()) or 0
     try:
-        return int(STATM.read_text().split()[PAGE_DATA]) * os.sysconf("SC_PAGE_SIZE")
+        with open(STATM, "rb", buffering=0) as told:
+            return int(told.read(1 << 10).split()[PAGE_DATA]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, IndexError, ValueError):  # no /proc
         return most_resident()
 

@@ -5,12 +5,12 @@ import io
 import numpy as np
 
 from shapeshift.runtime_models.gate.refusal import Unreadable
+from shapeshift.scene.colliders.triangle_mesh import joined
 
 
-def mesh_arrays(data: bytes, kind: str) -> dict:
-    """{"vertices": (V, 3), "faces": (F, 3) int64} of a file's bytes; kind: its ending.
-
-    Raises Unreadable.
+def mesh_arrays(data: bytes, kind: str, name: str) -> dict:
+    """{"vertices": (V, 3) float32, "faces": (F, 3) int32} of a file's bytes, as triangle_mesh's
+    `joined` makes them; kind: its ending; name: that of the file.  Raises Unreadable, BadFile.
     """
     import trimesh
 
@@ -31,4 +31,5 @@ def mesh_arrays(data: bytes, kind: str) -> dict:
         raise Unreadable(f"cannot be read as a mesh ({reason}); it is damaged") from None
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise Unreadable(f"it has vertices of {vertices.shape[-1]} numbers; 3 are wanted")
-    return {"vertices": vertices, "faces": faces}
+    mesh = joined(vertices, faces, name)
+    return {"vertices": mesh.vertices, "faces": mesh.faces}

@@ -18,11 +18,10 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.gltf.gltf_files import Asset
 from shapeshift.runtime_models.splats.gltf.gltf_nodes import OBEYED, placed_meshes
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y
-from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.colliders.triangle_mesh import MOST_FACES, TriangleMesh, joined
 
 ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 MOST_BYTES = 256 << 20
-MOST_FACES = 2_000_000
 MOST_HEADER = 65536  # bytes of a PLY's header
 PLY_SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2,
              "uint16": 2, "int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4,
@@ -54,41 +53,18 @@ def read_mesh(path: Path, leave_out: Collection[int] = ()) -> TriangleMesh:
     refuse_empty(path)
     memory = Memory().of(path)
     if ending in (".glb", ".gltf"):
-        vertices, faces = read_gltf_triangles(path, memory, leave_out)
-    else:
-        vertices, faces = read_by_trimesh(path, ending[1:], memory)
-    return clean(vertices, faces, path.name)
+        return joined(*read_gltf_triangles(path, memory, leave_out), path.name)
+    return read_by_trimesh(path, ending[1:], memory)
 
 
-def clean(vertices: np.ndarray, faces: np.ndarray, name: str) -> TriangleMesh:
-    """The mesh with equal vertices joined and faces of no area left out.  Raises BadFile."""
-    if len(faces) > MOST_FACES:
-        raise BadFile(f"{name} has {len(faces):,} faces; {MOST_FACES:,} at most, simplify it.")
-    if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
-        raise BadFile(f"{name} has faces of vertices that it does not have; it is damaged.")
-    with np.errstate(over="ignore"):
-        vertices = np.asarray(vertices, np.float32)
-    if not np.isfinite(vertices[faces]).all():
-        raise BadFile(f"{name} has vertices that are NaN or Inf; repair it.")
-    used, rows = np.unique(faces, return_inverse=True)
-    vertices, joined = np.unique(vertices[used] + np.float32(0), axis=0, return_inverse=True)
-    faces = joined.reshape(-1)[rows.reshape(-1)].reshape(-1, 3).astype(np.int32)
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
-    if not len(faces):
-        raise BadFile(f"{name} has no triangles; a collider needs some.")
-    if not 0 < np.ptp(vertices, axis=0).max() < 1e6:
-        raise BadFile(
-            f"{name} is {np.ptp(vertices, axis=0).max():.3g} m long; below 1000 km, please."
-        )
-    return TriangleMesh(vertices, faces)
+def read_by_trimesh(path: Path, kind: str, memory: Account) -> TriangleMesh:
+    """The joined mesh of an .obj, .ply or .stl.  Raises BadFile.
 
-
-def read_by_trimesh(path: Path, kind: str, memory: Account) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) and faces (F, 3) of an .obj, .ply or .stl.  Raises BadFile."""
+    Joined behind the gate as well: a few large arrays fewer go through its pipe.
+    """
     left = memory.left
-    found = ask("mesh", path, [prepared(path, kind, memory), kind], memory=left)
-    return found["vertices"], found["faces"]
+    found = ask("mesh", path, [prepared(path, kind, memory), kind, path.name], memory=left)
+    return TriangleMesh(found["vertices"], found["faces"])
 
 
 def prepared(path: Path, kind: str, memory: Account) -> bytes:

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import check
+
+MOST_FACES = 2_000_000  # of a file
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,45 @@ class TriangleMesh:
                 f"a mesh has faces of vertices {self.faces.min()} to {self.faces.max()}; there are "
                 f"{len(self.vertices)} vertices, counted from 0."
             )
+
+
+def joined(vertices: np.ndarray, faces: np.ndarray, name: str) -> TriangleMesh:
+    """The mesh with equal vertices joined and faces of no area left out.  Raises BadFile."""
+    if len(faces) > MOST_FACES:
+        raise BadFile(f"{name} has {len(faces):,} faces; {MOST_FACES:,} at most, simplify it.")
+    if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise BadFile(f"{name} has faces of vertices that it does not have; it is damaged.")
+    with np.errstate(over="ignore"):
+        vertices = np.asarray(vertices, np.float32)
+    if not np.isfinite(vertices[faces]).all():
+        raise BadFile(f"{name} has vertices that are NaN or Inf; repair it.")
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    vertices, same = unique_rows(vertices[used] + np.float32(0))  # -0 is 0
+    faces = same[np.cumsum(used, dtype=np.int32)[faces] - 1]
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    if not len(faces):
+        raise BadFile(f"{name} has no triangles; a collider needs some.")
+    if not 0 < np.ptp(vertices, axis=0).max() < 1e6:
+        raise BadFile(
+            f"{name} is {np.ptp(vertices, axis=0).max():.3g} m long; below 1000 km, please."
+        )
+    return TriangleMesh(vertices, faces)
+
+
+def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(U, 3) in the order of x, y, z, and the row there of each of (N, 3), int32.
+
+    As np.unique(axis=0) does, in a fifth of its time.
+    """
+    order = np.lexsort(rows.T[::-1])
+    rows = rows[order]
+    first = np.ones(len(rows), bool)
+    first[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    same = np.empty(len(rows), np.int32)
+    same[order] = np.cumsum(first, dtype=np.int32) - 1
+    return rows[first], same
 
 
 def separate(mesh: TriangleMesh) -> list[TriangleMesh]:

@@ -8,6 +8,7 @@ import trimesh
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.colliders.read_mesh import read_mesh
+from shapeshift.scene.colliders.triangle_mesh import joined, unique_rows
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 ENDINGS = ("obj", "ply", "stl", "glb")
@@ -40,6 +41,21 @@ def test_a_box_of_trimesh(tmp_path, ending, options):
     assert (len(mesh.vertices), len(mesh.faces)) == (8, 12)
     solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     assert solid.volume == pytest.approx(6, rel=1e-5) and solid.is_watertight
+
+
+def test_equal_rows_are_joined_as_numpy_joins_them():
+    """Its unique() of axis 0, and 0, 1, many rows; -0, denormals and 0 side by side."""
+    draw = np.random.default_rng(0)
+    for count in (0, 1, 400):
+        rows = draw.choice(np.float32([-2, -1e-45, 0, 1e-45, 3]), (count, 3))
+        found, same = unique_rows(rows)
+        wanted, rank = np.unique(rows, axis=0, return_inverse=True)
+        np.testing.assert_array_equal(found, wanted, strict=True)
+        np.testing.assert_array_equal(same, rank.reshape(-1))
+    corners = np.float32([(0, 0, 0), (-0.0, 0, 0), (1, 0, 0), (9, 9, 9), (0, 1, 0)])
+    mesh = joined(corners, np.array([(0, 2, 4), (1, 0, 2), (1, 4, 2)]), "a")
+    assert mesh.vertices.tolist() == [[0, 0, 0], [0, 1, 0], [1, 0, 0]]  # none of no face
+    assert mesh.faces.tolist() == [[0, 2, 1], [0, 1, 2]]
 
 
 def test_glb_is_turned_as_its_splats_are(tmp_path):
