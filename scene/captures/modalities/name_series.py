@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 HEAT, LIGHT, BLEND = "thermal", "rgb", "blend"  # BLEND: one laid over the other
 ROLES = (HEAT, LIGHT, BLEND)
+DIGIT = re.compile(r"\d")  # names are matched once a shape: no pattern below may name a digit
 FEWEST_SHARED = 2  # numbers: one may be by chance
 
 
@@ -38,7 +39,7 @@ SERIES = (
         rf"{HELD}[ _-]?(?:msx|pip|fusion|blend|mix)",
     ),
     series(r"(?:HM|IR)_?(\d{6,})", r"(?:VL|VM|VIS|DC|V)_?(\d{6,})"),  # HIKMICRO
-    series(rf"{TAKEN}_(?:8b|14b|R|IR)", TAKEN),  # FLIR's Duo Pro
+    series(rf"{TAKEN}_(?:\d\d?b|R|IR)", TAKEN),  # FLIR's Duo Pro
 )
 
 
@@ -47,10 +48,16 @@ def roles_of(files: Sequence[str]) -> list[str]:
     with the same numbers; else "".
     """
     out = [""] * len(files)
+    shapes = [DIGIT.sub("0", name) for name in files]
     for forms in SERIES:
+        fitting = {shape for shape in set(shapes) if role_in(forms, shape)}
+        if not fitting:  # nearly always: thousands of photos have a few shapes
+            continue
         rows: dict[str, dict[str, list[int]]] = {role: defaultdict(list) for role in ROLES}
         for row, name in enumerate(files):
-            if not out[row] and (found := role_in(forms, name)) is not None:
+            if out[row] or shapes[row] not in fitting:
+                continue
+            if (found := role_in(forms, name)) is not None:
                 rows[found[0]][found[1]].append(row)
         for role in ROLES:
             mine = rows[role].keys()
