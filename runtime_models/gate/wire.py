@@ -81,7 +81,8 @@ def array(pipe: BinaryIO, told: dict, size: int) -> np.ndarray:
     if kind.kind not in KINDS or math.prod(shape) * max(kind.itemsize, 1) != size:
         raise ValueError(f"{size:,} bytes for an array {shape} of {kind}")
     made = np.empty(shape, kind)
-    view, at = memoryview(made.reshape(-1).view(np.uint8) if size else b""), 0
+    flat: Any = made.reshape(-1).view(np.uint8) if size else b""
+    view, at = memoryview(flat), 0
     while at < size:
         count = pipe.readinto(view[at:])  # type: ignore[attr-defined]
         if not count:
