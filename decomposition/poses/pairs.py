@@ -67,7 +67,7 @@ def find_pairs(
 
 def by_series(heat: Iterable[PhotoFile], light: Iterable[PhotoFile]) -> dict[PhotoFile, str]:
     """Names that one camera writes for both, with one number, in folders as of by_name."""
-    found = {}
+    found: dict[PhotoFile, str] = {}
     for forms in SERIES:
         of: dict[tuple, str] = {}
         for photo in light:
