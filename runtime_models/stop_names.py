@@ -21,6 +21,15 @@ THERMAL_WORDS = re.compile(
     r"|thermo(cam\w*|ima\w*|vision|s(can|hot)s?)?"
     r"|ir(cam|camera|img|image|images|photo|photos)"
 )
+# Makers, models and parts of cameras of heat, which are words of other things as well.
+MAKERS_OF_HEAT = set(
+    "th tau seek quark hik hikmicro infiray iray topdon testo fluke optris xenics wiris workswell "
+    "bolometer microbolometer uncooled radiometric temperature temperatures kelvin celsius flirone "
+    "xt".split()
+)
+MODELS_OF_HEAT = {"h20t", "h30t", "m30t", "m3t", "m4t", "m2ea", "p2pro", "p2_pro", "vue_pro",
+                  "vuepro", "duo_pro", "duopro"}  # fmt: skip
+BESIDE_MAKERS = {"cam", "camera", "sensor", "left", "right", "image", "images", "pro", "raw"}
 LIGHT_WORDS = {
     "rgb", "color", "colour", "colors", "colours", "visible", "visual", "vis", "optical", "wide",
     "zoom", "eo",
@@ -52,6 +61,12 @@ def is_thermal_word(word: str) -> bool:
     """Of a word as words_of gives it."""
     part = any(part in word for part in THERMAL_PARTS)
     return (part and word not in NOT_THERMAL) or THERMAL_WORDS.fullmatch(word) is not None
+
+
+def is_heat_maker(name: str) -> bool:
+    """Whether a folder may be called by a camera of heat: what is in it has to say the same."""
+    words = set(words_of(name)) - BESIDE_MAKERS
+    return name.lower() in MODELS_OF_HEAT or (bool(words) and words <= MAKERS_OF_HEAT)
 
 
 def sort_of_name(name: str) -> str:

@@ -74,8 +74,8 @@ def find_masks(
     spare: list[Path] = []
     for name in SILHOUETTES:
         folder = base / there.get(name, name)
-        own = photo_key(f"{os.path.relpath(folder, photos)}/")
-        if folder.is_dir() and folder != photos and not any(k.startswith(own) for k in known):
+        below = photo_key(f"{os.path.relpath(folder, photos)}/")
+        if folder.is_dir() and folder != photos and not any(k.startswith(below) for k in known):
             found, alone = masks_in(folder, names)
             taken = {} if of else silhouettes(found, {photo_key(n): photos / n for n in names})
             of |= taken

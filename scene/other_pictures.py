@@ -69,10 +69,10 @@ def other_pictures(names: Sequence[str], is_grey: Callable[[int], bool]) -> dict
             found[row] = kind
     rows = [row for row in range(len(names)) if row not in found]
     photo_of = {ends_of(parts[row][-1])[0]: row for row in rows}
-    for folders, rows in by_folder.items():
+    for place, rows in by_folder.items():
         if (kind := found[rows[0]]) in (MASKS, CLASSES):
             ends = [end for row in rows for end in ends_of(parts[row][-1]) if end in photo_of]
-            sure = {*map(str.lower, folders)}.isdisjoint(SILHOUETTES)
+            sure = {*map(str.lower, place)}.isdisjoint(SILHOUETTES)
             grey = kind == CLASSES or (bool(ends) and is_grey(rows[0]))
             if not (ends and grey and (sure or not is_grey(photo_of[ends[0]]))):
                 for row in rows:

@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.app.charts.chart_measure import ChartRow
 from shapeshift.app.charts.pareto import pareto_front
-from shapeshift.runtime_models.files.plain_text import one_line
+from shapeshift.runtime_models.files.plain_text import one_line, several_lines
 from shapeshift.runtime_models.files.whole_file import whole_file
 
 WIDTH, HEIGHTS, DPI = 8.3, (4.6, 3.4), 200  # inches: a README shows it 830 pixels wide
@@ -51,7 +51,7 @@ def draw_chart(
     panels = {eyes: found for eyes, found in panels.items() if found}
     heights = HEIGHTS[: len(panels)]
     figure = Figure((WIDTH, sum(heights) + 0.5), layout="constrained", facecolor="white")
-    figure.suptitle(title, fontsize=10, color=INK)
+    figure.suptitle(several_lines(title), fontsize=10, color=INK)
     axes = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
     fronts = {}
     for axis, (eyes, found) in zip(axes, panels.items(), strict=True):

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Generic, TypeVar, get_type_hints
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.terminal import print_text
+from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.files.whole_file import write_whole
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+LONGEST_HEAD = 10_000  # letters of a line that says what was run
 Row = TypeVar("Row", bound="DataclassInstance")
 
 
@@ -25,7 +27,7 @@ class RowsFile(Generic[Row]):
 
     def __init__(self, path: Path, kind: type[Row], head: Sequence[str]) -> None:
         self.path, self._kind = path, kind
-        self._head = [f"# {line}" for line in head]
+        self._head = [f"# {one_line(line, LONGEST_HEAD)}" for line in head]  # names are bytes
         self.rows: list[Row] = []
         if path.exists():
             self.rows = self._read()
@@ -81,4 +83,4 @@ def write_lines(out: Path | None, lines: list[str]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """The whole file or none of it."""
-    write_whole(path, text.encode())
+    write_whole(path, text.encode("utf-8", "backslashreplace"))  # names that are no UTF-8

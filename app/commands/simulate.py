@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.runtime_models.files.plain_text import UNSAFE, escaped
 
 RESULT = "run.jsonl"
 HZ = 90
@@ -155,7 +156,8 @@ def shown(steps_done, steps: int):
 
 
 def line(row: dict) -> str:
-    return json.dumps(row, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+    text = json.dumps(row, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return UNSAFE.sub(escaped, text) + "\n"
 
 
 def draw_run(steps_done, simulation, file, size: tuple[int, int], options: Options) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,7 +93,7 @@ def film_key(plan: FilmPlan, scene: Path, drawing: dict) -> str:
     digest.update(json.dumps(drawing, sort_keys=True).encode())
     for path in scene_files(plan.document, scene):
         stat = path.stat()
-        digest.update(f"{path.name} {stat.st_size}".encode())
+        digest.update(os.fsencode(path.name) + f" {stat.st_size}".encode())
         with path.open("rb") as file:
             while block := file.read(BLOCK):
                 digest.update(block)

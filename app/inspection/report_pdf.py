@@ -14,6 +14,7 @@ from shapeshift.app.inspection.report import (
     html_of,
 )
 from shapeshift.renderer.debug.letters import drawable
+from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.files.whole_file import whole_file, write_whole
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def write_pdf(report: InspectionReport, cameras_name: str, path: Path) -> None:
     import matplotlib
     from matplotlib.backends.backend_pdf import PdfPages
 
-    about: dict[str, Any] = {"Title": report.head.title, "CreationDate": None}
+    about: dict[str, Any] = {"Title": one_line(report.head.title), "CreationDate": None}
     with (
         whole_file(path) as file,
         matplotlib.rc_context(

@@ -38,6 +38,7 @@ CASES = {
 }
 COLUMNS = ("case", "figure", "measured", "bound", "verdict", "reason")
 NAME = "stability.csv"
+LONGEST_HEAD = 10_000  # letters of a line that says what was run
 CAPTION = 18  # pixels
 LEAST_PANEL = 320  # pixels across; smaller pictures are enlarged by whole numbers
 
@@ -73,11 +74,12 @@ class Table:
         rows.writerow(COLUMNS)
         for case in CASES:
             rows.writerows(self.rows.get(case, []))
-        write_whole(self.path, text.getvalue().encode())
+        write_whole(self.path, text.getvalue().encode("utf-8", "backslashreplace"))
 
 
 def open_table(folder: Path, command: str, subject: str, overwrite: bool) -> Table:
     """The table of a folder with the rows of an earlier run on the same subject that held."""
+    command, subject = (one_line(text, LONGEST_HEAD) for text in (command, subject))
     table = Table(folder, command, subject, {})
     if not table.path.exists() or overwrite:
         return table

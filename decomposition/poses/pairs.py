@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_names import sort_of_name
+from shapeshift.scene.captures.modalities.name_series import HEAT, LIGHT, SERIES, role_in
 from shapeshift.scene.captures.modalities.photo_modality import LETTER, stem_of
 from shapeshift.scene.captures.photo import open_image
 
@@ -48,7 +49,8 @@ def find_pairs(
     if not light or not heat:
         return {}
     light = sorted(light, key=lambda photo: (ORDER.get(camera_letter(photo.name), 2), photo.name))
-    found = by_name(heat, light)
+    found = by_series(heat, light)
+    found |= by_name([photo for photo in heat if photo not in found], light)
     left = [photo for photo in heat if photo not in found]
     found |= by_number(left, light)
     left = [photo for photo in left if photo not in found]
@@ -60,6 +62,22 @@ def find_pairs(
             "of visible light of the same name, number or time of exposure; name the two of a pair "
             "alike, or leave them out."
         )
+    return found
+
+
+def by_series(heat: Iterable[PhotoFile], light: Iterable[PhotoFile]) -> dict[PhotoFile, str]:
+    """Names that one camera writes for both, with one number, in folders as of by_name."""
+    found: dict[PhotoFile, str] = {}
+    for forms in SERIES:
+        of: dict[tuple, str] = {}
+        for photo in light:
+            if (told := role_in(forms, PurePosixPath(photo.name).stem)) and told[0] == LIGHT:
+                of.setdefault((place_of(photo.name)[0], told[1]), photo.name)
+        for photo in heat if of else ():
+            told = role_in(forms, PurePosixPath(photo.name).stem)
+            name = of.get((place_of(photo.name)[0], told[1])) if told else None
+            if told and told[0] == HEAT and name is not None:
+                found.setdefault(photo, name)
     return found
 
 

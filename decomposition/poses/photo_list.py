@@ -13,7 +13,7 @@ from shapeshift.scene.captures.capture_rules import stops_from
 from shapeshift.scene.captures.modalities.frame_modalities import said_beside
 from shapeshift.scene.captures.modalities.photo_modality import HEAT, modalities_of
 from shapeshift.scene.captures.modalities.said_modalities import said_modality_of
-from shapeshift.scene.captures.modalities.two_sorts import Opened, refuse_two_sorts
+from shapeshift.scene.captures.modalities.two_sorts import GREY, Opened, check_two_sorts
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_capture import PICTURES, has_poses
 from shapeshift.scene.mask_files import is_grey_file
@@ -36,11 +36,12 @@ class PhotoList:
     stop_of: tuple[tuple[str, str], ...] = ()  # name of a photo, name of its stop
     said: tuple[dict, ...] = ()  # 'modalities' of the capture.json that lay with them
     others: tuple[tuple[str, str], ...] = ()  # name of a picture that is no photo, its kind
+    doubts: tuple[str, ...] = ()  # of its stops, a sentence each
 
     @property
     def sentences(self) -> list[str]:
-        """What of the pictures is left out, and why."""
-        out = []
+        """What of the pictures is left out, and why; what is doubtful of their stops."""
+        out = list(self.doubts)
         for kind in dict.fromkeys(kind for _, kind in self.others):
             mine = [name for name, each in self.others if each == kind]
             use = "; --masks with their folder hides what is black" if kind == MASKS else ""
@@ -77,7 +78,7 @@ def list_photos(root: Path, every: int = 1) -> PhotoList:
         if row not in others:
             folders[path.parent].append(path)
     chosen = [read_photo(path, root) for group in folders.values() for path in group[::every]]
-    stops, of, said = stops_of_photos(chosen, root, above)
+    stops, of, said, doubts = stops_of_photos(chosen, root, above)
     hot = {stop.name for stop in stops if stop.kind == HEAT}
     heat = [photo for photo, stop in zip(chosen, of, strict=True) if stop in hot]
     light = [photo for photo, stop in zip(chosen, of, strict=True) if stop not in hot]
@@ -91,7 +92,7 @@ def list_photos(root: Path, every: int = 1) -> PhotoList:
     refuse_copies(root, photos)
     stop_of = tuple(zip((photo.name for photo in chosen), of, strict=True))
     kinds = tuple((names[row], kind) for row, kind in others.items())
-    return PhotoList(root, photos, paired, stops, stop_of, said, kinds)
+    return PhotoList(root, photos, paired, stops, stop_of, said, kinds, doubts)
 
 
 def read_photo(path: Path, root: Path) -> PhotoFile:
@@ -115,9 +116,9 @@ def is_taken(path: Path, root: Path) -> bool:
 
 def stops_of_photos(
     photos: Sequence[PhotoFile], root: Path, above: Path
-) -> tuple[tuple[Stop, ...], list[str], tuple[dict, ...]]:
-    """Stops, of each photo the name of its stop, and the entries of a capture.json that says so,
-    which lies in `root` or in the folder that was given.  Raises BadFile.
+) -> tuple[tuple[Stop, ...], list[str], tuple[dict, ...], tuple[str, ...]]:
+    """Stops, of each photo the name of its stop, the entries of a capture.json that says so, which
+    lies in `root` or in the folder that was given, and what is doubtful.  Raises BadFile.
     """
     names = [photo.name for photo in photos]
     folder = root if (root / "capture.json").is_file() else above
@@ -129,12 +130,11 @@ def stops_of_photos(
             return {"{}x{}".format(*photos[row].size)}
 
         of = said_modality_of(said, listed, names, where, cameras_of)
-        return tuple(sorted(listed, key=lambda stop: stop.x)), of, tuple(said)
-    stops, of = modalities_of(names, root)
+        return tuple(sorted(listed, key=lambda stop: stop.x)), of, tuple(said), ()
+    stops, of = modalities_of(names, root, is_grey=lambda row: photos[row].mode in GREY)
     rows = zip(photos, of, strict=True)
     opened = [Opened(photo.name, stop, photo.mode, photo.size) for photo, stop in rows]
-    refuse_two_sorts(opened, stops, root)
-    return stops, of, ()
+    return stops, of, (), check_two_sorts(opened, stops, root)
 
 
 def refuse_copies(root: Path, photos: tuple[PhotoFile, ...]) -> None:

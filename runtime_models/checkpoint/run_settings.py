@@ -105,8 +105,8 @@ def with_settings(raw: RawSplats, path: Path) -> RawSplats:
                 "read as without it", file=raw.file, repaired=False,
             )  # fmt: skip
             raw = replace(raw, findings=(*raw.findings, found))
-    for key, values in KNOWN.items():
-        if said.get(key, values[0]) not in values:
+    for key, known in KNOWN.items():
+        if said.get(key, known[0]) not in known:
             what = f"its run's {name} says {key} {said[key][:40]}, which is unknown"
             found = Finding(what, 0, "read as without it", file=raw.file, repaired=False)
             raw = replace(raw, findings=(*raw.findings, found))

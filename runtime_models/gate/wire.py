@@ -74,14 +74,15 @@ def whole(part: Any, pipe: BinaryIO, left: list[int]) -> Any:
     return array(pipe, part, size) if "of" in part else exactly(pipe, size)
 
 
-def array(pipe: BinaryIO, told: dict, size: int) -> np.ndarray:
+def array(pipe: BinaryIO, facts: dict, size: int) -> np.ndarray:
     """The array of so many bytes that comes next, read where it stays."""
-    kind, shape = np.dtype(told["of"]), tuple(told["shape"])
+    kind, shape = np.dtype(facts["of"]), tuple(facts["shape"])
     # Else no bytes could stand for an array of any size.
     if kind.kind not in KINDS or math.prod(shape) * max(kind.itemsize, 1) != size:
         raise ValueError(f"{size:,} bytes for an array {shape} of {kind}")
     made = np.empty(shape, kind)
-    view, at = memoryview(made.reshape(-1).view(np.uint8) if size else b""), 0
+    flat: Any = made.reshape(-1).view(np.uint8) if size else b""
+    view, at = memoryview(flat), 0
     while at < size:
         count = pipe.readinto(view[at:])  # type: ignore[attr-defined]
         if not count:

@@ -43,7 +43,11 @@ from shapeshift.scene.captures.modalities.frame_modalities import said_beside
 from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
 from shapeshift.scene.captures.modalities.said_modalities import said_modality_of
 from shapeshift.scene.captures.modalities.twin_photos import with_twins
-from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
+from shapeshift.scene.captures.modalities.two_sorts import (
+    check_two_sorts,
+    has_grey_mode,
+    opened_photos,
+)
 from shapeshift.scene.captures.radiometric.stated_bands import of_each_band, sharing_folders
 
 
@@ -89,7 +93,7 @@ def read_colmap(folder: Path) -> Capture:
     table.used("points", 0 if points is None else len(points))
     if guessed := not said.get("modalities"):
         numbers = {path: str(image.lens) for path, image in zip(paths, posed, strict=True)}
-        refuse_two_sorts(opened_photos(photos, root, numbers), stops, folder)
+        more += check_two_sorts(opened_photos(photos, root, numbers), stops, folder)
     photos = listed_split(photos, folder, root, table, by_folder=any(splits))
     photos = of_each_band(photos, sharing_folders(said.get("modalities") or (), str(folder)))
     photos = with_counts(photos, said.get("modalities"), f"{folder}/capture.json")
@@ -114,7 +118,7 @@ def modalities(
     """Stops, and of each image the name of its stop: from capture.json, or else from the names."""
     names = [image.name for image in posed]
     if not said.get("modalities"):
-        return modalities_of(names, folder)
+        return modalities_of(names, folder, is_grey=lambda row: has_grey_mode(paths[row]))
     where, entries = f"{folder}/capture.json", said["modalities"]
     stops = stops_from(entries, where)
 

@@ -40,7 +40,7 @@ from shapeshift.scene.captures.modalities.frame_modalities import (
     said_beside,
     stops_of_frames,
 )
-from shapeshift.scene.captures.modalities.two_sorts import opened_photos, refuse_two_sorts
+from shapeshift.scene.captures.modalities.two_sorts import check_two_sorts, opened_photos
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
 from shapeshift.scene.captures.radiometric.stated_bands import (
@@ -130,7 +130,7 @@ def capture_of(
         unnamed_files(folder, photos, table)
     described = any(isinstance(m, dict) for m in listed)
     if not (told or data.get("modalities") or any("modality" in e for e in entries)):
-        refuse_two_sorts(opened_photos(photos, folder), stops, folder)
+        more += check_two_sorts(opened_photos(photos, folder), stops, folder)
     background, notes = background_from(data, where), Fields(data, where).optional_object("notes")
     capture = world.capture(
         folder,

@@ -31,5 +31,5 @@ def mesh_arrays(data: bytes, kind: str, name: str) -> dict:
         raise Unreadable(f"cannot be read as a mesh ({reason}); it is damaged") from None
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise Unreadable(f"it has vertices of {vertices.shape[-1]} numbers; 3 are wanted")
-    mesh = joined(vertices, faces, name)
-    return {"vertices": mesh.vertices, "faces": mesh.faces}
+    whole = joined(vertices, faces, name)
+    return {"vertices": whole.vertices, "faces": whole.faces}

@@ -3,7 +3,9 @@
 A name is bytes: in a report, a page, a table it has to become text.  In one process, for speed.
 """
 
+import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,10 @@ import pytest
 from PIL import Image
 
 from shapeshift.app import cli
+from shapeshift.app.charts.chart_rows import RowsFile
+from shapeshift.app.commands.simulate import line
+from shapeshift.app.stability_cases.finding import CaseFinding
+from shapeshift.app.stability_cases.table import open_table
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.support.models import make_random_model
@@ -62,6 +68,8 @@ def commands(folder: Path) -> dict[str, list[object]]:
         "colliders": ["colliders", ply], "measure": ["measure", shift, folder],
         "lod": ["lod", ply, "--out", folder / f"{name}.lod"],
         "web folder": ["export", shift, "--web", "--out", folder / f"{name}.web"],
+        "film": ["film", shift, "--out", folder / f"{name}.gif", "--size", "16x12", "--seconds",
+                 "0.1", "--drawing", "tiles", "--context", "none"],
         "unknown": [name], "option": ["info", shift, f"--{name}"],
     }  # fmt: skip
     for ending in OUTPUTS:
@@ -81,3 +89,26 @@ def test_no_name_is_a_fault_of_the_program(folder, capfd, monkeypatch):
     page = (folder / f"{folder.name}4.html").read_bytes().decode("utf-8")
     assert "<b>&" not in page
     assert page.count("<title>") == 1
+
+
+@dataclass(frozen=True)
+class PlainRow:
+    name: str
+    ms: float
+
+
+@pytest.mark.parametrize("raw", ODD.values(), ids=ODD)
+def test_rows_about_odd_names_are_text_and_found_again(tmp_path, raw):
+    """Tables of chart and stability, lines of simulate: a name is on one line, or as JSON has it.
+
+    Functions, not commands: their names come first, and what they measure takes seconds.
+    """
+    name = os.fsdecode(raw)
+    for rows in range(2):
+        file = RowsFile(tmp_path / "rows.csv", PlainRow, [f"of {name}"])
+        assert len(file.rows) == rows
+        file.add(PlainRow("exact", 2.0))
+        table = open_table(tmp_path, f"stability {name}", f"{name}, 3 splats", overwrite=False)
+        assert len(table.rows) == rows
+        table.add("life", [CaseFinding("memory", 1.0, "<= 2", True, "a reason")])
+    assert json.loads(line({"scene": name}).encode()) == {"scene": name}

@@ -63,13 +63,17 @@ def photos_alone(posed: list[Posed], root: Path, table: FileTable) -> tuple[list
 
     Where nobody says which stops there are: a model may be of everything below images/.
     """
-    paths = [find_file(root, image.name, ("",)).path for image in posed]
-    found = other_pictures([image.name for image in posed], lambda row: is_grey_file(paths[row]))
+
+    def path_of(row: int) -> Path:
+        return find_file(root, posed[row].name, ("",)).path
+
+    names = [image.name for image in posed]
+    found = other_pictures(names, lambda row: is_grey_file(path_of(row)))
     for kind in (DEPTH, NORMALS, CLASSES):
-        mine = [paths[row] for row, each in found.items() if each == kind]
+        mine = [path_of(row) for row, each in found.items() if each == kind]
         table.left_out(kind, mine, POSED)
         table.accounted |= {photo_key(str(path)) for path in mine}
-    masks = [paths[row] for row, kind in found.items() if kind == MASKS]
+    masks = [path_of(row) for row, kind in found.items() if kind == MASKS]
     if masks:
         table.sentences.append(
             f"{len(masks)} images of the model are called as masks are, and taken for that, for "

@@ -26,6 +26,7 @@ PEEK_BYTES = 1 << 16
 MOST_LOOKED_AT = 400  # files of a folder, and folders in it
 ENDINGS = {".xml", ".csv", ".json", ".sfm", ".out", ".nvm", ".txt", ".geojson", ".xmp"}
 XMP = ".xmp"  # one beside each photo
+NO_POINTS = "points3D.txt"  # of COLMAP; without points it has no bytes
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,7 @@ def is_blank(path: Path) -> bool:
     """Whether a file that may be of poses begins with nothing: it has no bytes, or blanks and
     zeros, as a disk leaves one that was full.
     """
-    if path.suffix.lower() not in ENDINGS or not path.is_file():
+    if path.suffix.lower() not in ENDINGS or path.name == NO_POINTS or not path.is_file():
         return False
     return not head_of(path).removeprefix(b"\xef\xbb\xbf").strip(b"\0 \t\r\n")
 

@@ -17,6 +17,7 @@ from shapeshift.scene.captures.modalities.said_modalities import (
     said_modality_of,
     settling_line,
 )
+from shapeshift.scene.captures.modalities.two_sorts import has_grey_mode
 
 MOST_BYTES = 1 << 30  # of JSON
 
@@ -71,7 +72,10 @@ def stops_of_frames(
 
         of = said_modality_of(told, told_stops, names, place, cameras_of)
         return tuple(sorted(told_stops, key=lambda stop: stop.x)), of, told
-    found, of = modalities_of(names, folder, [own_keys(entries[i]) for i in bare], False)
+    own = [own_keys(entries[i]) for i in bare]
+    found, of = modalities_of(
+        names, folder, own, False, lambda row: has_grey_mode(find_file(folder, names[row]).path)
+    )
     usual = dict(zip(bare, of, strict=True))
     if len(found) > 1 and any(days):
         raise of_days(days, found, usual, entries, where)

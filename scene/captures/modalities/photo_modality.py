@@ -7,7 +7,7 @@ and the keys of its frame.  What its pixels are is asked in two_sorts.py, when f
 import os
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,19 +19,21 @@ from shapeshift.runtime_models.stop_names import (
     COLOR_NAMES,
     LIGHT_WORDS,
     guess_kind,
+    is_heat_maker,
     is_thermal_word,
     sort_of_name,
     words_of,
 )
 from shapeshift.scene.capture_files import is_strange, parts_of
 from shapeshift.scene.captures.capture_rules import spread_stops
+from shapeshift.scene.captures.modalities.name_series import BLEND, HEAT, LIGHT, roles_of
 from shapeshift.scene.captures.modalities.said_modalities import (
     PhotoGroup,
     settling_line,
     shared_folders,
 )
 
-HEAT, LIGHT = "thermal", "rgb"  # sorts of photos, by the names of STOP_KINDS; "": not known
+# Sorts of photos, HEAT and LIGHT, are names of STOP_KINDS; "": not known.
 SAYS = {HEAT: "heat", LIGHT: "visible light"}
 SPLITS = {"train": "train", "test": "test", "val": "test", "validation": "test", "eval": "test"}
 # Words of folders that say where a camera was, or which of several alike, and not what it measured.
@@ -56,7 +58,9 @@ RADIOMETRIC = re.compile(r"DJI_\d{4}_R(?![a-z0-9])", re.IGNORECASE)  # of its Ze
 OTHER_LETTERS = re.compile(r"DJI_\d{4}_(?!R(?![a-z0-9]))", re.IGNORECASE)  # beside: R is red
 KEY_WORDS = {"is", "image", "photo", "frame", "camera"}  # beside the one of a sort in a key
 MAKERS = {"flir", "flir_one", "boson", "lepton"}  # folders of cameras of heat
-PARTNERS = {"MAX", "DC"}  # before the numbers of Autel's and FLIR's visible photos
+PARTNERS = {"MAX", "MIX", "DC", "YUN"}  # before numbers of Autel's, FLIR's and Yuneec's photos
+MIXED = "Mix"  # the stop of photos of light and heat laid over each other
+FEW_LOOKED_AT = 8  # photos, for whether some have colours
 FEWEST_PAIRS = 2  # one pair may be two letters of an alphabet
 FLAGS = {"true": True, "false": False, "1": True, "0": False, "yes": True, "no": False}
 
@@ -70,6 +74,8 @@ class SeenPhoto:
     by_key: str = ""  # the sort that its frame says
     by_folder: str = ""
     by_file: str = ""
+    blend: bool = False  # light and heat laid over each other, by its name
+    maker: bool = False  # a folder that is called as a camera of heat is, whose pixels are so
 
     @property
     def sorts(self) -> set[str]:
@@ -82,15 +88,19 @@ class SeenPhoto:
     @property
     def upto(self) -> tuple[str, ...]:
         """The folders down to the one that says its sort; all where none does."""
-        said = [i for i, name in enumerate(self.folders) if sort_of_name(name)]
+        said = [i for i, name in enumerate(self.folders) if self.sort_in(name)]
         return self.folders[: said[0] + 1] if said else self.folders
+
+    def sort_in(self, folder: str) -> str:
+        return sort_of_name(folder) or (HEAT if self.maker and is_heat_maker(folder) else "")
 
     @property
     def state(self) -> tuple[str, ...]:
         """Words of its folders that are neither a sort nor a place: "closed", "attic"."""
         folders = self.upto if self.sort else self.folders[:1]
         dates = [name for name in folders if DATED.fullmatch(name)]
-        words = [word for name in folders for word in words_of(name)]
+        made = [name for name in folders if not (self.maker and is_heat_maker(name))]
+        words = [word for name in made for word in words_of(name)]
         none = PLACES | LIGHT_WORDS
         return tuple(dates + [w for w in words if not (w in none or is_thermal_word(w))])
 
@@ -100,19 +110,21 @@ def modalities_of(
     folder: Path,
     keys: Sequence[Mapping] = (),
     folders_are_stops: bool = True,
+    is_grey: Callable[[int], bool] | None = None,
 ) -> tuple[tuple[Stop, ...], list[str]]:
     """Stops, and of each photo the name of its stop, where nobody says them.
 
     names: of photos as the capture in `folder` writes them; keys: of their frames;
     folders_are_stops: whether the first folders of photos are modalities where no heat is among
-    them, as in a COLMAP model's images.  Raises BadFile, with the line of capture.json that settles
-    it, where evidence disagrees.
+    them, as in a COLMAP model's images; is_grey: whether the photo of a row has one channel or
+    numbers, asked of folders that are called as makers of cameras are.  Raises BadFile, with the
+    line of capture.json that settles it, where evidence disagrees.
     """
     if not names:
         return (), []
-    seen = seen_of(names, keys or [{}] * len(names))
+    seen = seen_of(names, keys or [{}] * len(names), is_grey)
     refuse_contradictions(seen, names, folder)
-    if len({photo.sort == HEAT for photo in seen}) == 2:
+    if len({photo.sort == HEAT for photo in seen}) == 2 or any(photo.blend for photo in seen):
         return of_two_sorts(seen, names, folder, folders_are_stops)
     if all(photo.by_key == HEAT for photo in seen):
         return spread_stops(["Thermal"]), ["Thermal"] * len(names)
@@ -149,7 +161,11 @@ def splits_of(names: Sequence[str]) -> list[str]:
     return [said[0] if said else "train" for said in found]
 
 
-def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[SeenPhoto]:
+def seen_of(
+    names: Sequence[str],
+    keys: Sequence[Mapping],
+    is_grey: Callable[[int], bool] | None = None,
+) -> list[SeenPhoto]:
     folders = folders_of(names)
     shared = shared_folders(folders) if len(names) > 1 else 0
     folders = [part[shared:] for part in folders]
@@ -159,15 +175,38 @@ def seen_of(names: Sequence[str], keys: Sequence[Mapping]) -> list[SeenPhoto]:
     if "T" in letters and (letters & set("VWZ") or (letters == {"T"} and LIGHT in by_folder)):
         by_letter = [sort_of_letter([p.upper() for p in part if len(p) == 1]) for part in folders]
         by_folder = [one or other for one, other in zip(by_folder, by_letter, strict=True)]
+    made = grey_makers(folders, by_folder, is_grey) if is_grey else set()
+    by_folder = [HEAT if row in made else sort for row, sort in enumerate(by_folder)]
+    roles = roles_of(files)
     by_file = [
-        one or other or (HEAT if is_radiometric else "")
-        for one, other, is_radiometric in zip(
-            by_letters(files), by_words(files), radiometric(files), strict=True
+        one or role.replace(BLEND, "") or ("" if role else other or (HEAT if own else ""))
+        for one, role, other, own in zip(
+            by_letters(files), roles, by_words(files), radiometric(files), strict=True
         )
     ]
     by_key = [sort_of_keys(frame) for frame in keys]
-    rows = zip(folders, files, by_key, by_folder, by_file, strict=True)
+    more = ([role == BLEND for role in roles], [row in made for row in range(len(names))])
+    rows = zip(folders, files, by_key, by_folder, by_file, *more, strict=True)
     return [SeenPhoto(*row) for row in rows]
+
+
+def grey_makers(
+    folders: Sequence[tuple[str, ...]], by_folder: Sequence[str], is_grey: Callable[[int], bool]
+) -> set[int]:
+    """Rows in folders that are called as makers and parts of cameras of heat are (`TH`, `seek`),
+    of which every photo has one channel or numbers, while others have colours.
+    """
+    called: dict[tuple[str, ...], list[int]] = defaultdict(list)
+    rest = []
+    for row, (found, sort) in enumerate(zip(folders, by_folder, strict=True)):
+        if not sort and any(map(is_heat_maker, found)):
+            called[found].append(row)
+        elif sort != HEAT:
+            rest.append(row)
+    few = rest[:: max(len(rest) // FEW_LOOKED_AT, 1)][:FEW_LOOKED_AT]
+    if not called or all(map(is_grey, few)):
+        return set()
+    return {row for rows in called.values() if all(map(is_grey, rows)) for row in rows}
 
 
 def sort_of_folders(folders: Sequence[str]) -> str:
@@ -290,6 +329,9 @@ def of_two_sorts(
     groups: dict[tuple[str, tuple[str, ...]], list[int]] = defaultdict(list)
     for i, photo in enumerate(seen):
         state = () if not folders_are_stops or photo.folders[:1] in mixed else photo.state
+        if photo.blend:
+            groups["", (MIXED,)].append(i)
+            continue
         sort = photo.sort or (LIGHT if not state or photo.folders[:1] in mixed else "")
         groups[sort, state].append(i)
     lit = any(sort == LIGHT for sort, _ in groups)
@@ -319,13 +361,13 @@ def name_of(group: tuple[str, tuple[str, ...]], photos: Sequence[SeenPhoto]) -> 
     """Of a stop: its folder's where there is one, as it is written there."""
     sort, state = group
     if not sort:
-        return photos[0].folders[0]
+        return MIXED if photos[0].blend else photos[0].folders[0]
     folders = {photo.upto[-1] if photo.upto else "" for photo in photos}
     name = folders.pop() if len(folders) == 1 else ""
     words = set(words_of(name))
     plain = name.lower() in COLOR_NAMES - {"images", "photo"} or bool(state)
     plain |= sort == HEAT and words.isdisjoint({"images", "image", "photos"})
-    if plain and sort_of_name(name) == sort:
+    if plain and photos[0].sort_in(name) == sort:
         return name
     return " ".join(["Thermal" if sort == HEAT else "RGB", *state])
 

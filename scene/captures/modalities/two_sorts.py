@@ -1,8 +1,10 @@
 """Photos of two sorts in one stop, which their pixels show where nothing else says it."""
 
 import os
+import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,10 +12,16 @@ from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_files import parts_of
 from shapeshift.scene.captures.capture import Photo
+from shapeshift.scene.captures.modalities.name_series import HEAT, LIGHT, told_apart
 from shapeshift.scene.captures.modalities.said_modalities import PhotoGroup, settling_line
+from shapeshift.scene.captures.photo import open_image
+from shapeshift.scene.captures.radiometric.number_photos import is_radiometric
 
 ONE_CHANNEL = {"L", "LA", "La", "1"}  # how PIL names pictures of a byte without colours,
 NUMBERS = {"I;16", "I;16B", "I;16L", "I;16N", "I", "F"}  # and what is 16 bits or more
+GREY = ONE_CHANNEL | NUMBERS
+DIGITS = re.compile(r"\d+")
+MOST_SERIES = 6  # of a stop that are compared
 FEWEST = 3  # photos: one or two grey ones are no camera of another sort
 
 
@@ -28,7 +36,7 @@ class Opened(NamedTuple):
 
     @property
     def grey(self) -> bool:
-        return self.mode in ONE_CHANNEL or self.mode in NUMBERS
+        return self.mode in GREY
 
 
 def opened_photos(
@@ -48,9 +56,22 @@ def opened_photos(
     ]
 
 
-def refuse_two_sorts(photos: Sequence[Opened], stops: Sequence[Stop], folder: Path) -> None:
-    """Raises BadFile where a stop that nobody named has colour photos, and a folder or a camera of
-    which every photo has one channel or 16 bits.
+def has_grey_mode(path: Path) -> bool:
+    """Whether a photo has one channel, or numbers of its camera; one that is not there has not."""
+    if not os.path.isfile(path):
+        return False
+    if is_radiometric(path):
+        return True
+    with open_image(path) as image:
+        return image.mode in GREY
+
+
+def check_two_sorts(
+    photos: Sequence[Opened], stops: Sequence[Stop], folder: Path
+) -> tuple[str, ...]:
+    """A sentence where names alone tell two sorts apart.  Raises BadFile where a stop that nobody
+    named has colour photos, and a folder or a camera of which every photo has one channel or 16
+    bits.
 
     Size, camera, or single grey photos are no reason.
     """
@@ -61,6 +82,54 @@ def refuse_two_sorts(photos: Sequence[Opened], stops: Sequence[Stop], folder: Pa
         if grey:
             raise mixed(photos, stops, stop, grey, cameras, folder)
     refuse_swapped(photos, stops, folder)
+    found = ((stop, series_in(photos, stop)) for stop in stops)
+    return tuple(of_two_series(photos, stops, stop, *rows) for stop, rows in found if rows)
+
+
+def series_in(photos: Sequence[Opened], stop: Stop) -> tuple[list[int], list[int]] | None:
+    """Rows of the two series of names in one folder of a stop that may be two sorts, heat behind:
+    of other sizes and the same numbers, or called as a camera of both calls them.
+    """
+    groups: dict[tuple, list[int]] = defaultdict(list)
+    for row, photo in enumerate(photos):
+        if photo.stop == stop.name:
+            *folders, file = parts_of(photo.name)
+            groups[tuple(folders), DIGITS.sub("#", os.path.splitext(file)[0])].append(row)
+    large = sorted(((k, rows) for k, rows in groups.items() if len(rows) >= FEWEST and "#" in k[1]),
+                   key=lambda group: -len(group[1]))[:MOST_SERIES]  # fmt: skip
+    for (one, mine), (other, theirs) in combinations(large, 2):
+        if one[0] != other[0]:
+            continue
+        sizes = [{photos[row].size for row in rows} for rows in (mine, theirs)]
+        numbers = [{tuple(DIGITS.findall(photos[row].name)) for row in r} for r in (mine, theirs)]
+        shared = len(numbers[0] & numbers[1])
+        alike = shared >= FEWEST and 2 * shared >= min(map(len, numbers))
+        pair = mine, theirs
+        names = [os.path.splitext(parts_of(photos[rows[0]].name)[-1])[0] for rows in pair]
+        if roles := told_apart(*names):
+            return (mine, theirs) if roles == (LIGHT, HEAT) else (theirs, mine)
+        if alike and sizes[0].isdisjoint(sizes[1]):
+            areas = [min(w * h for w, h in each) for each in sizes]
+            return (mine, theirs) if areas[0] > areas[1] else (theirs, mine)
+    return None
+
+
+def of_two_series(
+    photos: Sequence[Opened],
+    stops: Sequence[Stop],
+    stop: Stop,
+    light: list[int],
+    heat: list[int],
+) -> str:
+    rest = [r for r, p in enumerate(photos) if p.stop == stop.name and r not in set(heat)]
+    line = line_of_two(photos, stops, stop, rest, set(heat), [""] * len(photos))
+    one, other = photos[light[0]], photos[heat[0]]
+    return (
+        f"{stop.name} has two series of names in one folder, {len(light)} photos such as "
+        f"{path_end(one.name)} of {of(one)} and {len(heat)} such as {path_end(other.name)} of "
+        f"{of(other)}, and they are one stop; where one of them shows heat, capture.json beside "
+        f"them makes two of it: {line}"
+    )
 
 
 def cameras_of(photos: Sequence[Opened]) -> list[str]:
@@ -98,6 +167,26 @@ def mixed(
 ) -> BadFile:
     """Of a stop whose rows `grey` are of another sort than its others."""
     rest = [row for row, p in enumerate(photos) if p.stop == stop.name and row not in grey]
+    line = line_of_two(photos, stops, stop, rest, grey, cameras)
+    colour = next((p for i, p in enumerate(photos) if i in rest and not p.grey), photos[rest[0]])
+    one = photos[min(grey)]
+    return BadFile(
+        f"{folder}: photos of two sorts would be one stop, {stop.name}: {len(grey)} of "
+        f"{bits_of(one)} and {of(one)}, for example {path_end(one.name)}, beside {len(rest)} in "
+        f"colours of {of(colour)}, for example {path_end(colour.name)}; say which are which in "
+        f"capture.json beside them, such as {line}"
+    )
+
+
+def line_of_two(
+    photos: Sequence[Opened],
+    stops: Sequence[Stop],
+    stop: Stop,
+    rest: list[int],
+    grey: set[int],
+    cameras: list[str],
+) -> str:
+    """The line that makes two of a stop: rows `rest` of light, `grey` of heat."""
     light = PhotoGroup("RGB" if stop.kind == "layer" else stop.name, stop.kind, stop.palette, rest)
     light.kind = "rgb" if stop.kind == "layer" and len(stops) == 1 else stop.kind
     heat = PhotoGroup("Thermal", "thermal", "ironbow", sorted(grey))
@@ -113,15 +202,7 @@ def mixed(
         while group.name in taken:
             group.name += " 2"
     groups = sorted([light, heat, *others], key=lambda g: g.kind != "rgb")
-    line = settling_line(groups, names, cameras)
-    colour = next((p for i, p in enumerate(photos) if i in rest and not p.grey), photos[rest[0]])
-    one = photos[min(grey)]
-    return BadFile(
-        f"{folder}: photos of two sorts would be one stop, {stop.name}: {len(grey)} of "
-        f"{bits_of(one)} and {of(one)}, for example {path_end(one.name)}, beside {len(rest)} in "
-        f"colours of {of(colour)}, for example {path_end(colour.name)}; say which are which in "
-        f"capture.json beside them, such as {line}"
-    )
+    return settling_line(groups, names, [] if not any(cameras) else cameras)
 
 
 def groups_of(photos: Sequence[Opened], stops: Sequence[Stop]) -> list[PhotoGroup]:

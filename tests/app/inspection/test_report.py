@@ -27,7 +27,7 @@ from shapeshift.scene.inspection.marks_file import HeldOutError, MarksFile
 from tests.support.scene.warm_wall import STOPS, celsius_at, traced, write_wall
 
 EVIL = '<script>alert("$x$")</script>'
-HEAD = ReportHead("Hall 7", "2026-11-23", EVIL, "温度 Müller", "Look at $\\frac{1}{0$ again.")
+HEAD = ReportHead("Hall \udcff", "2026-11-23", EVIL, "温度 Müller", "Look at $\\frac{1}{0$ again.")
 SCALE = ColorScale(0.0, 100.0, "ironbow")
 
 

@@ -27,6 +27,9 @@ def listed(root, light: list[str], heat: list[str], mode="RGB") -> dict[str, str
     ("DJI_2026050412000{0}_000{0}_W.png", "DJI_2026050412000{0}_000{0}_T.png"),
     ("MAX_000{}.png", "IRX_000{}.png"), ("{}.png", "{}_thermal.png"), ("{}.png", "IR/{}.png"),
     ("{}_rgb.png", "{}_ir.png"), ("{}.jpg", "{}_T.png"),
+    ("P031000{}.png", "T031000{}.png"), ("FLIR000{}_photo.png", "FLIR000{}.png"),
+    ("HM2024050412000{}_visual.png", "HM2024050412000{}.png"), ("IMG000{}V.png", "IMG000{}T.png"),
+    ("YUN_000{}.png", "IR_000{}.png"), ("2024-0{}.png", "seek/2024-0{}_thermal.png"),
     # Ten seconds apart: no pair, though the numbers are the same.
     ("DJI_2026050412000{0}_000{0}_W.png", "DJI_2026050412001{0}_000{0}_T.png"),
 ])  # fmt: skip

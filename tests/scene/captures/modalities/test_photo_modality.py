@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.stop_names import is_thermal_name, sort_of_name
+from shapeshift.runtime_models.stop_names import is_heat_maker, is_thermal_name, sort_of_name
 from shapeshift.scene.captures.modalities.frame_modalities import light_first
+from shapeshift.scene.captures.modalities.name_series import roles_of
 from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
 from shapeshift.scene.captures.modalities.stop_contents import contents_of
 from shapeshift.scene.captures.read_capture import read_capture
@@ -169,6 +170,42 @@ def test_few_grey_photos_and_sizes_are_no_reason(tmp_path):
     own = [Shot(f"g{i}.png", "L" if i % 2 else "RGB", (16, 12), 2 + i) for i in range(8)]
     write_colmap(tmp_path / "each", own)  # a camera a photo is no camera of grey ones
     assert len(read_capture(tmp_path / "each").stops) == 1
+
+
+@pytest.mark.parametrize("name", ["two series of names", "Parrot with other numbers"])
+def test_the_line_of_two_series_makes_two_stops(tmp_path, name):
+    folder = next(s for s in SITUATIONS if s.name == name).make(tmp_path / "in")
+    (said,) = (doubt for doubt in read_capture(folder).doubts if "two series" in doubt)
+    line, _ = json.JSONDecoder().raw_decode(said[said.index('{"modalities"') :])
+    (folder / "capture.json").write_text(json.dumps(line))
+    capture = read_capture(folder)
+    assert [stop.kind for stop in capture.stops] == ["rgb", "thermal"]
+    assert {p.path.name[0] for p in capture.of("Thermal", "train")} <= {"b", "T"}
+    assert not any("two series" in doubt for doubt in capture.doubts)
+
+
+@pytest.mark.parametrize("names", [
+    ["P0310001", "T0310001"],  # one pair may be by chance
+    ["P0310001", "P0310002", "T0320001", "T0320002"], ["P1", "T1", "P2", "T2"],
+    ["FLIR0001", "FLIR0002"], ["FLIR0001_photo", "FLIR0002_photo"], ["IMG01V", "IMG01T"] * 2,
+    ["HM2024", "V2024"] * 2, ["T0310001x", "P0310001x"] * 2,
+])  # fmt: skip
+def test_series_need_two_numbers_of_both(names):
+    assert roles_of(names) == [""] * len(names)
+
+
+def test_series_are_told_with_what_has_no_partner():
+    names = ["P031001", "p031002", "T031001", "t031002", "T031009", "IMG_1"]
+    assert roles_of(names) == ["rgb"] * 2 + ["thermal"] * 3 + [""]
+
+
+@pytest.mark.parametrize("name, found", [
+    ("TH", True), ("th_left", True), ("Seek", True), ("tau2", True), ("seekCam", True),
+    ("H20T", True), ("fluke_seek", True), ("hide_and_seek", False), ("thing", False), ("t", False),
+    ("temp", False), ("vue", False), ("vue_pro", True), ("", False), ("left", False),
+])  # fmt: skip
+def test_makers_of_heat(name, found):
+    assert is_heat_maker(name) is found and sort_of_name(name) == ""
 
 
 def test_what_a_stop_holds_is_said(tmp_path):

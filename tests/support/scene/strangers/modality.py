@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.scene.strangers.situations import (
     Shot,
     Situation,
+    found_in,
     write_colmap,
     write_frames,
     write_photos,
@@ -44,6 +46,35 @@ def thermal_gaussian(model: str = "sparse/0"):
     return make
 
 
+def one_folder(*forms: str) -> list[Shot]:
+    """Photos of light and of heat (and of more cameras of light) by the forms of their names."""
+    bright, hot, *more = forms
+    return light(bright) + heat(hot) + [shot for form in more for shot in light(form)]
+
+
+def asked(path: Path) -> str:
+    """What is found, and whether two series of names are asked about."""
+    series = any("two series of names" in doubt for doubt in read_capture(path).doubts)
+    return found_in(path) + (", asked about" if series else "")
+
+
+def maker(folder: str, mode: str) -> Situation:
+    what = {"L": "one channel", "I;16": "16 bits", "RGB": "false colours"}[mode]
+    kind = "layer" if mode == "RGB" or folder == "garage" else "thermal"
+    make = colmap_of(light("rgb/{}.png"), heat(f"{folder}/{{}}.png", mode=mode))
+    found = f"rgb 4 (rgb), {folder} 4 ({kind})"
+    return Situation(f"{folder}/ of {what}", f"rgb/ and {folder}/", make, found, kinds)
+
+
+def kinds(path: Path) -> str:
+    """Stops with their photos and kinds."""
+    capture = read_capture(path)
+    return ", ".join(
+        f"{stop.name} {sum(p.modality == stop.name for p in capture.photos)} ({stop.kind})"
+        for stop in capture.stops
+    )
+
+
 DJI = "DJI_20260504120{0:03}_{0:04}_"
 SITUATIONS = [
     Situation("rig folders", "COLMAP's own layout of a rig, rig1/CAMERA/ with two visible cameras",
@@ -74,6 +105,41 @@ SITUATIONS = [
               "RGB 8, Thermal 8"),
     Situation("Autel pairs", "one folder, MAX_0001 and IRX_0001",
               colmap_of(light("MAX_{:04}.png"), heat("IRX_{:04}.png")), "RGB 4, Thermal 4"),
+    Situation("Autel's three", "one folder, MAX_0001, IRX_0001 and MIX_0001, one over the other",
+              colmap_of(one_folder("MAX_{:04}.png", "IRX_{:04}.png", "MIX_{:04}.png")),
+              "RGB 4, Thermal 4, Mix 4"),
+    Situation("Autel without MAX", "one folder, MIX_0001 and IRX_0001",
+              colmap_of(one_folder("MIX_{:04}.png", "IRX_{:04}.png")), "Mix 4, Thermal 4"),
+    Situation("Autel without IRX", "one folder, MAX_0001 and MIX_0001",
+              colmap_of(light("MAX_{:04}.png"), light("MIX_{:04}.png")), "RGB 4, Mix 4"),
+    Situation("Parrot pairs", "one folder, P0310001 and T0310001 in false colours",
+              colmap_of(one_folder("P031{:04}.png", "T031{:04}.png")), "RGB 4, Thermal 4"),
+    Situation("Parrot in transforms.json", "the same as frames",
+              frames_of(one_folder("images/P031{:04}.png", "images/T031{:04}.png")),
+              "RGB 4, Thermal 4"),
+    Situation("Parrot with other numbers", "P0310001 and T0320001, no number twice",
+              colmap_of(one_folder("P031{:04}.png", "T032{:04}.png")), "RGB 8, asked about", asked),
+    Situation("FLIR E8", "one folder, FLIR0001 and FLIR0001_photo",
+              colmap_of(one_folder("FLIR{:04}_photo.png", "FLIR{:04}.png")), "RGB 4, Thermal 4"),
+    Situation("HIKMICRO", "one folder, HM20240504120001 and HM20240504120001_visual",
+              colmap_of(one_folder("HM2024050412{:04}_visual.png", "HM2024050412{:04}.png")),
+              "RGB 4, Thermal 4"),
+    Situation("FLIR Duo Pro", "one folder, 20240504_120001 and 20240504_120001_8b",
+              colmap_of(one_folder("20240504_12{:04}.png", "20240504_12{:04}_8b.png")),
+              "RGB 4, Thermal 4"),
+    Situation("Snap-on", "one folder, IMG0153V, IMG0153T and IMG0153X, one over the other",
+              colmap_of(one_folder("IMG{:04}V.png", "IMG{:04}T.png", "IMG{:04}X.png")),
+              "RGB 4, Thermal 4, Mix 4"),
+    Situation("two series of names", "a_0001 and b_0001 of another size, in colours",
+              colmap_of(one_folder("a_{:04}.png", "b_{:04}.png")), "RGB 8, asked about", asked),
+    Situation("two series of one size", "left_0001 and right_0001, a stereo camera",
+              colmap_of(light("left_{:04}.png"), light("right_{:04}.png")), "RGB 8", asked),
+    *(maker(folder, mode) for folder, mode in (
+        ("TH", "L"), ("seek", "I;16"), ("tau2", "I;16"), ("h20t", "L"), ("TH", "RGB"),
+        ("seek", "RGB"), ("garage", "I;16"))),
+    Situation("makers in transforms.json", "images/rgb and images/TH of one channel",
+              frames_of(light("images/rgb/{}.png"), heat("images/TH/{}.png", mode="L")),
+              "rgb 4, TH 4"),
     Situation("FLIR and its camera", "one folder, DC_0001 and IR_0001",
               colmap_of(light("DC_{:04}.png"), heat("IR_{:04}.png")), "RGB 4, Thermal 4"),
     Situation("back slashes", "rgb\\0001.png in a model from Windows",
