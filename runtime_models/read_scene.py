@@ -43,7 +43,11 @@ from shapeshift.runtime_models.splats.layers.read_layer_list import (
     has_layer_list,
     read_layer_list,
 )
-from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
+from shapeshift.runtime_models.splats.layers.read_layers import (
+    layer_files,
+    read_file,
+    read_layers,
+)
 from shapeshift.runtime_models.splats.lcc.read_lcc import is_lcc, read_lcc
 from shapeshift.runtime_models.splats.lcc.read_lcc2 import is_lcc2, read_lcc2
 from shapeshift.runtime_models.splats.operations.decimate import within_most_splats
@@ -55,7 +59,6 @@ from shapeshift.runtime_models.splats.read_output_folder import (
     newest_checkpoints,
     newest_cloud,
     read_checkpoints,
-    read_file,
     read_pair,
     thermal_pair,
 )

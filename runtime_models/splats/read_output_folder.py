@@ -2,9 +2,9 @@
 
 INRIA's 3DGS and what grew from it (2DGS, Mip-Splatting, Scaffold-GS, Gaussian Grouping) save
 point_cloud/iteration_N/point_cloud.ply; ThermalGaussian's MSMG and MFTG save point_cloud_color
-and point_cloud_thermal beside each other, its OMMG a second set of harmonics, t_dc_* and t_rest_*,
-in the one PLY; gsplat saves ply/point_cloud_N.ply and ckpts/ckpt_N_rankR.pt, one for each card;
-nerfstudio nerfstudio_models/step-N.ckpt, in outputs/NAME/METHOD/TIME.
+and point_cloud_thermal beside each other; gsplat saves ply/point_cloud_N.ply and
+ckpts/ckpt_N_rankR.pt, one for each card; nerfstudio nerfstudio_models/step-N.ckpt, in
+outputs/NAME/METHOD/TIME.
 """
 
 import re
@@ -13,17 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
-
 from shapeshift.runtime_models.checkpoint.run_settings import GSPLAT_CLOUDS
-from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import formats, read_plain, read_raw
-from shapeshift.runtime_models.splats.layers.read_layers import join_layers
-from shapeshift.runtime_models.splats.moving_splats import TIME_STOPS
+from shapeshift.runtime_models.splats.layers.read_layers import join_layers, stops_of_pair
 from shapeshift.runtime_models.splats.placed_splats import joined
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.stop_names import is_thermal_name
 
 CLOUD = "point_cloud.ply"
@@ -151,47 +147,6 @@ def read_pair(pair: tuple[Path, Path], folder: Path, reading: Reading) -> SplatL
     files = [str(path.relative_to(folder)) for path in pair]
     model = join_layers(parts, stops_of_pair(), reading.mode or "exclusive", files)
     return with_steps(model, list(pair))
-
-
-def stops_of_pair() -> tuple[Stop, Stop]:
-    return Stop("RGB", 0.0, "rgb"), Stop("Thermal", 1.0, "thermal")
-
-
-def read_file(path: Path, reading: Reading) -> SplatLayers:
-    """One file of splats: one stop, or two where it holds thermal harmonics, too."""
-    raw = read_raw(path, reading)
-    if "t_dc_0" not in raw.extra:
-        plain = judge(raw, reading)
-        if plain.motion is not None:
-            return join_layers([plain], TIME_STOPS, "cumulative", [path.name])
-        stops = (Stop(path.stem, 0.0, "layer"),)
-        return join_layers([plain], stops, reading.mode, [path.name])
-    parts = [judge(each, reading) for each in (thermal_twin(raw), raw)][::-1]
-    return join_layers(parts, stops_of_pair(), reading.mode or "exclusive", [path.name])
-
-
-def thermal_twin(raw: RawSplats) -> RawSplats:
-    """The same splats with their thermal harmonics; takes those columns out of `raw`.
-
-    Raises BadFile.
-    """
-    names = [name for name in raw.extra if re.fullmatch(r"t_(dc|rest)_[0-9]+", name)]
-    columns = {name: raw.extra.pop(name) for name in names}
-    rest = len(names) - 3
-    count = rest // 3 + 1
-    wanted = [f"t_dc_{i}" for i in range(3)] + [f"t_rest_{i}" for i in range(rest)]
-    if rest % 3 or count not in COEFFICIENTS or set(wanted) != set(names):
-        raise BadFile(
-            f"{raw.file} has {len(names)} columns t_dc and t_rest; thermal harmonics are 3, 12, "
-            "27 or 48 of them, numbered from 0 on."
-        )
-    raw.memory.charge(len(raw.means) * raw.bytes_a_splat, f"{len(raw.means):,} splats once more")
-    sh = np.empty((len(raw.means), count, 3), np.float32)
-    for i, name in enumerate(wanted):  # t_rest is channel-major, as f_rest is
-        row, channel = (0, i) if i < 3 else (1 + (i - 3) % (count - 1), (i - 3) // (count - 1))
-        sh[:, row, channel] = columns[name]
-    own = {name: getattr(raw, name).copy() for name in ("means", "scales", "wxyz", "opacity")}
-    return replace(raw, **own, sh=sh, findings=())
 
 
 def in_run(model: Model, folder: Path, cloud: Path) -> Model:

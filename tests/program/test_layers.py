@@ -1,11 +1,14 @@
 """Imports go down only: one table, one test.  And each folder stays within what it may know."""
 
 import ast
+import re
 from collections import Counter
 from functools import cache
 from pathlib import Path
 
 import pytest
+
+from tools.program import architecture
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -16,7 +19,7 @@ MAY_IMPORT = {
     "scene": {"runtime_models"},
     "renderer": {"rasterizer", "scene", "runtime_models"},
     "training": {"rasterizer", "scene", "runtime_models"},
-    "decomposition": {"training", "renderer", "rasterizer", "scene", "runtime_models"},
+    "decomposition": {"rasterizer", "scene", "runtime_models"},
     "vr": {"renderer", "scene", "runtime_models"},
     "app": {
         "vr",
@@ -201,6 +204,57 @@ def test_no_modules_import_each_other_in_a_circle():
     graph = import_graph()
     assert sum(map(len, graph.values())) > 1000  # 2,300 now: it sees what there is
     assert not circle_in(graph)
+
+
+def test_the_table_allows_no_more_than_there_is():
+    rooms = architecture.rooms_of(import_graph(), modules())
+    assert {room.name: set(room.imports) for room in rooms} == MAY_IMPORT
+
+
+def test_the_map_of_the_program_is_true():
+    page = architecture.PAGE.read_text("utf-8")
+    made = architecture.made(import_graph(), modules(), page)
+    found = (page, architecture.PICTURE.read_text("utf-8"))
+    assert found == made, "run python3 tools/program/architecture.py and commit docs/architecture.*"
+    assert len(re.findall(r"[^\W\d][\w./-]*", page)) < 700
+
+
+def test_a_number_of_the_map_is_made_anew_where_it_is_a_tenth_off():
+    assert [architecture.settled(n, 100) for n in (89, 91, 110, 112, 20, 0)] == [
+        89, 100, 100, 110, 20, 0,
+    ]  # fmt: skip
+    assert architecture.settled(21_349, None) == 21_000
+    assert architecture.floors_of({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == dict(a=2, b=1, c=0)
+
+
+def function_at(name: str, known: dict[str, Path]) -> ast.AST | None:
+    """Of module.function or module.Class.function without our first name; None: there is none."""
+    parts = name.split(".")
+    for end in range(len(parts) - 1, 0, -1):
+        if (path := known.get(".".join(["shapeshift", *parts[:end]]))) is not None:
+            node: ast.AST | None = parsed(path)
+            for part in parts[end:]:
+                body = getattr(node, "body", [])
+                node = next((n for n in body if getattr(n, "name", "") == part), None)
+            return node if isinstance(node, ast.FunctionDef) else None
+    return None
+
+
+def test_four_ways_lead_through_the_program_as_the_map_says():
+    """Each stay is there, and is called by one before it, in its way or one above."""
+    ways = architecture.ways_in(architecture.PAGE.read_text("utf-8"))
+    assert len(ways) == 4 and all(5 < len(way) <= 8 for way in ways.values())
+    called: set[str] = set()
+    wrong, known = [], modules()
+    for way in ways.values():
+        for number, (name, called_as) in enumerate(way):
+            function = function_at(name, known)
+            if function is None or (number and called_as not in called):
+                wrong.append(name)
+            calls = (n.func for n in ast.walk(function or ast.Pass()) if isinstance(n, ast.Call))
+            called |= {getattr(f, "attr", None) or getattr(f, "id", "") for f in calls}
+    assert not wrong
+    assert not [n for n in ("scene.control.none", "none.control_of") if function_at(n, known)]
 
 
 # shelf of app/editor: shelves of it that it may import (itself is always allowed)

@@ -1,15 +1,18 @@
-"""Several plain splat files to one scene with a stop per file."""
+"""Files of plain splats to one scene: one file with its own stops, several with a stop each."""
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
+from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
-from shapeshift.runtime_models.splats.formats import read_plain
-from shapeshift.runtime_models.splats.moving_splats import held_still
-from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.formats import read_plain, read_raw
+from shapeshift.runtime_models.splats.moving_splats import TIME_STOPS, held_still
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, RawSplats, Reading
 from shapeshift.runtime_models.stop_names import stems_named
 
 MODES = ("cumulative", "exclusive")
@@ -29,6 +32,47 @@ def layer_files(folder: Path) -> list[Path]:
 def number_aware(path: Path) -> list[tuple[int, str]]:
     parts = re.split(r"([0-9]+)", path.name)  # text, digits, text, ...
     return [(int(part) if i % 2 else 0, part) for i, part in enumerate(parts)]
+
+
+def read_file(path: Path, reading: Reading) -> SplatLayers:
+    """One file of splats: one stop, or two where it holds thermal harmonics, too."""
+    raw = read_raw(path, reading)
+    if "t_dc_0" not in raw.extra:
+        plain = judge(raw, reading)
+        if plain.motion is not None:
+            return join_layers([plain], TIME_STOPS, "cumulative", [path.name])
+        stops = (Stop(path.stem, 0.0, "layer"),)
+        return join_layers([plain], stops, reading.mode, [path.name])
+    parts = [judge(each, reading) for each in (thermal_twin(raw), raw)][::-1]
+    return join_layers(parts, stops_of_pair(), reading.mode or "exclusive", [path.name])
+
+
+def thermal_twin(raw: RawSplats) -> RawSplats:
+    """The same splats with their thermal harmonics, the second set that ThermalGaussian's OMMG
+    writes into its one PLY; takes those columns out of `raw`.  Raises BadFile.
+    """
+    names = [name for name in raw.extra if re.fullmatch(r"t_(dc|rest)_[0-9]+", name)]
+    columns = {name: raw.extra.pop(name) for name in names}
+    rest = len(names) - 3
+    count = rest // 3 + 1
+    wanted = [f"t_dc_{i}" for i in range(3)] + [f"t_rest_{i}" for i in range(rest)]
+    if rest % 3 or count not in COEFFICIENTS or set(wanted) != set(names):
+        raise BadFile(
+            f"{raw.file} has {len(names)} columns t_dc and t_rest; thermal harmonics are 3, 12, "
+            "27 or 48 of them, numbered from 0 on."
+        )
+    raw.memory.charge(len(raw.means) * raw.bytes_a_splat, f"{len(raw.means):,} splats once more")
+    sh = np.empty((len(raw.means), count, 3), np.float32)
+    for i, name in enumerate(wanted):  # t_rest is channel-major, as f_rest is
+        row, channel = (0, i) if i < 3 else (1 + (i - 3) % (count - 1), (i - 3) // (count - 1))
+        sh[:, row, channel] = columns[name]
+    own = {name: getattr(raw, name).copy() for name in ("means", "scales", "wxyz", "opacity")}
+    return replace(raw, **own, sh=sh, findings=())
+
+
+def stops_of_pair() -> tuple[Stop, Stop]:
+    """Of what has colours and heat."""
+    return Stop("RGB", 0.0, "rgb"), Stop("Thermal", 1.0, "thermal")
 
 
 def read_layers(
