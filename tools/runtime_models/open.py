@@ -66,7 +66,8 @@ def by_gsply(path: Path) -> list[np.ndarray]:
 
     read = {".spz": gsply.read_spz, ".sog": sogread}.get(path.suffix, gsply.plyread)
     data = read(str(path))
-    return [data.means, data.scales, data.quats, data.opacities, data.sh0, data.shN]
+    arrays = data.means, data.scales, data.quats, data.opacities, data.sh0, data.shN
+    return [array for array in arrays if array is not None]  # None: one colour from all sides
 
 
 def by_gaussforge(path: Path) -> list[np.ndarray]:
