@@ -1,0 +1,204 @@
+"""pytest --changed: which tests a change reaches, in what order, and what a minute leaves out."""
+
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from tests.support.selection import changed, facts, reaching
+
+TREE = {
+    ".gitignore": ".pytest_cache/",
+    "shapeshift/__init__.py": "_NAMES_OF = {'api.load': ('load',), 'api.write': ('export',)}",
+    "shapeshift/__main__.py": "from shapeshift.app.cli import main",
+    "shapeshift/api/load.py": "from shapeshift.scene.pose import Pose",
+    "shapeshift/api/write.py": "",
+    "app/cli.py": "COMMANDS = {'info': ('commands.info', 'what is in it')}",
+    "app/commands/info.py": "def run():\n    from shapeshift.scene.pose import Pose",
+    "app/page.py": "WEB = ROOT / 'web'\nMODULES = ('poses', 'renderer/sort')\nPAGE = 'index.html'",
+    "scene/__init__.py": "",
+    "scene/pose.py": "",
+    "scene/typed.py": "if TYPE_CHECKING:\n    from shapeshift.scene.pose import Pose",
+    "scene/gate.py": "DOOR = f'{PLACE}.runs.mesh_run:arrays'",
+    "scene/runs/mesh_run.py": "",
+    "rasterizer/project.py": "KERNEL = KERNELS / 'project.cl'",
+    "rasterizer/sums.py": "for name in ('sum_up',):\n    KERNELS / f'{name}.cl'",
+    "rasterizer/kernels/project.cl": '#include "common/ewa.cl"\n',
+    "rasterizer/kernels/sum_up.cl": "",
+    "rasterizer/kernels/common/ewa.cl": "",
+    "training/step.py": "KERNEL = KERNELS / 'project.cl'",
+    "training/kernels/project.cl": "",
+    "web/index.html": '<script src="page.js"></script>',
+    "web/page.js": 'import { a } from "./renderer/sort.js";\n',
+    "web/poses.js": "",
+    "web/renderer/sort.js": 'import { b } from "../poses.js";\n',
+    "tests/conftest.py": (
+        "@pytest.fixture\ndef project():\n    import shapeshift.rasterizer.project\n"
+        "@pytest.fixture\ndef drawn(project):\n    pass\n"
+        "@pytest.fixture(autouse=True)\ndef gate():\n    import shapeshift.scene.gate\n"
+    ),
+    "tests/app/test_info.py": "from shapeshift.app.commands.info import run",
+    "tests/app/test_program.py": "run([sys.executable, '-m', 'shapeshift', 'info'])",
+    "tests/app/test_page.py": "from shapeshift.app import page",
+    "tests/scene/test_pose.py": "from shapeshift.scene import pose, typed",
+    "tests/scene/test_typed.py": "import shapeshift.scene.typed",
+    "tests/test_library.py": "import shapeshift as ss\nss.load('a')",
+    "tests/test_export.py": "from shapeshift import export",
+    "tests/test_drawn.py": "def test_one(drawn):\n    pass",
+    "tests/test_asked.py": "def test_one(request):\n    request.getfixturevalue('project')",
+    "tests/test_step.py": "def test_one():\n    from shapeshift.training.step import step",
+    "tests/test_sums.py": "import shapeshift.rasterizer.sums",
+    "tests/test_broken.py": "def (",
+    "docs/formats.md": "",
+    "tests/test_docs.py": "PAGE = ROOT / 'docs/formats.md'",
+}
+
+
+@pytest.fixture(scope="module")
+def used() -> reaching.UsedFiles:
+    return reaching.UsedFiles({path: facts.read_facts(path, text) for path, text in TREE.items()})
+
+
+@pytest.mark.parametrize(
+    ("path", "wanted"),
+    [
+        # Also by an import in a function, by a name of the library, by -m; not for types alone.
+        ("scene/pose.py", {"scene/test_pose": 1, "app/test_info": 2, "test_library": 2,
+                           "app/test_program": 4}),
+        ("app/commands/info.py", {"app/test_info": 1, "app/test_program": 3}),
+        ("scene/typed.py", {"scene/test_pose": 1, "scene/test_typed": 1}),
+        ("shapeshift/api/write.py", {"test_export": 1}),
+        # By includes; of two kernels of a name that of the folder's own; by a name in two parts.
+        ("rasterizer/kernels/common/ewa.cl", {"test_asked": 3, "test_drawn": 3}),
+        ("rasterizer/kernels/project.cl", {"test_asked": 2, "test_drawn": 2}),
+        ("training/kernels/project.cl", {"test_step": 2}),
+        ("rasterizer/kernels/sum_up.cl", {"test_sums": 2}),
+        ("web/renderer/sort.js", {"app/test_page": 4}),
+        ("web/poses.js", {"app/test_page": 5}),
+        ("tests/scene/test_typed.py", {"scene/test_typed": 0}),
+        ("docs/formats.md", {"test_docs": 1}),
+        ("no/such.py", {}),
+    ],
+)  # fmt: skip
+def test_what_a_change_reaches_and_how_far_off_it_is(used, path, wanted):
+    found = reaching.reached_tests(used, [path])
+    assert {each.test: each.distance for each in found} == {
+        f"tests/{name}.py": distance for name, distance in wanted.items()
+    }
+    assert [each.distance for each in found] == sorted(wanted.values())
+    assert all(each.way[0] == each.test and each.way[-1] == path for each in found)
+
+
+def test_what_all_tests_use_reaches_all(used):
+    tests = {path for path in TREE if reaching.is_test(path)}
+    for path, distance in (("tests/conftest.py", 1), ("scene/runs/mesh_run.py", 2)):
+        found = reaching.reached_tests(used, [path])
+        assert {each.test for each in found} == tests
+        assert {each.distance for each in found} == {distance}
+
+
+def test_of_equally_near_ones_that_of_the_same_name_comes_first(used):
+    found = reaching.reached_tests(used, ["scene/typed.py"])
+    assert [each.test for each in found] == [
+        "tests/scene/test_typed.py",
+        "tests/scene/test_pose.py",
+    ]
+
+
+def test_what_was_read_is_kept_until_the_file_is_another(tmp_path):
+    file, kept = tmp_path / "a.py", {}
+    file.write_text("import one.two")
+    assert facts.facts_of(tmp_path, "a.py", kept)["imports"] == ["one.two"]
+    kept["a.py"][2]["imports"] = ["kept"]
+    assert facts.facts_of(tmp_path, "a.py", kept)["imports"] == ["kept"]
+    file.write_text("import one.two.three")
+    assert facts.facts_of(tmp_path, "a.py", kept)["imports"] == ["one.two.three"]
+    file.unlink()
+    assert facts.facts_of(tmp_path, "a.py", kept) == {}
+    for text in ("", "{", "[]", '{"form": 0, "files": {}}'):
+        file.write_text(text)
+        assert facts.load_kept(file) == {}
+
+
+@pytest.fixture
+def checkout(tmp_path) -> Path:
+    """With git, and all of TREE committed."""
+    for path, text in TREE.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+    who = ["-c", "user.name=A", "-c", "user.email=a@b"]
+    for words in (["init", "-q"], ["add", "."], [*who, "commit", "-q", "-m", "all"]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True, capture_output=True)
+    return tmp_path
+
+
+def config_of(root: Path, **options):
+    wanted = {"--changed": "HEAD", "--minutes": 1.0} | options
+    return SimpleNamespace(
+        getoption=wanted.get, args=["tests"], args_source=pytest.Config.ArgsSource.TESTPATHS,
+        invocation_params=SimpleNamespace(dir=root),
+    )  # fmt: skip
+
+
+def test_edited_new_and_deleted_files_choose_the_tests(checkout):
+    config = config_of(checkout)
+    run = changed.Changed(config, checkout, 0.0)
+    assert config.args == [] and run.sentence() == "nothing differs from HEAD."
+    (checkout / "scene/runs/mesh_run.py").unlink()
+    (checkout / "scene/typed.py").write_text("import os")
+    (checkout / "tests/test_new one.py").write_text("")
+    run = changed.Changed(config, checkout, 0.0)
+    assert run.changed == ["scene/runs/mesh_run.py", "scene/typed.py", "tests/test_new one.py"]
+    assert config.args[:2] == [
+        str(checkout / "tests/test_new one.py"), str(checkout / "tests/scene/test_typed.py"),
+    ]  # fmt: skip
+    assert "the nearest first: tests/test_new one.py" in run.sentence()
+    config.args[:], config.args_source = ["tests/scene"], pytest.Config.ArgsSource.ARGS
+    changed.Changed(config, checkout, 0.0)
+    assert config.args == [
+        str(checkout / f"tests/scene/test_{name}.py") for name in ("typed", "pose")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"--minutes": 0.0}, "--minutes is 0"),
+        ({"--minutes": float("nan")}, "--minutes is nan"),
+        ({"--changed": "tests/scene"}, "A revision is wanted"),
+    ],
+)
+def test_what_cannot_be_done_is_a_sentence(checkout, options, word):
+    with pytest.raises(pytest.UsageError, match=word):
+        changed.Changed(config_of(checkout, **options), checkout, 0.0)
+
+
+def test_after_its_time_no_test_begins_and_what_is_left_is_said(checkout, monkeypatch):
+    (checkout / "scene/pose.py").write_text("import os")
+    run = changed.Changed(config_of(checkout), checkout, 100.0)
+    item = SimpleNamespace(path=checkout / "tests/scene/test_pose.py")
+    module = pytest.Module.__new__(pytest.Module)  # only its kind is looked at
+    for seconds, loads, begins in ((100.0, True, True), (124.0, True, True), (124.1, False, True),
+                                   (142.0, False, True), (142.1, False, False)):  # fmt: skip
+        monkeypatch.setattr(changed.time, "monotonic", lambda seconds=seconds: seconds)
+        assert (run.pytest_runtest_protocol(item) is None) == begins
+        if loads:
+            assert run.pytest_make_collect_report(module) is None
+    assert run.left == [item]
+    assert run.left_out().startswith("--changed: 1 of 4 files, the farthest ones, were left out")
+    assert "--changed=HEAD --minutes=10" in run.left_out()
+
+
+def test_windows_come_before_all_others_or_not_at_all():
+    """Mesa's GLX ends the process where EGL was up before."""
+
+    def at(name: str, distance: int) -> reaching.Reached:
+        return reaching.Reached(f"tests/{name}.py", ("",) * (distance + 1))
+
+    near, far, window = at("test_a", 1), at("test_b", 3), at("test_desktop_a", 1)
+    assert changed.apart([near, window, far]) == ([window, near, far], [])
+    window = at("test_desktop_a", 2)
+    assert changed.apart([near, window, far]) == ([near, far], [window])
+    assert changed.apart([window]) == ([window], [])
+    assert changed.apart([]) == ([], [])
