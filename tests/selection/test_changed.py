@@ -10,48 +10,48 @@ from tests.support.selection import changed, facts, reaching
 
 TREE = {
     ".gitignore": ".pytest_cache/",
-    "shapeshift/__init__.py": "_NAMES_OF = {'api.load': ('load',), 'api.write': ('export',)}",
-    "shapeshift/__main__.py": "from shapeshift.app.cli import main",
-    "shapeshift/api/load.py": "from shapeshift.scene.pose import Pose",
-    "shapeshift/api/write.py": "",
-    "app/cli.py": "COMMANDS = {'info': ('commands.info', 'what is in it')}",
-    "app/commands/info.py": "def run():\n    from shapeshift.scene.pose import Pose",
-    "app/page.py": "WEB = ROOT / 'web'\nMODULES = ('poses', 'renderer/sort')\nPAGE = 'index.html'",
+    "shapeshift/__init__.py": "_NAMES_OF = {'api.take': ('load',), 'api.give': ('export',)}",
+    "shapeshift/__main__.py": "from shapeshift.app.words import main",
+    "shapeshift/api/take.py": "from shapeshift.scene.stand import Pose",
+    "shapeshift/api/give.py": "",
+    "app/words.py": "COMMANDS = {'tell': ('commands.tell', 'what is in it')}",
+    "app/commands/tell.py": "def run():\n    from shapeshift.scene.stand import Pose",
+    "app/sheet.py": "WEB = ROOT / 'web'\nMODULES = ('turns', 'renderer/rows')\nPAGE = 'first.html'",
     "scene/__init__.py": "",
-    "scene/pose.py": "",
-    "scene/typed.py": "if TYPE_CHECKING:\n    from shapeshift.scene.pose import Pose",
-    "scene/gate.py": "DOOR = f'{PLACE}.runs.mesh_run:arrays'",
-    "scene/runs/mesh_run.py": "",
-    "rasterizer/project.py": "KERNEL = KERNELS / 'project.cl'",
+    "scene/stand.py": "",
+    "scene/typed.py": "if TYPE_CHECKING:\n    from shapeshift.scene.stand import Pose",
+    "scene/door.py": "DOOR = f'{PLACE}.runs.arrays_run:arrays'",
+    "scene/runs/arrays_run.py": "",
+    "rasterizer/draw_it.py": "KERNEL = KERNELS / 'draw_it.cl'",
     "rasterizer/sums.py": "for name in ('sum_up',):\n    KERNELS / f'{name}.cl'",
-    "rasterizer/kernels/project.cl": '#include "common/ewa.cl"\n',
+    "rasterizer/kernels/draw_it.cl": '#include "common/shared.cl"\n',
     "rasterizer/kernels/sum_up.cl": "",
-    "rasterizer/kernels/common/ewa.cl": "",
-    "training/step.py": "KERNEL = KERNELS / 'project.cl'",
-    "training/kernels/project.cl": "",
-    "web/index.html": '<script src="page.js"></script>',
-    "web/page.js": 'import { a } from "./renderer/sort.js";\n',
-    "web/poses.js": "",
-    "web/renderer/sort.js": 'import { b } from "../poses.js";\n',
+    "rasterizer/kernels/common/shared.cl": "",
+    "training/go.py": "KERNEL = KERNELS / 'draw_it.cl'",
+    "training/kernels/draw_it.cl": "",
+    "web/first.html": '<script src="all.js"></script>',
+    "web/all.js": 'import { a } from "./renderer/rows.js";\n',
+    "web/turns.js": "",
+    "web/renderer/rows.js": 'import { b } from "../turns.js";\n',
     "tests/conftest.py": (
-        "@pytest.fixture\ndef project():\n    import shapeshift.rasterizer.project\n"
-        "@pytest.fixture\ndef drawn(project):\n    pass\n"
-        "@pytest.fixture(autouse=True)\ndef gate():\n    import shapeshift.scene.gate\n"
+        "@pytest.fixture\ndef draw_it():\n    import shapeshift.rasterizer.draw_it\n"
+        "@pytest.fixture\ndef drawn(draw_it):\n    pass\n"
+        "@pytest.fixture(autouse=True)\ndef door():\n    import shapeshift.scene.door\n"
     ),
-    "tests/app/test_info.py": "from shapeshift.app.commands.info import run",
-    "tests/app/test_program.py": "run([sys.executable, '-m', 'shapeshift', 'info'])",
-    "tests/app/test_page.py": "from shapeshift.app import page",
-    "tests/scene/test_pose.py": "from shapeshift.scene import pose, typed",
+    "tests/app/test_tell.py": "from shapeshift.app.commands.tell import run",
+    "tests/app/test_program.py": "run([sys.executable, '-m', 'shapeshift', 'tell'])",
+    "tests/app/test_sheet.py": "from shapeshift.app import sheet",
+    "tests/scene/test_stand.py": "from shapeshift.scene import stand, typed",
     "tests/scene/test_typed.py": "import shapeshift.scene.typed",
     "tests/test_library.py": "import shapeshift as ss\nss.load('a')",
     "tests/test_export.py": "from shapeshift import export",
     "tests/test_drawn.py": "def test_one(drawn):\n    pass",
-    "tests/test_asked.py": "def test_one(request):\n    request.getfixturevalue('project')",
-    "tests/test_step.py": "def test_one():\n    from shapeshift.training.step import step",
+    "tests/test_asked.py": "def test_one(request):\n    request.getfixturevalue('draw_it')",
+    "tests/test_step.py": "def test_one():\n    from shapeshift.training.go import go",
     "tests/test_sums.py": "import shapeshift.rasterizer.sums",
     "tests/test_broken.py": "def (",
-    "docs/formats.md": "",
-    "tests/test_docs.py": "PAGE = ROOT / 'docs/formats.md'",
+    "docs/none.md": "",
+    "tests/test_docs.py": "PAGE = ROOT / 'docs/none.md'",
 }
 
 
@@ -64,20 +64,20 @@ def used() -> reaching.UsedFiles:
     ("path", "wanted"),
     [
         # Also by an import in a function, by a name of the library, by -m; not for types alone.
-        ("scene/pose.py", {"scene/test_pose": 1, "app/test_info": 2, "test_library": 2,
+        ("scene/stand.py", {"scene/test_stand": 1, "app/test_tell": 2, "test_library": 2,
                            "app/test_program": 4}),
-        ("app/commands/info.py", {"app/test_info": 1, "app/test_program": 3}),
-        ("scene/typed.py", {"scene/test_pose": 1, "scene/test_typed": 1}),
-        ("shapeshift/api/write.py", {"test_export": 1}),
+        ("app/commands/tell.py", {"app/test_tell": 1, "app/test_program": 3}),
+        ("scene/typed.py", {"scene/test_stand": 1, "scene/test_typed": 1}),
+        ("shapeshift/api/give.py", {"test_export": 1}),
         # By includes; of two kernels of a name that of the folder's own; by a name in two parts.
-        ("rasterizer/kernels/common/ewa.cl", {"test_asked": 3, "test_drawn": 3}),
-        ("rasterizer/kernels/project.cl", {"test_asked": 2, "test_drawn": 2}),
-        ("training/kernels/project.cl", {"test_step": 2}),
+        ("rasterizer/kernels/common/shared.cl", {"test_asked": 3, "test_drawn": 3}),
+        ("rasterizer/kernels/draw_it.cl", {"test_asked": 2, "test_drawn": 2}),
+        ("training/kernels/draw_it.cl", {"test_step": 2}),
         ("rasterizer/kernels/sum_up.cl", {"test_sums": 2}),
-        ("web/renderer/sort.js", {"app/test_page": 4}),
-        ("web/poses.js", {"app/test_page": 5}),
+        ("web/renderer/rows.js", {"app/test_sheet": 4}),
+        ("web/turns.js", {"app/test_sheet": 5}),
         ("tests/scene/test_typed.py", {"scene/test_typed": 0}),
-        ("docs/formats.md", {"test_docs": 1}),
+        ("docs/none.md", {"test_docs": 1}),
         ("no/such.py", {}),
     ],
 )  # fmt: skip
@@ -92,7 +92,7 @@ def test_what_a_change_reaches_and_how_far_off_it_is(used, path, wanted):
 
 def test_what_all_tests_use_reaches_all(used):
     tests = {path for path in TREE if reaching.is_test(path)}
-    for path, distance in (("tests/conftest.py", 1), ("scene/runs/mesh_run.py", 2)):
+    for path, distance in (("tests/conftest.py", 1), ("scene/runs/arrays_run.py", 2)):
         found = reaching.reached_tests(used, [path])
         assert {each.test for each in found} == tests
         assert {each.distance for each in found} == {distance}
@@ -102,7 +102,7 @@ def test_of_equally_near_ones_that_of_the_same_name_comes_first(used):
     found = reaching.reached_tests(used, ["scene/typed.py"])
     assert [each.test for each in found] == [
         "tests/scene/test_typed.py",
-        "tests/scene/test_pose.py",
+        "tests/scene/test_stand.py",
     ]
 
 
@@ -145,11 +145,11 @@ def test_edited_new_and_deleted_files_choose_the_tests(checkout):
     config = config_of(checkout)
     run = changed.Changed(config, checkout, 0.0)
     assert config.args == [] and run.sentence() == "nothing differs from HEAD."
-    (checkout / "scene/runs/mesh_run.py").unlink()
+    (checkout / "scene/runs/arrays_run.py").unlink()
     (checkout / "scene/typed.py").write_text("import os")
     (checkout / "tests/test_new one.py").write_text("")
     run = changed.Changed(config, checkout, 0.0)
-    assert run.changed == ["scene/runs/mesh_run.py", "scene/typed.py", "tests/test_new one.py"]
+    assert run.changed == ["scene/runs/arrays_run.py", "scene/typed.py", "tests/test_new one.py"]
     assert config.args[:2] == [
         str(checkout / "tests/test_new one.py"), str(checkout / "tests/scene/test_typed.py"),
     ]  # fmt: skip
@@ -157,7 +157,7 @@ def test_edited_new_and_deleted_files_choose_the_tests(checkout):
     config.args[:], config.args_source = ["tests/scene"], pytest.Config.ArgsSource.ARGS
     changed.Changed(config, checkout, 0.0)
     assert config.args == [
-        str(checkout / f"tests/scene/test_{name}.py") for name in ("typed", "pose")
+        str(checkout / f"tests/scene/test_{name}.py") for name in ("typed", "stand")
     ]
 
 
@@ -175,9 +175,9 @@ def test_what_cannot_be_done_is_a_sentence(checkout, options, word):
 
 
 def test_after_its_time_no_test_begins_and_what_is_left_is_said(checkout, monkeypatch):
-    (checkout / "scene/pose.py").write_text("import os")
+    (checkout / "scene/stand.py").write_text("import os")
     run = changed.Changed(config_of(checkout), checkout, 100.0)
-    item = SimpleNamespace(path=checkout / "tests/scene/test_pose.py")
+    item = SimpleNamespace(path=checkout / "tests/scene/test_stand.py")
     module = pytest.Module.__new__(pytest.Module)  # only its kind is looked at
     for seconds, loads, begins in ((100.0, True, True), (124.0, True, True), (124.1, False, True),
                                    (142.0, False, True), (142.1, False, False)):  # fmt: skip
@@ -185,8 +185,14 @@ def test_after_its_time_no_test_begins_and_what_is_left_is_said(checkout, monkey
         assert (run.pytest_runtest_protocol(item) is None) == begins
         if loads:
             assert run.pytest_make_collect_report(module) is None
+    monkeypatch.setattr(changed.time, "monotonic", lambda: 100.0)
+    run.loaded = changed.LOADED - 1
+    assert run.pytest_make_collect_report(module) is None
+    run.pytest_itemcollected()
+    module._nodeid = "tests/scene/test_typed.py"
+    assert run.pytest_make_collect_report(module).result == [] and run.unread == 1
     assert run.left == [item]
-    assert run.left_out().startswith("--changed: 1 of 4 files, the farthest ones, were left out")
+    assert run.left_out().startswith("--changed: 2 of 4 files, the farthest ones, were left out")
     assert "--changed=HEAD --minutes=10" in run.left_out()
 
 

@@ -8,6 +8,7 @@ import pytest
 from tests.support.selection.reaching import Reached, changed_files, reached_tests, used_files
 
 LOAD_WITHIN, BEGIN_WITHIN = 0.4, 0.7  # of the minutes: later no file is loaded, no test begun
+LOADED = 600  # tests a minute: of more the last would not begin, and loading them takes its time
 SHOWN = 3  # changed files that the line names
 
 
@@ -34,7 +35,7 @@ class Changed:
         self.load_until = began + LOAD_WITHIN * 60 * self.minutes
         self.until = began + BEGIN_WITHIN * 60 * self.minutes
         self.left: list[pytest.Item] = []
-        self.unread = 0  # files
+        self.loaded = self.unread = 0  # tests, files
         try:
             self.changed = changed_files(root, self.revision)
             used = used_files(root, self.changed, root / ".pytest_cache" / "imports.json")
@@ -68,9 +69,13 @@ class Changed:
             f"imports away; the nearest first: {way}"
         )
 
+    def pytest_itemcollected(self) -> None:
+        self.loaded += 1
+
     @pytest.hookimpl(tryfirst=True)
     def pytest_make_collect_report(self, collector) -> pytest.CollectReport | None:
-        if not isinstance(collector, pytest.Module) or time.monotonic() <= self.load_until:
+        enough = self.loaded >= LOADED * self.minutes or time.monotonic() > self.load_until
+        if not (isinstance(collector, pytest.Module) and enough):
             return None
         self.unread += 1
         return pytest.CollectReport(collector.nodeid, "passed", None, [])
