@@ -3,6 +3,7 @@
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -178,22 +179,32 @@ def test_after_its_time_no_test_begins_and_what_is_left_is_said(checkout, monkey
     (checkout / "scene/stand.py").write_text("import os")
     run = changed.Changed(config_of(checkout), checkout, 100.0)
     item = SimpleNamespace(path=checkout / "tests/scene/test_stand.py")
-    module = pytest.Module.__new__(pytest.Module)  # only its kind is looked at
+    module = Mock(spec=pytest.Module, nodeid="tests/scene/test_typed.py")
+    assert run.pytest_make_collect_report(module) is None  # of one file at least
+    run.loaded = 1
     for seconds, loads, begins in ((100.0, True, True), (124.0, True, True), (124.1, False, True),
                                    (142.0, False, True), (142.1, False, False)):  # fmt: skip
         monkeypatch.setattr(changed.time, "monotonic", lambda seconds=seconds: seconds)
         assert (run.pytest_runtest_protocol(item) is None) == begins
-        if loads:
-            assert run.pytest_make_collect_report(module) is None
+        if seconds < 142:
+            assert (run.pytest_make_collect_report(module) is None) == loads
     monkeypatch.setattr(changed.time, "monotonic", lambda: 100.0)
     run.loaded = changed.LOADED - 1
     assert run.pytest_make_collect_report(module) is None
     run.pytest_itemcollected()
-    module._nodeid = "tests/scene/test_typed.py"
-    assert run.pytest_make_collect_report(module).result == [] and run.unread == 1
+    assert run.pytest_make_collect_report(module).result == [] and run.unread == 2
     assert run.left == [item]
-    assert run.left_out().startswith("--changed: 2 of 4 files, the farthest ones, were left out")
+    assert run.left_out().startswith("--changed: 3 of 4 files, the farthest ones, were left out")
     assert "--changed=HEAD --minutes=10" in run.left_out()
+
+
+def test_on_a_slow_machine_the_nearest_run_for_a_while_all_the_same(checkout, monkeypatch):
+    run = changed.Changed(config_of(checkout), checkout, 0.0)
+    assert run.until == 42
+    for seconds, until in ((10.0, 42.0), (30.0, 42.0), (30.5, 42.5), (100.0, 112.0)):
+        monkeypatch.setattr(changed.time, "monotonic", lambda seconds=seconds: seconds)
+        run.pytest_collection_finish()
+        assert run.until == pytest.approx(until)
 
 
 def test_windows_come_before_all_others_or_not_at_all():
@@ -202,9 +213,9 @@ def test_windows_come_before_all_others_or_not_at_all():
     def at(name: str, distance: int) -> reaching.Reached:
         return reaching.Reached(f"tests/{name}.py", ("",) * (distance + 1))
 
-    near, far, window = at("test_a", 1), at("test_b", 3), at("test_desktop_a", 1)
+    near, far, window = at("test_a", 1), at("test_b", 3), at("test_desktop_a", 0)
     assert changed.apart([near, window, far]) == ([window, near, far], [])
-    window = at("test_desktop_a", 2)
+    window = at("test_desktop_a", 1)
     assert changed.apart([near, window, far]) == ([near, far], [window])
     assert changed.apart([window]) == ([window], [])
     assert changed.apart([]) == ([], [])

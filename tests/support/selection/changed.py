@@ -8,6 +8,7 @@ import pytest
 from tests.support.selection.reaching import Reached, changed_files, reached_tests, used_files
 
 LOAD_WITHIN, BEGIN_WITHIN = 0.4, 0.7  # of the minutes: later no file is loaded, no test begun
+AT_LEAST = 0.2  # of the minutes that tests have once they are loaded, however slow a machine is
 LOADED = 600  # tests a minute: of more the last would not begin, and loading them takes its time
 SHOWN = 3  # changed files that the line names
 
@@ -32,8 +33,9 @@ class Changed:
         if not self.minutes > 0:
             raise pytest.UsageError(f"--minutes is {self.minutes:g}; a number above 0 is wanted.")
         self.revision = config.getoption("--changed")
-        self.load_until = began + LOAD_WITHIN * 60 * self.minutes
-        self.until = began + BEGIN_WITHIN * 60 * self.minutes
+        self.seconds = 60 * self.minutes
+        self.load_until = began + LOAD_WITHIN * self.seconds
+        self.until = began + BEGIN_WITHIN * self.seconds
         self.left: list[pytest.Item] = []
         self.loaded = self.unread = 0  # tests, files
         try:
@@ -75,10 +77,13 @@ class Changed:
     @pytest.hookimpl(tryfirst=True)
     def pytest_make_collect_report(self, collector) -> pytest.CollectReport | None:
         enough = self.loaded >= LOADED * self.minutes or time.monotonic() > self.load_until
-        if not (isinstance(collector, pytest.Module) and enough):
+        if not (isinstance(collector, pytest.Module) and enough and self.loaded):
             return None
         self.unread += 1
         return pytest.CollectReport(collector.nodeid, "passed", None, [])
+
+    def pytest_collection_finish(self) -> None:
+        self.until = max(self.until, time.monotonic() + AT_LEAST * self.seconds)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
@@ -108,7 +113,7 @@ class Changed:
             return ""
         return (
             f"--changed: {len(self.windows)} files that open a window were left out: they have to "
-            f"come before all others, and are farther.  Run: pytest {self.windows[0].test}"
+            f"come before all others, and are no nearer.  Run: pytest {self.windows[0].test}"
             + " ..."
             * (len(self.windows) > 1)
         )
@@ -122,6 +127,6 @@ def apart(reached: list[Reached]) -> tuple[list[Reached], list[Reached]]:
     """Files to run, and those that open a window where others are nearer: see tests/conftest.py."""
     windows = [each for each in reached if each.test.rpartition("/")[2].startswith("test_desktop")]
     others = [each for each in reached if each not in windows]
-    if not windows or not others or windows[0].distance <= others[0].distance:
+    if not windows or not others or windows[0].distance < others[0].distance:
         return windows + others, []
     return others, windows
