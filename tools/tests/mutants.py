@@ -1,8 +1,8 @@
 """Mutants: faults of one line in the program, and what notices them: docs/bench/mutants.csv.
 
-    python3 tools/tests/mutants.py                     # all that have no row yet
-    python3 tools/tests/mutants.py web/ "snap turn"    # some, by words of their names or files
-    python3 tools/tests/mutants.py --all               # all of them anew
+    python3 tools/tests/mutants.py                             # all that have no row yet
+    python3 tools/tests/mutants.py web/ "snap turn" --again    # by words of their names or files
+    python3 tools/tests/mutants.py --all                       # all of them anew
 
 tools/tests/mutants.csv has them: the text of a line before and after, what that breaks in a word,
 and the test files that are to notice.  Each is put into a copy of the checkout, where these files
@@ -16,12 +16,12 @@ import csv
 import io
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields
@@ -33,6 +33,7 @@ sys.path[:0] = [str(ROOT)]
 from shapeshift.app.terminal import print_text, say  # noqa: E402
 from shapeshift.runtime_models.files.whole_file import write_whole  # noqa: E402
 from tests.support.selection.reaching import (  # noqa: E402
+    UsedFiles,
     checkout_files,
     reached_tests,
     used_files,
@@ -42,7 +43,9 @@ LIST = Path(__file__).with_name("mutants.csv")
 OUT = ROOT / "docs" / "bench" / "mutants.csv"
 COMMAND = "# python3 tools/tests/mutants.py --all"
 PATIENCE_S = 900.0  # of all tests of a mutant
-FARTHER = 12  # files, the nearest by imports, that run where the named ones notice nothing
+NAMED, FARTHER = "named", "farther"
+MOST_FARTHER = 8  # files, the nearest by imports, that run where the named ones notice nothing
+LONG = ("tests/slow/", "tests/xr/")
 CAUGHT, MISSED, BROKEN = "caught", "missed", "broken"
 FAILED = 1  # the exit code of pytest where a test failed
 FAILURE = re.compile(r"^(?:FAILED|ERROR) (\S+?)(?:::| -|$)", re.M)
@@ -90,8 +93,8 @@ class Row:
     breaks: str
     result: str  # CAUGHT, MISSED or BROKEN
     by: str  # the first test that failed
-    way: str  # named, or farther: by imports
-    seconds: str
+    way: str  # NAMED tests, or FARTHER ones: by imports
+    cpu_s: str
 
 
 def read_mutants() -> list[Mutant]:
@@ -171,45 +174,58 @@ def check_tests_pass(mutants: list[Mutant], copy: Path) -> None:
         raise ValueError(f"without a fault the tests end with {code}: {said.strip()[-300:]}")
 
 
-def judge(mutant: Mutant, copy: Path, texts: dict[str, str], farther: list[str]) -> Row:
-    """Runs the tests of one mutant; the copy is afterwards as it was."""
-    began = time.monotonic()
+def judge(mutant: Mutant, copy: Path, texts: dict[str, str], way: str, tests: list[str]) -> Row:
+    """Runs tests of one mutant; the copy is afterwards as it was."""
+    began = spent_s()
     file, text = mutant.applied(texts)
-    result, by, way = MISSED, "", "farther"
     try:
         (copy / file).write_text(text, "utf-8")
-        for way, tests in (("named", mutant.tests.split()), ("farther", farther)):  # noqa: B007
-            code, said = in_copy(copy, ["-x", *tests], PATIENCE_S) if tests else (0, "")
-            if code:
-                failed = FAILURE.search(said)
-                result = CAUGHT if code == FAILED else BROKEN
-                by = failed[1] if failed else said.strip()[-200:]
-                break
+        code, said = in_copy(copy, ["-x", *tests], PATIENCE_S) if tests else (0, "")
     finally:
         (copy / file).write_text(texts[file], "utf-8")
-    seconds = f"{time.monotonic() - began:.0f}"
-    return Row(mutant.name, file, mutant.breaks, result, by, way, seconds)
+    failed = FAILURE.search(said)
+    result = {0: MISSED, FAILED: CAUGHT}.get(code, BROKEN)
+    by = "" if not code else failed[1] if failed else said.strip()[-200:]
+    return Row(mutant.name, file, mutant.breaks, result, by, way, f"{spent_s() - began:.0f}")
 
 
-def run(mutants: list[Mutant], everything: list[Mutant], rows: dict[str, Row], out: Path) -> None:
+def spent_s() -> float:
+    """Processor seconds of the processes that have ended."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
+
+
+def run(
+    mutants: list[Mutant], everything: list[Mutant], rows: dict[str, Row], out: Path, checked: bool
+) -> None:
+    """The named tests of all mutants, then what is farther off of those that these have missed.
+
+    checked: the named tests are tried without a fault first.
+    """
     used = used_files(ROOT, (), ROOT / ".pytest_cache" / "imports.json")
     with copied_checkout() as copy:
         check_copy(copy)
-        check_tests_pass(mutants, copy)
+        if checked:
+            check_tests_pass(mutants, copy)
         texts = {
             path: (copy / path).read_text("utf-8")
             for path in checkout_files(ROOT)
             if not path.startswith(("tests/", "tools/", "docs/")) and is_code(path)
         }
-        for mutant in mutants:
-            file = mutant.applied(texts)[0]
-            near = [each.test for each in reached_tests(used, [file])]
-            named = set(mutant.tests.split())
-            farther = [t for t in near if t not in named and "/slow/" not in t and "/xr/" not in t]
-            row = judge(mutant, copy, texts, farther[:FARTHER])
-            rows[mutant.name] = row
+        for way, mutant in ((way, mutant) for way in (NAMED, FARTHER) for mutant in mutants):
+            row, named = rows.get(mutant.name), mutant.tests.split()
+            if row is not None and (way == NAMED or row.result != MISSED or row.way != NAMED):
+                continue
+            tests = named if way == NAMED else farther_tests(used, mutant.applied(texts)[0], named)
+            row = rows[mutant.name] = judge(mutant, copy, texts, way, tests)
             write_rows(rows, everything, out)
-            print_text(f"{row.result:7} {row.seconds:>4} s  {row.name}  {row.by}")
+            print_text(f"{row.result:7} {row.cpu_s:>4} s  {row.name}  {row.by}")
+
+
+def farther_tests(used: UsedFiles, file: str, named: list[str]) -> list[str]:
+    """The nearest by imports that are not named; none of those that take long."""
+    near = [each.test for each in reached_tests(used, [file])]
+    return [t for t in near if t not in named and not t.startswith(LONG)][:MOST_FARTHER]
 
 
 def is_code(path: str) -> bool:
@@ -217,19 +233,23 @@ def is_code(path: str) -> bool:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="words of a name or of a file")
     parser.add_argument("--all", action="store_true", help="all of them anew, their rows go")
+    parser.add_argument("--again", action="store_true", help="those that are named anew")
+    parser.add_argument(
+        "--unchecked", action="store_true", help="the named tests are known to pass without a fault"
+    )
     parser.add_argument("--out", type=Path, default=OUT, help="default: docs/bench/mutants.csv")
     options = parser.parse_args()
     everything = read_mutants()
     rows = {} if options.all else read_rows(options.out)
     chosen = [m for m in everything if m.holds(options.names)]
-    if not options.names:
-        chosen = [m for m in chosen if m.name not in rows]
+    if options.names and options.again:
+        rows = {name: row for name, row in rows.items() if name not in {m.name for m in chosen}}
     try:
         if chosen:
-            run(chosen, everything, rows, options.out)
+            run(chosen, everything, rows, options.out, not options.unchecked)
     except ValueError as why:
         say(str(why))
         return 2
