@@ -6,7 +6,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from shapeshift.app.page.conventions import conventions_text  # noqa: E402
 from shapeshift.runtime_models.files.whole_file import write_whole  # noqa: E402
+from tools.web.conventions import conventions_text  # noqa: E402
 
 write_whole(ROOT / "web" / "conventions.js", conventions_text().encode())

@@ -194,7 +194,7 @@ def test_the_touch_scene_needs_no_collider_to_be_made(monkeypatch):
 
 @pytest.mark.slow
 def test_the_shipped_colliders_are_what_the_program_makes(tmp_path):
-    from shapeshift.training.synthetic.tabletop import write_colliders, write_example
+    from tools.synthetic.tabletop import write_colliders, write_example
 
     write_example(tmp_path)
     write_colliders(tmp_path)
