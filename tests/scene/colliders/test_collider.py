@@ -29,14 +29,10 @@ from shapeshift.scene.colliders.collider_wrap import squared_distances
 from shapeshift.scene.colliders.convex_parts import MOST_VERTICES, SEARCH, cut_into_parts
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from tests.support.models import make_random_model
-from tests.support.scene.collider_shapes import Cloud, distances, shapes, splatted
+from tests.support.scene.collider_shapes import Cloud, distances, shapes, solid, splatted
 from tests.support.splats.scaffold_scenes import random_raw, write_run
 
 FRESH = Making(kept=False)
-
-
-def solid(collider: Collider) -> trimesh.Trimesh:
-    return trimesh.Trimesh(collider.mesh.vertices, collider.mesh.faces, process=False)
 
 
 def check_hulls(collider: Collider, most: int = 16) -> None:
