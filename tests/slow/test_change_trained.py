@@ -1,7 +1,7 @@
 """Six planted changes between two trained visits: the oracle of tools/inspection/change.py, small.
 
-Photos of 96x72 pixels, 16 a stop, 300 steps a training; the whole size is in
-docs/bench/change.csv.
+Photos of 96x72 pixels, 16 a stop, 300 steps a training; the whole size is
+`tools/inspection/change.py WORK`.
 """
 
 import pytest

@@ -1,5 +1,5 @@
-"""What the program makes of captures as other people's tools leave them: the table in
-docs/capture.md.
+"""What the program makes of captures as other people's tools leave them:
+docs/bench/strange_captures.csv.
 
     python3 tools/scene/strange_captures.py [--check]
 
@@ -8,6 +8,8 @@ in a folder of its own and read; --check compares with what is expected, and wri
 """
 
 import argparse
+import csv
+import io
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -16,26 +18,17 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
-DOCS = ROOT / "docs/capture.md"
-BEGIN, END = "<!-- strange captures: written by a program -->\n", "<!-- end -->\n"
-HEAD = "| situation | what people have | what comes out |\n|---|---|---|\n"
+ROWS = ROOT / "docs/bench/strange_captures.csv"
+HEAD = "# python3 tools/scene/strange_captures.py\n"
 
 
 def table_of(rows: Sequence[tuple]) -> str:
     """rows: situations with what came out."""
-    cells = [(s.name, s.met, found) for s, found in rows]
-    return HEAD + "".join(f"| {' | '.join(map(plain, row))} |\n" for row in cells)
-
-
-def plain(text: str) -> str:
-    """As a cell of a table in Markdown."""
-    for sign in "\\|<>*_":
-        text = text.replace(sign, f"\\{sign}")
-    return text
-
-
-def table_in(text: str) -> str:
-    return text.split(BEGIN)[1].split(END)[0] if BEGIN in text and END in text else ""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("situation", "what people have", "what comes out"))
+    writer.writerows((s.name, s.met, found) for s, found in rows)
+    return HEAD + text.getvalue()
 
 
 def main() -> int:
@@ -53,10 +46,8 @@ def main() -> int:
                 wrong += 1
                 sys.stderr.write(f"{module}: {situation.name}: {found!r}, expected "
                                  f"{situation.expected!r}\n")  # fmt: skip
-    text = DOCS.read_text()
     if not options.check:
-        before, _, rest = text.partition(BEGIN)
-        DOCS.write_text(before + BEGIN + table_of(rows) + END + rest.partition(END)[2])
+        ROWS.write_text(table_of(rows), encoding="utf-8")
     return 1 if wrong else 0
 
 

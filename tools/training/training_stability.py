@@ -1,15 +1,16 @@
 """Where training fails, and what it says then: a row a case, decibels beside the untouched capture.
 
-    python3 tools/training/training_stability.py --out docs/bench/training-stability.md
+    python3 tools/training/training_stability.py --out docs/bench/training-stability.csv
         [--tankard FOLDER] [--fern FOLDER] [--iterations 600] [--size 100] [--cases NAME ...]
 
 Each case is `launch.py train` on a capture of which something is wrong (training_cases.py).  What
-is drawn is compared with the held-out photos of the untouched capture.  What stands in --out
-between the machine and the table is kept: the reading of the rows.
+is drawn is compared with the held-out photos of the untouched capture.  Lines with # in --out
+below that of the machine are kept: the reading of the rows.
 """
 
 import argparse
 import contextlib
+import csv
 import io
 import shlex
 import sys
@@ -40,7 +41,7 @@ from shapeshift.training.photos import BLACK, load_photos  # noqa: E402
 from shapeshift.training.supervision.backgrounds import choose_background  # noqa: E402
 from shapeshift.training.synthetic.balls import make_balls  # noqa: E402
 
-HEAD = "| case | what was done | dB | untouched | what the program said | verdict |"
+HEAD = ("case", "what was done", "dB", "untouched", "what the program said", "verdict")
 ANCHORS = ("--max-anchors", "2000")
 MOST_SAID = 5  # sentences a row
 USUAL = (
@@ -156,7 +157,7 @@ class Bench:
 def cells(case: Case, outcome: Outcome) -> list[str]:
     more = len(outcome.said) - MOST_SAID
     shown = [*outcome.said[:MOST_SAID], *([f"... {more} more"] if more > 0 else [])]
-    said = "<br>".join(shown) or "nothing"
+    said = "\n".join(shown) or "nothing"
     db = [decibels(outcome.db), decibels(outcome.before)]
     return [case.name, case.done, *db, said, case.judge(outcome)]
 
@@ -171,7 +172,7 @@ def sentences(text: str, folder: Path) -> Iterator[str]:
     """What was said beyond the device, the photos and the result, without this machine's places."""
     text = text.replace(f"{folder}/", "").replace(f"{tempfile.gettempdir()}/", "TEMP/")
     for line in text.replace("\r", "\n").splitlines():
-        words = " ".join(line.split()).replace("|", "/")
+        words = " ".join(line.split())
         if words and not any(usual in words for usual in USUAL):
             yield words
 
@@ -180,14 +181,14 @@ def print_line(text: str) -> None:
     print(text, file=sys.stderr, flush=True)  # noqa: T201
 
 
-def before(path: Path) -> tuple[str, dict[str, str]]:
-    """Of an older file: what a person wrote between the machine and the table; rows by case."""
+def before(path: Path) -> tuple[str, dict[str, list[str]]]:
+    """Of an older file: what a person wrote below the machine; rows by case."""
     if not path.exists():
-        return "\n", {}
-    top, _, table = path.read_text(encoding="utf-8").partition(HEAD)
-    middle = top.split("\n", 2)
-    rows = {row.split(" | ")[0].lstrip("| "): row for row in table.splitlines()[2:]}
-    return middle[2] if len(middle) == 3 else "\n", rows
+        return "", {}
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    notes = [line for line in lines if line.startswith("#")]
+    rows = list(csv.reader(lines[len(notes) :]))
+    return "".join(notes[2:]), {row[0]: row for row in rows[1:]}
 
 
 def main() -> None:
@@ -205,17 +206,18 @@ def main() -> None:
     given = {"tankard": options.tankard, "fern": options.fern}
     words = [Path(word).name if Path(word).is_dir() else word for word in without_cases()]
     device = open_device()
-    head = f"    python3 tools/training/training_stability.py {shlex.join(words)}\n"
-    head += f"    {device.name}, {device.platform}\n"
+    head = f"# python3 tools/training/training_stability.py {shlex.join(words)}\n"
+    head += f"# {device.name}, {device.platform}\n"
     read, rows = before(options.out)
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(Path(folder), given, options.iterations, options.size, {}, {})
         for case in CASES:
             if options.cases is None or case.name in options.cases:
-                rows[case.name] = "| " + " | ".join(bench.row(case)) + " |"
-                table = [rows[c.name] for c in CASES if c.name in rows]
-                lines = [HEAD, "|" + "---|" * 6, *table]
-                options.out.write_text(head + read + "\n".join(lines) + "\n", encoding="utf-8")
+                rows[case.name] = bench.row(case)
+                text = io.StringIO(newline="")
+                writer = csv.writer(text, lineterminator="\n")
+                writer.writerows([HEAD, *(rows[c.name] for c in CASES if c.name in rows)])
+                options.out.write_text(head + read + text.getvalue(), encoding="utf-8")
 
 
 def without_cases() -> list[str]:

@@ -1,7 +1,7 @@
 """Captures as other people's tools leave them: a list of situations, and what the program says.
 
 Every module of this folder with a list SITUATIONS takes part: the test of all situations
-(tests/scene/captures/test_strange_captures.py), and the table in docs/capture.md, which
+(tests/scene/captures/test_strange_captures.py), and docs/bench/strange_captures.csv, which
 `python3 tools/scene/strange_captures.py` writes.
 
 To add a row: in a module of this folder, a function that writes the smallest valid input into an
@@ -11,8 +11,8 @@ empty folder and returns the path that a person would give, and a line in its li
 
 The last text is what `look` has to say of that path, word for word; without a `look` of your own it
 is what read_capture finds: the stops with how many photos each has, or "refused: " and the sentence
-up to its first ";".  Then run the program, and commit docs/capture.md with it.  Photos of a few
-pixels are enough (`picture`), and nothing may be read that is not made on the spot.
+up to its first ";".  Then run the program, and commit its rows with it.  Photos of a few pixels
+are enough (`picture`), and nothing may be read that is not made on the spot.
 """
 
 import importlib
