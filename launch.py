@@ -30,6 +30,8 @@ TEST_HELP = """usage: python3 launch.py test [file] [options of pytest]
 Runs the tests; the first time it installs what they need into .venv.
 
   --slow                long trainings, large sweeps and sessions of a headset, too
+  --changed             what reaches the files that were edited, nearest first, for a minute;
+                        --changed=REVISION since that one, --minutes=5 for so long
   -k WORDS              only tests whose names have these words
   -x                    stop at the first that fails
   -q, -v                say less, say more

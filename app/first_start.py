@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -163,15 +164,16 @@ def is_ready(testing: bool) -> bool:
 
 def make_environment(testing: bool) -> None:
     """Make .venv with the locked packages, unless it is there already."""
-    if is_ready(testing):
-        return
-    with one_at_a_time() as lock:
-        if is_ready(testing):
-            return  # another start has made it meanwhile
-        if missing := missing_packages(testing):
-            install_packages(missing)
-        make_venv(lock)
-        install_requirements(testing, lock)
+    made = not is_ready(testing)
+    if made:
+        with one_at_a_time() as lock:
+            if not is_ready(testing):  # else another start has made it meanwhile
+                if missing := missing_packages(testing):
+                    install_packages(missing)
+                make_venv(lock)
+                install_requirements(testing, lock)
+    if made or testing:  # those who run the tests also add files
+        write_stubs()
 
 
 @contextmanager
@@ -329,3 +331,45 @@ def pip_reason(code: int) -> str:
         if found := re.search(pattern, text):
             return f"{meaning.format(*found.groups())} ({where})"
     return f"{pip_said('^ERROR:').removeprefix('ERROR: ').rstrip('.')} ({where})"
+
+
+# What editors see.  Running, shapeshift/__init__.py finds the folders beside it; an editor or a
+# type checker runs nothing, and reads stubs (PEP 561): shapeshift-stubs/renderer/renderer.pyi in
+# .venv says `from renderer.renderer import *`, which leads to the file in the checkout itself, so
+# that each definition is one.  No program imports a name with a hyphen.
+
+
+def write_stubs() -> None:
+    """Bring .venv's stubs to what the checkout has; only what changed is written."""
+    for site in [*VENV.glob("lib/python*/site-packages"), *VENV.glob("Lib/site-packages")][:1]:
+        folder, texts = site / "shapeshift-stubs", stub_texts()
+        try:
+            for old in sorted(folder.rglob("*.pyi")):
+                if old.relative_to(folder).as_posix() not in texts:
+                    old.unlink()
+            for name, text in texts.items():
+                stub = folder / name
+                if not stub.exists() or stub.read_text(encoding="utf-8") != text:
+                    stub.parent.mkdir(parents=True, exist_ok=True)
+                    stub.write_text(text, encoding="utf-8")
+        except OSError as error:
+            say(f"Editors will not follow imports: {error.strerror}: {error.filename}.")
+
+
+def stub_texts() -> dict[str, str]:
+    """Path below shapeshift-stubs -> text, for all modules that do not lie in shapeshift/."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    folders = set(project["tool"]["setuptools"]["package-dir"].values()) - {"shapeshift"}
+    face = ROOT / "shapeshift" / "__init__.pyi"
+    texts = {face.name: face.read_text(encoding="utf-8")}  # some read no other beside this one
+    for path in sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py")):
+        name = path.relative_to(ROOT).with_suffix("")
+        module = ".".join(name.parts).removesuffix(".__init__")
+        own = re.findall(  # of the module, which a star leaves out
+            r"^(?:(?:async )?def |class )?(_[a-zA-Z]\w*)(?=[(:]| = )",
+            path.read_text(encoding="utf-8"), re.M,
+        )  # fmt: skip
+        lines = [f"from {module} import *"]
+        lines += [f"from {module} import {one} as {one}" for one in sorted(set(own))]
+        texts[f"{name.as_posix()}.pyi"] = "\n".join(lines) + "\n"
+    return texts

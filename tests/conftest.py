@@ -1,5 +1,5 @@
-"""Options of the test run: --slow (long ones too), --slow-minutes (as many as there is time for),
---regenerate (write the golden images anew)."""
+"""Options of the test run: --changed (what a change reaches), --slow (long ones too),
+--slow-minutes (as many as there is time for), --regenerate (write the golden images anew)."""
 
 import gc
 import os
@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
+STARTED = time.monotonic()
 BEGAN = pytest.StashKey[float]()  # by time.monotonic()
 
 pytest.register_assert_rewrite("tests.support")  # asserts there tell their values, too
@@ -31,6 +32,9 @@ settings.load_profile("shapeshift")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
+    from tests.support.selection import changed  # not before asserts are rewritten there
+
+    changed.add_options(parser)
     parser.addoption("--slow", action="store_true", help="run the tests marked slow, too")
     parser.addoption(
         "--slow-minutes", type=float, default=float("inf"), metavar="N",
@@ -52,6 +56,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_configure(config: pytest.Config) -> None:
     config.stash[BEGAN] = time.monotonic()
+    if config.getoption("--changed") is not None:
+        from tests.support.selection import changed
+
+        config.pluginmanager.register(changed.Changed(config, ROOT, STARTED))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -205,3 +206,76 @@ def test_the_lock_goes_with_the_last_process_that_has_it(tmp_path):
         child.wait()
         assert first_start.try_lock(other.fileno()) is True
     child.stdin.close()
+
+
+# What editors see
+
+
+@pytest.fixture
+def stubs(tmp_path, monkeypatch) -> Path:
+    """Where the stubs of an environment go."""
+    monkeypatch.setattr(first_start, "VENV", tmp_path)
+    site = tmp_path / ("Lib/site-packages" if os.name == "nt" else "lib/python3.11/site-packages")
+    site.mkdir(parents=True)
+    return site / "shapeshift-stubs"
+
+
+def test_every_module_of_the_package_leads_into_the_checkout(stubs):
+    first_start.write_stubs()
+    table = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    folders = [name.split(".")[1:] for name in table["packages"]]
+    modules = {path.relative_to(ROOT).with_suffix(".pyi") for parts in folders
+               if parts and (ROOT / parts[0]).is_dir()
+               for path in ROOT.joinpath(*parts).glob("*.py")}  # fmt: skip
+    written = {path.relative_to(stubs) for path in stubs.rglob("*.pyi")}
+    assert len(modules) > 400 and written == modules | {Path("__init__.pyi")}
+    assert (
+        (stubs / "renderer/renderer.pyi")
+        .read_text()
+        .startswith("from renderer.renderer import *\n")
+    )
+    face = ROOT / "shapeshift/__init__.pyi"
+    assert (stubs / "__init__.pyi").read_text() == face.read_text()
+
+
+def test_stubs_follow_the_files_and_nothing_else_is_written(stubs, tmp_path, monkeypatch):
+    root = tmp_path / "checkout"
+    for name, text in {
+        "pyproject.toml": '[tool.setuptools.package-dir]\n"shapeshift" = "shapeshift"\n'
+                          '"shapeshift.room" = "room"\n',
+        "shapeshift/__init__.pyi": "",
+        "room/__init__.py": "",
+        "room/deep/wall.py": "import _io\n_A = 1\n_b: int = 2\nC = 3\n_d == 4\nclass _E:\n"
+                             "    _f = 5\ndef _g(): ...\nasync def _h(): ...\n__all__ = []\n",
+        "tools/hammer.py": "",
+    }.items():  # fmt: skip
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text)
+    monkeypatch.setattr(first_start, "ROOT", root)
+    first_start.write_stubs()
+    found = {path.relative_to(stubs).as_posix(): path for path in stubs.rglob("*.pyi")}
+    assert sorted(found) == ["__init__.pyi", "room/__init__.pyi", "room/deep/wall.pyi"]
+    assert found["room/__init__.pyi"].read_text() == "from room import *\n"
+    first, *others = found["room/deep/wall.pyi"].read_text().splitlines()
+    assert first == "from room.deep.wall import *"
+    assert others == [f"from room.deep.wall import {n} as {n}" for n in ("_A", "_E", "_b", "_g",
+                                                                         "_h")]  # fmt: skip
+    before = found["room/__init__.pyi"].stat().st_mtime_ns
+    (root / "room/deep/wall.py").rename(root / "room/deep/floor.py")
+    first_start.write_stubs()
+    assert not found["room/deep/wall.pyi"].exists() and (stubs / "room/deep/floor.pyi").exists()
+    assert found["room/__init__.pyi"].stat().st_mtime_ns == before
+
+
+def test_without_stubs_the_program_starts_all_the_same(stubs, capsys):
+    stubs.write_text("a file where the folder would be")
+    first_start.write_stubs()
+    assert capsys.readouterr().err.startswith("Editors will not follow imports: ")
+
+
+def test_the_tests_bring_the_stubs_to_the_files(calls, monkeypatch):
+    written = []
+    monkeypatch.setattr(first_start, "write_stubs", lambda: written.append(True))
+    for testing, times in ((False, 1), (False, 1), (True, 2), (True, 3)):
+        first_start.make_environment(testing)
+        assert len(written) == times
