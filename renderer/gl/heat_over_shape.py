@@ -14,7 +14,7 @@ class HeatOverShape:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        name = ("resolve.vert", "colors/heat_over_shape.frag")
+        name = ("full.vert", "colors/heat_over_shape.frag")
         self._passes = [gpu.program(*name, SECOND=second, MOST=MOST) for second in (0, 1)]
         self._triangles = [gpu.ctx.vertex_array(program, []) for program in self._passes]
         self._between: moderngl.Framebuffer | None = None  # luminance, blurred along x

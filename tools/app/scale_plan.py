@@ -234,12 +234,15 @@ def lines(cases: Sequence[Case], measured: Measured, assumed: Assumed = Assumed(
     for words, name, form, unit in ROWS:
         values = [f"{getattr(each, name):{form}}{unit}" for each in plans]
         told.append(f"| {words} | {' | '.join(values)} |")
-    for case, needed in zip(cases, plans, strict=True):
-        broken = [row for row in limits(case, needed, measured, assumed) if row[0] > 1]
-        told += ["", f"**{case.name}**, what breaks first:" if broken else
-                 f"**{case.name}**: nothing breaks."]  # fmt: skip
-        told += [f"{i}. {times:,.1f} times too much: {what}." for i, (times, what) in
-                 enumerate(broken, 1)]  # fmt: skip
+    broken: dict[str, list[str]] = {}  # what: how often too much, a case
+    for number, (case, needed) in enumerate(zip(cases, plans, strict=True)):
+        for times, what in limits(case, needed, measured, assumed):
+            broken.setdefault(what, ["no"] * len(cases))
+            broken[what][number] = f"{times:,.1f} times" if times > 1 else "no"
+    told += ["", f"| breaks, too much by | {' | '.join(c.name for c in cases)} |"]
+    told.append("|---" * (len(cases) + 1) + "|")
+    told += [f"| {what} | {' | '.join(values)} |" for what, values in broken.items()
+             if set(values) != {"no"}]  # fmt: skip
     return told
 
 

@@ -67,7 +67,7 @@ class FoveatedSplatter:
 
     def _program_for(self, images: int) -> tuple[moderngl.Program, moderngl.VertexArray]:
         """What composes pictures, with or without a second one of heat."""
-        program = self._gpu.program("resolve.vert", "lenses/foveate.frag", HEAT=images - 1)
+        program = self._gpu.program("full.vert", "lenses/foveate.frag", HEAT=images - 1)
         if images not in self._triangles:
             self._triangles[images] = self._gpu.ctx.vertex_array(program, [])
         return program, self._triangles[images]
