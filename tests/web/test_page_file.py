@@ -11,7 +11,7 @@ import pytest
 
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.page.conventions import conventions_text
+from shapeshift.app.page.conventions import conventions_text, entries_text
 from shapeshift.app.page.export_page import export_page
 from shapeshift.app.page.page_file import (
     MODULES,
@@ -42,6 +42,11 @@ def nothing(*_):
 def test_constants_are_those_of_python():
     text = (WEB / "conventions.js").read_text()
     assert text == conventions_text(), "run python3 tools/web/write_conventions.py"
+
+
+def test_types_are_those_of_python():
+    text = (WEB / "entries.d.ts").read_text()
+    assert text == entries_text(), "run python3 tools/web/write_conventions.py"
 
 
 def test_each_module_comes_after_what_it_imports():
