@@ -186,7 +186,7 @@ class Physics:
         body = self._world.rigid_bodies[self._handle(number)]
         body.position = isometry(checked_pose(pose, f"object {number}"))
         if number in self._masses:
-            body.linvel = body.angvel = (0.0, 0.0, 0.0)
+            body.linvel = body.angvel = (0.0, 0.0, 0.0)  # pyright: ignore[reportAttributeAccessIssue]
         self._world.wake_up_all()
         self._queries_stale = True
 

@@ -70,7 +70,7 @@ def xmp_lens(words: dict[str, str], size: tuple[int, int], where: str) -> Colmap
     each = numbers_in(bends, len(bends.split()), where)
     if model not in BROWN and any(each):
         return None
-    values = dict(zip(NAMES, each if model in BROWN else [], strict=False))
+    values: dict[str, float] = dict(zip(NAMES, each if model in BROWN else [], strict=False))
     for key, name in (
         ("f", "FocalLength35mm"),
         ("px", "PrincipalPointU"),
