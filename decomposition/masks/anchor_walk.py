@@ -64,7 +64,7 @@ class AnchorGraph:
         solved = [k for k in range(1, labels) if known[:, k].any()]
         if free.any() and solved:
             found = self._solve(known[:, solved], free)
-            known[np.ix_(free, solved)] = np.clip(found[free], 0, 1)
+            known[np.ix_(np.flatnonzero(free), np.array(solved))] = np.clip(found[free], 0, 1)
         if known[:, 0].any():  # the shares of all labels add up to 1
             known[free, 0] = np.clip(1 - known[free].sum(1), 0, 1)
         return known

@@ -77,6 +77,7 @@ class PointSam:
 
     def points_of(self, prompt: Prompt, square: Square) -> tuple[np.ndarray, np.ndarray]:
         """(n, 2) places in the square and (n,) their labels; at least one."""
+        places: list[np.ndarray | tuple[float, float]]
         places = [*np.reshape(prompt.inside, (-1, 2)), *np.reshape(prompt.outside, (-1, 2))]
         labels = [INSIDE] * len(prompt.inside) + [OUTSIDE] * len(prompt.outside)
         if prompt.box is not None:

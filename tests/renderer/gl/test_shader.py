@@ -1,6 +1,7 @@
 """GLSL files: includes, defines, errors with file and line; and what holds for every shader."""
 
 import re
+from typing import Any
 
 import pytest
 
@@ -13,6 +14,7 @@ FILES = sorted(
     if p.suffix in (".comp", ".vert", ".frag")
 )
 COMPUTE = [name for name in FILES if name.endswith(".comp")]
+NO_DRIVER: Any = None
 DECODER = {"LAYER_VECS": 16, "BLOCK_VECS": 1024, "STORED_WEIGHTS": 0, "OWN_CONTROL": 0}
 NEEDS = {  # of shaders that say so at their head
     "decode_mlp.comp": DECODER,
@@ -93,7 +95,7 @@ def test_a_shader_that_is_not_given_what_it_needs_says_the_name(name):
     """Before a driver sees it: some take a name that nobody has defined for 0."""
     needed = list(NEEDS[name])[-1]
     with pytest.raises(shader.ShaderError, match=rf"^{name}:\d+: #if {needed}, which nobody"):
-        shader.compile_compute(None, name, **dict(list(NEEDS[name].items())[:-1]))
+        shader.compile_compute(NO_DRIVER, name, **dict(list(NEEDS[name].items())[:-1]))
 
 
 def test_a_condition_of_an_include_names_that_file(folder):
@@ -101,7 +103,7 @@ def test_a_condition_of_an_include_names_that_file(folder):
     (folder / "common" / "outer.glsl").write_text("\n#if TWOO == 2  // once TWO\n#endif\n")
     (folder / "a.frag").write_text('#include "common/outer.glsl"\nvoid main() {}\n')
     with pytest.raises(shader.ShaderError, match=r"^common/outer\.glsl:2: #if TWOO, which nobody"):
-        shader.compile_program(None, "a.vert", "a.frag", folder, TWO=2)
+        shader.compile_program(NO_DRIVER, "a.vert", "a.frag", folder, TWO=2)
 
 
 def test_chunks_of_the_renderer_are_there_for_other_folders(folder):
