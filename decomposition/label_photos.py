@@ -221,7 +221,8 @@ class PhotoLabelling:
             for label, decision in here.items()
             if decision.what in (REJECTED, UNKNOWN)
         }
-        return merge(here, self.photos[view].view.size[::-1], hidden)
+        width, height = self.photos[view].view.size
+        return merge(here, (height, width), hidden)
 
 
 def best_of(candidates: list[Candidate], prompt: Prompt) -> Candidate | None:

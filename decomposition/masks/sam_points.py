@@ -86,7 +86,8 @@ class PointSam:
                 places += [(left, top), (right, bottom)]
                 labels += [CORNER, FAR_CORNER]
             elif not (self.takes_boxes or labels):
-                places, labels = [((left + right) / 2, (top + bottom) / 2)], [INSIDE]
+                places = [((left + right) / 2, (top + bottom) / 2)]
+                labels = [INSIDE]
         if not places or (prompt.box is None and not self.transformers):
             places.append((0.0, 0.0))  # SAM's networks want one more where there is no box
             labels.append(NOTHING)

@@ -46,7 +46,7 @@ def ground_mesh(
         low, covered = covered_cells(looks, labels, plane, side)
         slabs.append(slab(plane, low, covered, side))
         cells = ((vertices @ plane.axes().T - low) / side).astype(int)
-        inside = ((cells >= 0) & (cells < covered.shape)).all(1)
+        inside = np.asarray(((cells >= 0) & (cells < covered.shape)).all(1))
         inside[inside] = covered[tuple(cells[inside].T)]
         height = plane.height(vertices)
         low_skin = inside & (np.abs(height) < NEAR * side)

@@ -18,7 +18,8 @@ class SourceOutputs:
         place = next(each.x for each in model.stops if each.name == stop)
         self.model, self.psi = model, model.psi(place)
         self.rows = np.zeros((len(model.anchors), layout.raw_at[-1]), np.float32)
-        self.at = dict(zip(HEADS, zip(layout.raw_at, layout.outs, strict=False), strict=True))
+        columns = zip(layout.raw_at, layout.outs, strict=False)
+        self.at: dict[str, tuple] = dict(zip(HEADS, columns, strict=True))
         self.networks = {
             head: FoldedNetwork(
                 head, replace(mlp, head="none", clip=None, gain=1.0), model, threads=1
