@@ -18,7 +18,6 @@ from shapeshift.decomposition.masks.anchor_walk import (
     seeds_of_evidence,
 )
 from shapeshift.decomposition.masks.journal import Journal
-from shapeshift.decomposition.masks.label_maps import SILENT
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt, Segmenter
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs
 from shapeshift.decomposition.masks.view_prompts import prompts_of
@@ -30,7 +29,6 @@ from shapeshift.decomposition.masks.work_photos import (
 )
 from shapeshift.decomposition.propagate import (
     ACCEPTED,
-    GIVEN,
     REJECTED,
     UNKNOWN,
     Decision,
@@ -285,14 +283,3 @@ def choose_photos(
         chosen.append(far)
         apart = np.minimum(apart, np.linalg.norm(eyes - eyes[far], axis=1))
     return [photos[i] for i in sorted(chosen)]
-
-
-def silent_maps(photos: PhotoLabels) -> int:
-    """Pixels of all maps that say nothing."""
-    return int(sum((labels == SILENT).sum() for labels in photos.maps))
-
-
-def outcome(counts: Counts) -> str:
-    """For a person."""
-    parts = [f"{getattr(counts, word)} {word}" for word in (GIVEN, ACCEPTED, REJECTED, UNKNOWN)]
-    return ", ".join(parts)

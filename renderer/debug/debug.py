@@ -15,7 +15,6 @@ from shapeshift.renderer.debug.debug_map import birdseye
 from shapeshift.renderer.debug.points import dim, dot_size, paint_points
 from shapeshift.renderer.settings import (
     CULL_REASONS,
-    DEBUG_VIEWS,
     EDGES,
     FrameStats,
     RenderSettings,
@@ -57,7 +56,6 @@ DISTANT = np.asarray(
      [0.99, 0.91, 0.14]]
 , np.float32)  # fmt: skip
 LEGEND_STEPS = 5  # rows that stand for a ramp
-DEBUG_NAMES = tuple(name for name in DEBUG_VIEWS if name)
 MOST_LABELS = 24  # rows of a legend
 RECOLORED = ("depth", "object")  # drawn with other colours than the scene's
 

@@ -25,13 +25,6 @@ class BlockBox:
         low, high = np.array(self.low) - margin, np.array(self.high) + margin
         return np.asarray(((places >= low) & (places < high)).all(axis=1))
 
-    def overlaps(self, other: "BlockBox") -> bool:
-        """Whether a place lies in both."""
-        return all(
-            max(a, c) < min(b, d)
-            for a, b, c, d in zip(self.low, self.high, other.low, other.high, strict=True)
-        )
-
 
 def turned(places: np.ndarray, degrees: float) -> np.ndarray:
     """(N, 3) float64 places in a frame whose x axis lies so many degrees from +X towards -Z.

@@ -45,7 +45,6 @@ WANTED = (
     "wanted are the splats of gsplat (ckpt_*.pt), nerfstudio (step-*.ckpt) or arrays called means, "
     "scales, quats, opacities and sh0"
 )
-Take = Callable[[str], np.ndarray]
 
 
 def is_checkpoint(head: bytes, path: Path) -> bool:

@@ -62,7 +62,6 @@ ELSEWHERE = {
     "training/first_anchors/triangulate_run.py": "a process of its own, by colmap_child.py",
     "runtime_models/session.py": "onnxruntime of networks that write_onnx made, or behind the gate",
     "scene/colliders/primitives.py": "trimesh calculates with our own points",
-    "scene/colliders/collider.py": "trimesh calculates with our own points",
     "scene/colliders/collider_pieces.py": "trimesh writes our own triangles",
     "runtime_models/splats/usd/write_usd.py": "usd-core writes our own splats",
     "runtime_models/package/read_onnx.py": "protobuf of a network, its memory charged beforehand",

@@ -2,28 +2,10 @@
 
 import numpy as np
 
-from shapeshift.runtime_models.files.blocks import each_block
 from shapeshift.runtime_models.splats.plain_splats import RawSplats
 
 LARGEST_LOG = 80.0  # exp of it is a finite float32
 SQUARES = (1e-30, 1e30)  # a quaternion's length squared: far from the ends of float32
-
-
-def invalid_rows(raw: RawSplats) -> np.ndarray:
-    """(K,) rising rows with a number that is not usual as it is filed.
-
-    NaN or Inf anywhere, a quaternion of next to no or of boundless length, a scale or opacity that
-    its coding does not have.  A block is judged by its least and largest numbers; only where those
-    are odd is it looked at row by row.
-    """
-    found: list[np.ndarray] = []
-
-    def look(rows: slice, _: None) -> None:
-        if any_invalid(raw, rows):
-            found.append(rows.start + np.flatnonzero(invalid_in(raw, rows)))
-
-    each_block(len(raw.means), look)
-    return np.sort(np.concatenate(found)) if found else np.empty(0, np.intp)
 
 
 def ranges(raw: RawSplats) -> tuple[tuple[float, float], tuple[float, float]]:

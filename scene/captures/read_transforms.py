@@ -58,7 +58,6 @@ POSES = ("transform_matrix", "c2w_opencv", "c2w")
 SPLITS = {"train": "train", "test": "test", "val": "test"}
 # nerfstudio's lists of the photos of a split; what is in none of them is not used.
 LISTS = {"train_filenames": "train", "val_filenames": "test", "test_filenames": "test"}
-MOST_BYTES = 1 << 30  # of JSON
 
 
 @dataclass(frozen=True)

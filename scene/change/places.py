@@ -14,7 +14,6 @@ from shapeshift.scene.change.similarity import (
 
 KINDS = ("moved", "appeared", "vanished", "hotter", "colder", "higher", "lower", "recoloured")
 HEAT_WORDS, VALUE_WORDS = KINDS[3:5], KINDS[5:7]  # more and less of heat, and of other values
-GEOMETRY = KINDS[:3]
 TOUCH = 1.8  # cells between the middles of two that hang together
 THROUGH = 0.5  # part of the views in which the other visit sees through
 BESIDE = 4.0  # cells from a change of geometry: heat and colour there are of that

@@ -39,15 +39,6 @@ class Collider:
 
 
 @dataclass(frozen=True)
-class MassProperties:
-    """Of a body that is the same throughout, in the object's frame."""
-
-    volume_m3: float
-    centre: np.ndarray  # (3,) float64 metres
-    inertia: np.ndarray  # (3, 3) float64 kg m^2 about the centre
-
-
-@dataclass(frozen=True)
 class Making:
     """How colliders are made."""
 
@@ -199,22 +190,6 @@ def box_around(points: np.ndarray) -> TriangleMesh:
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
     return TriangleMesh(vertices.astype(np.float32), np.array(faces, np.int32))
-
-
-def mass_properties(collider: Collider, mass_kg: float) -> MassProperties:
-    """Centre and inertia of a collider of that mass, which is spread evenly within its mesh."""
-    import trimesh
-
-    if not 0 < mass_kg < np.inf:
-        raise ValueError(f"a mass of {mass_kg} kg is asked for; more than 0 is wanted.")
-    mesh = trimesh.Trimesh(
-        collider.mesh.vertices.astype(np.float64), collider.mesh.faces, process=False
-    )
-    found = mesh.mass_properties
-    scale = mass_kg / found.mass
-    return MassProperties(
-        float(found.volume), np.array(found.center_mass), np.array(found.inertia) * scale
-    )
 
 
 def parts_volume(collider: Collider) -> float:

@@ -17,7 +17,6 @@ from shapeshift.decomposition.masks.work_photos import find_photo, work_photos
 from shapeshift.decomposition.walk_objects import walk_objects
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.runtime_models.model import BadFile, Stop
-from shapeshift.training.synthetic.labels import LABELS, labels_of_places
 from tests.support.decomposition.demo_photos import (
     COUNT,
     SIZE,
@@ -27,6 +26,7 @@ from tests.support.decomposition.demo_photos import (
     true_maps,
     write_demo_capture,
 )
+from tools.synthetic.labels import LABELS, labels_of_places
 
 NAMES = ("cabinet", "motor", "mug")
 

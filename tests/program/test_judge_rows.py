@@ -5,7 +5,6 @@ import pytest
 
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.files.blocks import BLOCK, WORTH_A_THREAD, each_block
-from shapeshift.runtime_models.lint.invalid_rows import invalid_rows
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.rotation import covariance
@@ -13,6 +12,7 @@ from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.operations.activate import activate
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import AXES, RawSplats, Reading
+from tests.support.splats.lint_scenes import invalid_rows
 from tests.support.splats.ply_files import some_splats
 
 COUNTS = (1, 256, 257, BLOCK, BLOCK + 1, WORTH_A_THREAD * BLOCK + 1)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.program import architecture
+from tools.program import architecture, counts
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -255,6 +255,14 @@ def test_four_ways_lead_through_the_program_as_the_map_says():
             called |= {getattr(f, "attr", None) or getattr(f, "id", "") for f in calls}
     assert not wrong
     assert not [n for n in ("scene.control.none", "none.control_of") if function_at(n, known)]
+
+
+def test_a_front_door_leads_to_every_module():
+    """By imports or by a name in a table; what tests and tools alone use lies with them."""
+    graph, known = import_graph(), modules()
+    assert not counts.unreached(graph, known)
+    beside = {"shapeshift.scene.lonely": ROOT / "scene" / "pose.py"}
+    assert counts.unreached(graph | {name: set() for name in beside}, known | beside) == [*beside]
 
 
 # shelf of app/editor: shelves of it that it may import (itself is always allowed)

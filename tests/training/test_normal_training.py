@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.raster import RasterFrame
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.rasterizer.surface import DepthFrame
-from shapeshift.rasterizer.surface_reference import render_depth_reference
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.normal_photo import load_normals
@@ -20,12 +18,14 @@ from shapeshift.training.losses.depth_loss import DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.losses.normal_loss import NormalLoss, NormalTerm, pairs_of
 from shapeshift.training.photos import read
-from shapeshift.training.reference import decode_reference, image_loss_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.renderer.rasterizer_reference import finite_differences
+from tests.support.renderer.surface_reference import render_depth_reference
 from tests.support.training.depth_photos import depth_error, depth_loss_reference, depth_photo
+from tests.support.training.reference import decode_reference, image_loss_reference
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 SHARE = 0.7

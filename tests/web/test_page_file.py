@@ -11,7 +11,6 @@ import pytest
 
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.page.conventions import conventions_text, entries_text
 from shapeshift.app.page.export_page import export_page
 from shapeshift.app.page.page_file import (
     MODULES,
@@ -27,6 +26,7 @@ from shapeshift.runtime_models.model import BadFile, ScaffoldModel
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
 from tests.support.web.page_scenes import paced_model, plain_splats
+from tools.web.conventions import conventions_text, entries_text
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "web"

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from shapeshift.app.document import Document
-from shapeshift.app.page.conventions import interface, script_type
 from shapeshift.app.page.page_file import one_script
 from shapeshift.app.page.page_scene import PageSettings, page_scene
 from shapeshift.app.page.squeeze import squeeze
@@ -21,6 +20,7 @@ from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Painted, Sphere
 from tests.support.models import with_light
 from tests.support.web.page_scenes import paced_model, plain_splats, several_objects
+from tools.web.conventions import interface, script_type
 
 ROOT = Path(__file__).resolve().parents[2]
 OPTIONS = {

@@ -28,11 +28,11 @@ from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, ObjectLab
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.rotation import product  # noqa: E402
 from shapeshift.scene.pose import Pose, View, look_at, perspective  # noqa: E402
-from shapeshift.training.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 from shapeshift.training.synthetic.openness import Clearance  # noqa: E402
 from shapeshift.training.synthetic.placing import frame, inside, turned  # noqa: E402
 from shapeshift.training.synthetic.tracer import Place, look, photograph, shade  # noqa: E402
 from shapeshift.training.synthetic.workshop import GOLDEN, GREY, LIGHT, dome, things  # noqa: E402
+from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 
 VIEWS, SIZE = 24, (384, 288)  # that label
 BELOW, BELOW_SIZE = 8, (256, 192)  # that judge

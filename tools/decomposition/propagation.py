@@ -39,8 +39,8 @@ from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
-from shapeshift.training.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome  # noqa: E402
+from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 
 SIZE = (384, 288)
 VIEWS, OF, TESTS = 16, 48, 8

@@ -32,10 +32,6 @@ from shapeshift.decomposition.partition import (  # noqa: E402
 )
 from shapeshift.decomposition.proxies.choose import candidates_of, choose_proxy  # noqa: E402
 from shapeshift.decomposition.proxies.standing import standing_mesh  # noqa: E402
-from shapeshift.decomposition.proxies.surface_scores import (  # noqa: E402
-    score_surfaces,
-    surface_of,
-)
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.parts import part_of  # noqa: E402
@@ -43,9 +39,13 @@ from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.colliders.collider import Making, collider_of_model  # noqa: E402
 from shapeshift.scene.pose import Pose  # noqa: E402
 from shapeshift.scene.world.physics import Physics  # noqa: E402
-from shapeshift.training.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 from shapeshift.training.synthetic.tracer import Place, trace  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome, things  # noqa: E402
+from tools.decomposition.surface_scores import (  # noqa: E402
+    score_surfaces,
+    surface_of,
+)
+from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 
 THINGS = ("mug", "can", "spanner", "screwdriver", "motor", "cabinet")
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

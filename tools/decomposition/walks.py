@@ -35,8 +35,8 @@ from shapeshift.decomposition.propagate import Support, propagate  # noqa: E402
 from shapeshift.decomposition.shown import ShownAnchors  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.training.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome  # noqa: E402
+from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 
 SIZE = (384, 288)
 VIEWS, TESTS = 16, 8

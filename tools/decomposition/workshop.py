@@ -37,8 +37,8 @@ from shapeshift.rasterizer.raster import rasterize_rgba  # noqa: E402
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.training.synthetic.labels import OBJECTS, label_map, labels_of_places  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome  # noqa: E402
+from tools.synthetic.labels import OBJECTS, label_map, labels_of_places  # noqa: E402
 
 SIZE = (384, 288)
 NAMES = tuple(ObjectLabel(label, name) for label, name in enumerate(OBJECTS, 1))

@@ -40,9 +40,9 @@ from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint  # n
 from shapeshift.training.evaluation.evaluate import ModelRenderer  # noqa: E402
 from shapeshift.training.photos import BLACK, LoadedPhoto, load_photos  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
-from shapeshift.training.synthetic.hall.hall import make_hall, place  # noqa: E402
 from shapeshift.training.synthetic.tracer import depth_under  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
+from tools.synthetic.hall.hall import make_hall, place  # noqa: E402
 
 BAND = 0.5  # metres on both sides of a cut
 LEAST_PIXELS = 100  # of a band, or beside it, for a photo to count

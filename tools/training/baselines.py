@@ -107,7 +107,7 @@ def made(name: str, work: Path) -> Path:
 
             make_balls(folder)
         elif name == "one_shape":
-            from shapeshift.training.synthetic.one_shape import make_one_shape
+            from tools.synthetic.one_shape import make_one_shape
 
             make_one_shape(folder)
         else:

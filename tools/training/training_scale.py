@@ -6,8 +6,8 @@
 Anchors lie on a ball's surface in front of the camera, networks are fresh, photos are noise: the
 arithmetic and the memory of a real scene of that size, without its data.  slots: pairs of a splat
 and a tile of its box, listed: those whose ellipse touches the tile.  pool_mb: what the device's
-pool holds after the last step; said_mb: what training/memory.py says of it.  cpu_ms: processor time
-of all threads, mean of the steps but the first; the passes are wall time.
+pool holds after the last step; said_mb: what tools/app/step_memory.py says of it.  cpu_ms:
+processor time of all threads, mean of the steps but the first; the passes are wall time.
 """
 
 import argparse
@@ -27,8 +27,8 @@ from shapeshift.training.density.densification_stats import DensificationStats  
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded  # noqa: E402
 from shapeshift.training.heads.optimizer import Adam  # noqa: E402
 from shapeshift.training.losses.losses import ImageLoss  # noqa: E402
-from shapeshift.training.memory import step_memory  # noqa: E402
 from shapeshift.training.step import TrainingStep  # noqa: E402
+from tools.app.step_memory import step_memory  # noqa: E402
 
 PASSES = (
     "heads", "activate", "project", "bin", "rasterize", "loss", "rasterize backward",

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-RUNNING = ("SYNCHRONIZED", "VISIBLE", "FOCUSED")
 BEGIN, END = "begin", "end"  # what has to be done at once
 LOST = "LOST"  # of ours, no state of the runtime's: what follows is another session
 

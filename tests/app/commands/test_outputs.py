@@ -9,13 +9,13 @@ from PIL import Image
 from shapeshift.app import cli
 from shapeshift.app.commands.outputs import as_steps, choose_unit, summary
 from shapeshift.app.commands.png16 import write_png16
-from shapeshift.renderer.reference.surface_reference import reference_surface
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import random_package
+from tests.support.renderer.surface_reference import reference_surface
 
 NO_GL = ["--context", "none", "--size", "60x44"]
 

@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.renderer.reference.reference import (
-    reference_counts,
-    reference_image,
-)
+from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
+from tests.support.renderer.reference_reasons import reference_counts
 from tests.support.splat_scenes import (
     alone,
     front_view,

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.training.density.densification_stats import DensificationStats
@@ -28,9 +27,10 @@ from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
+from tests.support.renderer.rasterizer_reference import render_reference
+from tests.support.training.reference import decode_reference
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 RNG = np.random.default_rng

@@ -3,7 +3,7 @@
     python3 tools/training/first_anchors/masks_meaning.py --out docs/bench/masks_meaning.csv \
         [--seconds 20] [--masks object valid] [--seeds 0]
 
-Two kinds of training/synthetic/strangers.py whose files do not say what their masks mean: cut_out,
+Two kinds of tools/synthetic/strangers.py whose files do not say what their masks mean: cut_out,
 an object before a wall, and passers, a room in which somebody stands in every photo; the column
 auto is what their shapes tell the reader.  psnr_db is against what the tracer shows from the places
 of the held-out photos without the wall and without the people, not against the photos; worst_db of
@@ -27,14 +27,14 @@ from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
-from shapeshift.training.synthetic.strangers import (  # noqa: E402
+from shapeshift.training.synthetic.tracer import Place, photograph  # noqa: E402
+from shapeshift.training.train import Trainer  # noqa: E402
+from tools.synthetic.strangers import (  # noqa: E402
     BLACK,
     KINDS,
     make_stranger,
     radiance,
 )
-from shapeshift.training.synthetic.tracer import Place, photograph  # noqa: E402
-from shapeshift.training.train import Trainer  # noqa: E402
 
 COLUMNS = (
     "capture", "seed", "auto", "masks", "psnr_db", "worst_db", "seconds", "steps", "count", "said",

@@ -13,7 +13,6 @@ from shapeshift.app.editor.panels.widgets.question_box import answer_row, questi
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.paths import plain
 
-Vec = imgui.ImVec2
 LONGEST_PATH = 1000  # letters
 MOST_RECENT = 6
 DIALOGS = ("zenity", "kdialog", "qarma", "matedialog")  # what Linux desktops ask files with

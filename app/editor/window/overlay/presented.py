@@ -33,11 +33,6 @@ class Presented:
         self._other_before = True
         self.due = True  # the window has something that is not on the screen yet
 
-    @property
-    def keeps(self) -> bool:
-        """Whether pictures are kept: a frame in which nothing changed shows the last one again."""
-        return self.kept is not None
-
     def screen(self) -> moderngl.Framebuffer:
         """The window's framebuffer with the viewport on all of it, to draw into: over a picture
         that was taken, if that is not on the screen yet.

@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from shapeshift.rasterizer.project import Camera
-from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.files import blocks
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.model import BadFile, SplatLayers
@@ -32,6 +31,7 @@ from shapeshift.runtime_models.splats.operations.moment_matching import shown_ar
 from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from tests.support.renderer.rasterizer_reference import render_reference
 from tests.support.renderer.rasterizer_scenes import psnr
 from tests.support.splat_scenes import FIELDS, random_layers, shell
 from tests.support.splats.ply_files import some_splats

@@ -16,8 +16,6 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import Pose, View, look_at
-from shapeshift.training.synthetic.hall import machines, pipes, vessels
-from shapeshift.training.synthetic.hall.building import HALF_X, HALF_Z, HEIGHT, building
 from shapeshift.training.synthetic.openness import Clearance
 from shapeshift.training.synthetic.placing import frame, inside, turned
 from shapeshift.training.synthetic.tracer import (
@@ -31,6 +29,8 @@ from shapeshift.training.synthetic.tracer import (
     surface_points,
 )
 from shapeshift.training.synthetic.workshop import Radiance, write_photos
+from tools.synthetic.hall import machines, pipes, vessels
+from tools.synthetic.hall.building import HALF_X, HALF_Z, HEIGHT, building
 
 COLD, HOT = 5.0, 105.0  # °C that thermal intensity 0 and 1 stand for
 STOPS = (

@@ -6,9 +6,9 @@ group stays within 2.6 metres to each side and 1.7 to the front and the back.
 
 import numpy as np
 
-from shapeshift.training.synthetic.hall.building import INDOORS
 from shapeshift.training.synthetic.placing import ball, bar, box, bump, disc, mix, noise, ring
 from shapeshift.training.synthetic.tracer import Material, Solid
+from tools.synthetic.hall.building import INDOORS
 
 DARK = Material((0.15, 0.16, 0.18), INDOORS + 2, 0.15, 20.0)
 CONCRETE = Material(

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from shapeshift.training.synthetic.hall.building import HALF_X, HALF_Z, INDOORS
-from shapeshift.training.synthetic.hall.machines import DARK, metal
 from shapeshift.training.synthetic.placing import ball, bar, box, mix, noise, ring, run_of_pipe
 from shapeshift.training.synthetic.tracer import Material, Solid
+from tools.synthetic.hall.building import HALF_X, HALF_Z, INDOORS
+from tools.synthetic.hall.machines import DARK, metal
 
 TRAP, TRAP_C = (8.4, 1.0, -8.9), 94.0  # a steam trap that no longer closes
 LEAK, LEAK_C = (-8.2, 4.7, -8.9), 80.0  # a flange under the steam line's lagging

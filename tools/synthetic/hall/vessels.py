@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from shapeshift.training.synthetic.hall.building import INDOORS
-from shapeshift.training.synthetic.hall.machines import CONCRETE, DARK, carton, metal, paint
 from shapeshift.training.synthetic.placing import ball, bar, box, bump, disc, mix, noise, ring
 from shapeshift.training.synthetic.tracer import Material, Solid
+from tools.synthetic.hall.building import INDOORS
+from tools.synthetic.hall.machines import CONCRETE, DARK, carton, metal, paint
 
 FUSE, FUSE_C = (0.42, 1.32, 0.42), 79.0  # behind the third door of the switchgear
 BUSHING, BUSHING_C = (-0.5, 2.75, 0.0), 92.0  # the transformer's first

@@ -1,9 +1,10 @@
-"""The slow twin of a training step: heads, activations and losses in plain numpy float64."""
+"""The slow twin of a training step in plain numpy float64: heads, activations and losses; and what
+plain splats decode to.
+"""
 
 import numpy as np
 
 from shapeshift.rasterizer.project import Camera
-from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.colors.spherical_harmonics import C1, basis
 from shapeshift.runtime_models.model import HEADS
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
@@ -11,6 +12,7 @@ from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.losses.min_opacity import MIN_OPACITY
+from tests.support.renderer.rasterizer_reference import render_reference
 
 
 def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
@@ -115,3 +117,20 @@ def step_loss_reference(
     image, _ = render_reference(splats, camera, background)
     image_loss = image_loss_reference(image.transpose(1, 2, 0), photo, ssim_share)
     return float(image_loss + min_opacity_share * np.maximum(MIN_OPACITY - splats[3], 0).mean())
+
+
+def decode_plain_reference(parameters: dict[str, np.ndarray], eye: np.ndarray, used: int) -> tuple:
+    """(means, scales, wxyz, opacity, color) of an optimiser's values seen from `eye` (3,).
+
+    used: how many coefficients count besides the first.
+    """
+    values = {name: np.asarray(array, np.float64) for name, array in parameters.items()}
+    harmonics = np.concatenate([values["base"][:, None], values["rest"][:, :used]], axis=1)
+    weights = basis(directions(values["means"], eye), 1 + used)
+    return (
+        values["means"],
+        np.exp(values["scales"]),
+        values["wxyz"],
+        1 / (1 + np.exp(-values["opacity"])),
+        np.maximum(0.5 + np.einsum("nm,nmc->nc", weights, harmonics), 0),
+    )
