@@ -61,7 +61,7 @@ def _inside(
     in_objects = np.swapaxes(planes @ turns, 1, 2)  # (n, 3, 5)
     place = middle @ in_objects + (shifts @ planes.T)[:, None]  # (n, L, 5)
     reach = (1 + TAIL) * half @ np.abs(in_objects)
-    return (place + reach > np.array([0, 0, 0, 0, near])).all(axis=2)
+    return np.asarray((place + reach > np.array([0, 0, 0, 0, near])).all(axis=2))
 
 
 def wider(tangents: tuple, angle: float = WIDER) -> tuple[float, float, float, float]:

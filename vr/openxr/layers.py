@@ -110,7 +110,7 @@ class FrameLayers:
         projected = []
         for i, (chain, texture, view) in enumerate(zip(self._eyes, textures, views, strict=True)):
             picture = chain.show(texture, self._shown, self.keep)
-            if self.keep:
+            if picture is not None:
                 self.kept.append(picture)
             behind = deep[i] if deep else None
             each = xr.CompositionLayerProjectionView(view.pose, view.fov, chain.whole, next=behind)
@@ -130,7 +130,7 @@ class FrameLayers:
         deep = []
         for i, chain in enumerate(self._depths):
             kept = chain.fill(partial(write_depth, i), self.keep)
-            if self.keep:
+            if kept is not None:
                 self.kept_depth.append(kept)
             info = xr.CompositionLayerDepthInfoKHR(chain.whole, 0.0, 1.0, NEAR_M, FAR_M)
             deep.append(info)
