@@ -119,6 +119,14 @@ def test_a_simulation_is_that_of_the_command(tmp_path):
     assert not np.allclose(ring, steps[0].scene.object("ring").world_from_object.position)
 
 
+def test_a_simulation_goes_on_for_a_while_after_its_script(tmp_path, monkeypatch):
+    monkeypatch.setattr("shapeshift.api.play.AFTER_S", 0.1)
+    script = tmp_path / "script.jsonl"
+    script.write_text('{"t": 0.1, "do": "hand", "position": [0, 2, 0]}')
+    assert len(list(ss.simulate(ss.TOUCH, script))) == 18  # 0.2 s at 90 Hz
+    assert len(list(ss.simulate(ss.TOUCH))) == 9
+
+
 def test_what_falls_falls_as_newton_says():
     """From 0.5 m up, nothing below it for 0.25 s: g t^2 / 2 within a step's rounding."""
     scene = ss.load(ss.TOUCH).with_object("cube", position=(-0.22, 0.8, 0.05))

@@ -208,13 +208,15 @@ def test_what_was_pressed_elsewhere_presses_nothing_here():
     assert carried.pointing.pressing
 
 
-@pytest.mark.parametrize("away", [-0.5, RAY_M + 0.2])
-def test_a_ray_from_behind_or_too_far_does_not_point(away):
+@pytest.mark.parametrize(
+    ("away", "to"), [(-0.5, 0.0), (-0.5, -1.0), (0.5, 1.0), (RAY_M + 0.2, 0.0)]
+)
+def test_a_ray_from_behind_or_away_or_too_far_does_not_point(away, to):
     carried = settled()
     normal = carried.play_from_panel.matrix()[:3, 2]
-    place = spot(carried) + normal * away
+    place, target = (spot(carried) + normal * metres for metres in (away, to))
     for trigger in (0.0, 1.0):
-        carried, _ = step(carried, hand_at(place, spot(carried), trigger=trigger))
+        carried, _ = step(carried, hand_at(place, target, trigger=trigger))
     assert carried.pointing.at is None and not carried.on_panel
 
 
