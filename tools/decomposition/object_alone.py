@@ -70,7 +70,9 @@ def cut_objects(device: Device, names: list[str]) -> Iterator[Cut]:
     model = read_model(DEMO)
     pictures = [LabelledView(view, 0.0, label_map(view)) for view in dome(VIEWS, 0.0, SIZE)]
     sums = gather_evidence(device, model, pictures, len(LABELS))
+    assert isinstance(model, AnchorModel)
     model = partition(model, sums, tuple(ObjectLabel(LABELS[n], n) for n in OBJECTS))
+    assert isinstance(model, AnchorModel) and model.labels is not None
     looks = looks_of(model)
     for name in names:
         label = LABELS[name]

@@ -110,7 +110,9 @@ def main() -> None:
     rows = []
     with ss.Renderer("tiles") as renderer:
         first = models[0][3]
+        assert isinstance(first, ss.AnchorModel)
         for name, steps, seconds, model in models:
+            assert isinstance(model, ss.AnchorModel)
             inside = int(region.holds(model.anchors).sum())
             kept = len(set(rows_as_bytes(first)) & set(rows_as_bytes(model)))
             values = score(renderer, model, photos, region, capture.background or (0, 0, 0))

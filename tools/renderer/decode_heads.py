@@ -173,7 +173,9 @@ def frame_row(model: AnchorModel) -> str:
 
 def cold(form: str) -> None:
     """In a process of its own: what the first decoding costs more than the second, ms."""
-    model = read_model(DEMO).with_anchors(slice(0, 100))
+    demo = read_model(DEMO)
+    assert isinstance(demo, AnchorModel)
+    model = demo.with_anchors(slice(0, 100))
     open_device()
     taken = []
     for _ in range(2):
@@ -214,6 +216,7 @@ def main() -> None:
         cold(asked.cold)
         return
     device, demo = open_device(), read_model(DEMO)
+    assert isinstance(demo, AnchorModel)
     counts = " ".join(map(str, asked.anchors))
     lines = [
         f"# python3 tools/renderer/decode_heads.py --anchors {counts}",

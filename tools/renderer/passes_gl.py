@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,10 +40,11 @@ from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 from tests.support.splat_scenes import random_model, shell  # noqa: E402
 
 SIZE = (1280, 720)
-EYES = [View(look_at((x, 0.3, 4.5), (x, 0, 0)), (-0.6, 0.6, -0.34, 0.34), 0.05, 50, SIZE)
+EYES = [View(look_at(np.array([x, 0.3, 4.5]), np.array([x, 0, 0])),
+             (-0.6, 0.6, -0.34, 0.34), 0.05, 50, SIZE)
         for x in (0.0, 0.064)]  # fmt: skip
 EXACT = RenderSettings()
-CULLS = {"max_pixels": 8.0, "max_distance": 4.5, "min_pixels": 1.0}
+CULLS: dict[str, Any] = {"max_pixels": 8.0, "max_distance": 4.5, "min_pixels": 1.0}
 PROJECTED = {  # name: (settings, number of views)
     "exact": (EXACT, 1),
     "culls": (RenderSettings(**CULLS), 1),

@@ -24,6 +24,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.streaming import fade
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.files.part_cache import PartCache
+from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import LeafReading, Reading
 from shapeshift.scene.pose import View, look_at, perspective
@@ -75,6 +76,7 @@ def measure(folder: Path, view: View, budget: int) -> Iterator[dict]:
         renderer.draw([view])
         stream = renderer.streaming.stream
         level, pixels = stream.table.level, stream.weights.pixels
+        assert isinstance(model, SplatLayers)
         coarsest = model.leaves.levels.coarsest
         able = np.flatnonzero((level >= 0) & (level < coarsest) & (pixels >= PIXELS))
         leaves = np.random.default_rng(0).permutation(able)[:LEAVES]

@@ -87,7 +87,9 @@ def decimated_by_peer(path: Path, model: SplatLayers, count: int) -> SplatLayers
         out = Path(folder) / "fewer.ply"
         command = [PEER, "-q", "-g", "cpu", str(path), "--decimate", str(count), str(out)]
         subprocess.run(command, check=True)
-        return read_model(out)
+        fewer = read_model(out)
+        assert isinstance(fewer, SplatLayers)
+        return fewer
 
 
 def cpu_seconds() -> float:
@@ -129,6 +131,7 @@ def pictures(renderer, model: SplatLayers, views: list, x: float) -> np.ndarray:
 
 def measure(path: Path, renderer) -> list[str]:
     model = read_model(path)
+    assert isinstance(model, SplatLayers)
     views = orbit_path(VIEWS, *frame_points(*model_points(model)), SIZE)
     whole = {stop.x: pictures(renderer, model, views, stop.x) for stop in model.stops}
     rows = []
@@ -149,7 +152,9 @@ def measure(path: Path, renderer) -> list[str]:
     return rows
 
 
-def write_scenes(doc: str, columns: str, measure: Callable[[Path, Renderer], list[str]]) -> None:
+def write_scenes(
+    doc: str | None, columns: str, measure: Callable[[Path, Renderer], list[str]]
+) -> None:
     """Measures every scene that is named; the rows go below their command into --out."""
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("scenes", nargs="+", type=Path)

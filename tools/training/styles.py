@@ -160,7 +160,7 @@ def row_of(device, scene: Path, name: str, networks: Path, arguments) -> str:
         frames = [
             [
                 view.coverage[..., None] * network.stylise(view.source)
-                + (1 - view.coverage[..., None]) * np.float32(behind)
+                + (1 - view.coverage[..., None]) * np.array(behind, np.float32)
                 for view in group
             ]
             for group in before
