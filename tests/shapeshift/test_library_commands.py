@@ -58,7 +58,7 @@ def test_a_package_of_one_object_is_its_anchors(tmp_path):
     from shapeshift.runtime_models.model import ObjectLabel
     from tests.support.models import make_random_model
 
-    labels = np.uint8([0, 1, 0, 1, 1, 0])
+    labels = np.array([0, 1, 0, 1, 1, 0], np.uint8)
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     whole = ss.Scene.from_model(replace(model, labels=labels, objects=(ObjectLabel(1, "mug"),)))
     for name, label in (("a", "mug"), ("b", 1)):

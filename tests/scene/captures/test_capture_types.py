@@ -205,4 +205,4 @@ def test_ply_colours_as_numbers_of_0_to_1_and_in_big_endian(tmp_path, order):
     (tmp_path / "a.ply").write_bytes(header.encode() + rows.tobytes())
     points, colors = read_points(tmp_path / "a.ply")
     np.testing.assert_array_equal(points, [[x, 0, 0] for x in range(5)])
-    np.testing.assert_array_equal(colors, np.tile(np.float32([0.25, 0, 1]), (5, 1)))
+    np.testing.assert_array_equal(colors, np.tile(np.array([0.25, 0, 1], np.float32), (5, 1)))

@@ -121,7 +121,7 @@ def archive_seeds(folder: Path) -> list[Seed]:
 
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     write_package(model, folder / "package.shift")
-    labels, mug = np.uint8([0, 1, 0, 1, 1, 0]), ObjectLabel(1, "mug")
+    labels, mug = np.array([0, 1, 0, 1, 1, 0], np.uint8), ObjectLabel(1, "mug")
     write_package(replace(model, labels=labels, objects=(mug,)), folder / "package")
     write_package(model, folder / "bytes.shift", "uint8")
     seeds = [

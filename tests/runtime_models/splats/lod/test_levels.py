@@ -36,7 +36,7 @@ def test_leaves_hold_every_splat_once_and_none_too_many(count):
 
 def test_leaves_are_apart():
     """The two halves at the top do not overlap along the side that was cut: the longest."""
-    means = random_layers(1000).means * np.float32([1, 5, 1])
+    means = random_layers(1000).means * np.array([1, 5, 1], np.float32)
     leaves = cut_leaves(means, 64)
     half = np.isin(leaves.of_splat, flattened(leaves.tree[0]))
     assert means[half, 1].max() <= means[~half, 1].min()

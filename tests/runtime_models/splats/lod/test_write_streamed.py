@@ -102,7 +102,7 @@ def test_progress_is_of_the_time_that_each_piece_takes(coefficients):
 
 
 def test_numbers_of_a_codebook_are_short_and_exact():
-    book = np.float32([-1e30, -0.1, -0.0, 1e-38, 1 / 3, 0.1, 1.0, 16777217, 3.4e38])
+    book = np.array([-1e30, -0.1, -0.0, 1e-38, 1 / 3, 0.1, 1.0, 16777217, 3.4e38], np.float32)
     book = np.concatenate([book, np.random.default_rng(0).normal(size=2000).astype(np.float32)])
     text = json.dumps(shortest(book))
     assert np.float32(json.loads(text)).tobytes() == book.tobytes()

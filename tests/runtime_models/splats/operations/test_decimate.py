@@ -120,8 +120,9 @@ def test_crossed_needles_are_not_cheap():
     """1 to 30,000: float32 knows nothing of their areas, and never says that merging is free."""
     layers = at_places(np.zeros((2, 3)))
     layers = replace(
-        layers, scales=np.float32([[3, 1e-4, 1e-4]] * 2), opacity=np.float32([0.5, 0.5]),
-        wxyz=np.float32([[1, 0, 0, 0], [0.6, 0.2, 0.6, 0.48989795]]),
+        layers, scales=np.array([[3, 1e-4, 1e-4]] * 2, np.float32),
+        opacity=np.array([0.5, 0.5], np.float32),
+        wxyz=np.array([[1, 0, 0, 0], [0.6, 0.2, 0.6, 0.48989795]], np.float32),
     )  # fmt: skip
     mixture = mixture_of(layers)
     (cost,) = pair_costs(mixture[:, :1], mixture[:, 1:])
