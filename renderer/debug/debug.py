@@ -10,9 +10,16 @@ from typing import Protocol
 import numpy as np
 
 from shapeshift.renderer import layout
-from shapeshift.renderer.debug.classify import Points, classify, eye_places, runs
-from shapeshift.renderer.debug.debug_map import birdseye
-from shapeshift.renderer.debug.points import dim, dot_size, paint_points
+from shapeshift.renderer.debug.debug_map import (
+    Points,
+    birdseye,
+    classify,
+    dim,
+    dot_size,
+    eye_places,
+    paint_points,
+    runs,
+)
 from shapeshift.renderer.settings import (
     CULL_REASONS,
     EDGES,

@@ -11,8 +11,12 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "decomposition")]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import AnchorLooks, looks_of  # noqa: E402
-from shapeshift.decomposition.completion.plane import Plane, support_plane  # noqa: E402
+from shapeshift.decomposition.completion.plane import (  # noqa: E402  # noqa: E402
+    AnchorLooks,
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.partition import (  # noqa: E402
     LabelledView,
     gather_evidence,

@@ -29,7 +29,7 @@ from shapeshift.renderer.gl.context import open_context  # noqa: E402
 from shapeshift.renderer.gl.gpu import Gpu, groups_for  # noqa: E402
 from shapeshift.renderer.gl.project import Projector  # noqa: E402
 from shapeshift.renderer.gl.quads import QuadsDrawing  # noqa: E402
-from shapeshift.renderer.gl.sort import Sorter, quantize  # noqa: E402
+from shapeshift.renderer.gl.sort_check import Sorter, quantize  # noqa: E402
 from shapeshift.renderer.gl.splat import Splatter  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.settings import RenderSettings  # noqa: E402

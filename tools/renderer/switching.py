@@ -22,7 +22,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.streaming import fade
+from shapeshift.renderer.streaming import changing
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.files.part_cache import PartCache
 from shapeshift.runtime_models.model import SplatLayers
@@ -43,7 +43,7 @@ COLUMNS = (
     "worst_change",
     "as_finer_comes",
 )
-PARTS = ((), (0.30,), (0.16, 0.50), (0.25, 0.50, 0.75), fade.PARTS)  # of the finer level
+PARTS = ((), (0.30,), (0.16, 0.50), (0.25, 0.50, 0.75), changing.PARTS)  # of the finer level
 
 
 def main() -> None:
@@ -84,7 +84,7 @@ def measure(folder: Path, view: View, budget: int) -> Iterator[dict]:
         stream.converges = False
         shown = [weight_of(renderer, view, leaf) for leaf in leaves]
         for parts in PARTS:
-            fade.PARTS = parts or (0.5,)
+            changing.PARTS = parts or (0.5,)
             changes = {1: [], -1: []}
             for leaf, weight in zip(leaves, shown, strict=True):
                 if weight.sum() > PIXELS / 4:
