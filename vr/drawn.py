@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.card import Card
+from shapeshift.vr.cards import Card
 from shapeshift.vr.frame import SIDES, Hand
 from shapeshift.vr.glove import Capsule, glove
 from shapeshift.vr.locomotion.locomotion import Comfort

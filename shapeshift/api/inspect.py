@@ -18,8 +18,8 @@ from shapeshift.app.inspection.draw_values import (
     depth_picture,
     draw_values,
     measured_scene,
+    value_facing,
 )
-from shapeshift.app.inspection.facing import value_facing
 from shapeshift.app.inspection.measure_outputs import (
     check_reports,
     keep_file,

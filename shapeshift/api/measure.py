@@ -75,7 +75,7 @@ def compare(
 
 def side_of(scene: PathText | OpenedScene):
     """A scene as it stands, or what a path, or a path with @stop or @x, stands for."""
-    from shapeshift.app.commands.compare_sides import SceneSide, split_stop
+    from shapeshift.app.commands.compared import SceneSide, split_stop
     from shapeshift.runtime_models.stop_weights import Control, control_text
 
     at = ""

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.bounds import frame_points
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.lod.average_anchors import average_anchors
 from shapeshift.runtime_models.model import (
@@ -17,7 +16,7 @@ from shapeshift.runtime_models.model import (
     SplatLayers,
     Stop,
 )
-from shapeshift.runtime_models.parts import find_label, name_of, part_of, splat_labels
+from shapeshift.runtime_models.parts import find_label, frame_points, name_of, part_of, splat_labels
 from tests.support.models import make_random_model
 
 WHOLE = make_random_model(anchors=60)

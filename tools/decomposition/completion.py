@@ -24,21 +24,27 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import looks_of  # noqa: E402
 from shapeshift.decomposition.completion.complete import (  # noqa: E402
+    Stamp,
+    apply_stamp,
     complete,
+    find_stamp,
     only_background,
     with_background_copies,
 )
-from shapeshift.decomposition.completion.draw import ModelPictures, over  # noqa: E402
-from shapeshift.decomposition.completion.plane import Plane, support_plane  # noqa: E402
-from shapeshift.decomposition.completion.stamp import Stamp, apply_stamp, find_stamp  # noqa: E402
+from shapeshift.decomposition.completion.plane import (  # noqa: E402
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.completion.verify import (  # noqa: E402
     MARGIN,
     OPEN,
     Cells,
+    ModelPictures,
     PhotoView,
     decibels,
+    over,
     verify,
 )
 from shapeshift.decomposition.partition import (  # noqa: E402

@@ -11,8 +11,12 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "decomposition")]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import AnchorLooks, looks_of  # noqa: E402
-from shapeshift.decomposition.completion.plane import Plane, support_plane  # noqa: E402
+from shapeshift.decomposition.completion.plane import (  # noqa: E402  # noqa: E402
+    AnchorLooks,
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.partition import (  # noqa: E402
     LabelledView,
     gather_evidence,
@@ -146,7 +150,8 @@ def draw_together(device: Device, parts: list[AnchorModel], view: View) -> np.nd
         device.upload(np.concatenate(each).astype(np.float32))
         for each in zip(*columns, strict=True)
     ]
-    projected = project(device, *arrays, Camera(*view.pinhole(), view.size, view.near))
+    camera = Camera(*view.pinhole(), view.size, view.near)
+    projected = project(device, *arrays, camera=camera)
     tiles = bin_tiles(device, projected, view.size)
     return rasterize_rgba(device, projected, tiles, view.size).copy()
 

@@ -23,15 +23,21 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "decomposition")]
 from completion import HELD_OUT, SIZE, VIEWS  # noqa: E402
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import looks_of  # noqa: E402
-from shapeshift.decomposition.completion.plane import Plane, support_plane  # noqa: E402
+from shapeshift.decomposition.assemble import (  # noqa: E402
+    candidates_of,
+    choose_proxy,
+    standing_mesh,
+)
+from shapeshift.decomposition.completion.plane import (  # noqa: E402
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.partition import (  # noqa: E402
     LabelledView,
     gather_evidence,
     partition,
 )
-from shapeshift.decomposition.proxies.choose import candidates_of, choose_proxy  # noqa: E402
-from shapeshift.decomposition.proxies.standing import standing_mesh  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.parts import part_of  # noqa: E402

@@ -21,6 +21,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
+from shapeshift.decomposition.label_photos import prompts_of  # noqa: E402
 from shapeshift.decomposition.label_pictures import LabelPictures  # noqa: E402
 from shapeshift.decomposition.masks.anchor_walk import (  # noqa: E402
     AnchorGraph,
@@ -30,7 +31,6 @@ from shapeshift.decomposition.masks.anchor_walk import (  # noqa: E402
 )
 from shapeshift.decomposition.masks.pixel_walk import PixelWalk  # noqa: E402
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt  # noqa: E402
-from shapeshift.decomposition.masks.view_prompts import prompts_of  # noqa: E402
 from shapeshift.decomposition.propagate import Support, propagate  # noqa: E402
 from shapeshift.decomposition.shown import ShownAnchors  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402

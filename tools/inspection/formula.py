@@ -26,7 +26,7 @@ from shapeshift.app.inspection.draw_values import (  # noqa: E402
 )
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.training.styles.style_views import dome_views  # noqa: E402
+from shapeshift.training.styles.train_stop import dome_views  # noqa: E402
 
 SIZE = (320, 240)
 

@@ -35,7 +35,7 @@ from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.tiles.tiles import TilesDrawing  # noqa: E402
 from shapeshift.runtime_models.evaluate import BATCH, directions  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
-from shapeshift.runtime_models.package.write_onnx import write_onnx  # noqa: E402
+from shapeshift.runtime_models.package.package_files import write_onnx  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.session import open_session  # noqa: E402
 from shapeshift.scene.pose import View, look_at  # noqa: E402

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from shapeshift.renderer.gl.context import open_context  # noqa: E402
 from shapeshift.renderer.gl.gpu import Gpu, groups_for  # noqa: E402
 from shapeshift.renderer.gl.project import Projector  # noqa: E402
 from shapeshift.renderer.gl.quads import QuadsDrawing  # noqa: E402
-from shapeshift.renderer.gl.sort import Sorter, quantize  # noqa: E402
+from shapeshift.renderer.gl.sort_check import Sorter, quantize  # noqa: E402
 from shapeshift.renderer.gl.splat import Splatter  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.settings import RenderSettings  # noqa: E402
@@ -202,7 +202,7 @@ class Passes:
 
         def decode(drawing: QuadsDrawing | TilesDrawing) -> None:
             drawing.decode_geometry(0, 0.4)
-            drawing.decode_color(0, 0.4, eye)
+            cast(Any, drawing).decode_color(0, 0.4, eye)
 
         floor = self.least_ms(networks_alone)
         for drawing in (TilesDrawing(), QuadsDrawing(self.gpu, "onnxruntime", "numpy")):

@@ -17,7 +17,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
-from shapeshift.renderer.colors.two_looks import same_shape  # noqa: E402
+from shapeshift.renderer.colors.decode_colors import same_shape  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402

@@ -5,7 +5,7 @@
 Each scene is drawn whole and with fewer splats from views around it; the rows are the mean PSNR (dB
 of the mean squared error over all views) against the whole one at each stop, and the processor
 seconds that the way took.  "merge" is --max-splats (runtime_models/splats/operations/decimate.py),
-with two other ways to treat an opacity above 1; "prune" is prune_by_importance.py beside it;
+with two other ways to treat an opacity above 1; "prune" is decimate.py beside it;
 "even" draws along the Z-curve with chances by a weight.  Where splat-transform is on the PATH
 (`npm install @playcanvas/splat-transform`), what its --decimate makes of the same file is measured
 too, reading and writing included in its seconds.
@@ -32,13 +32,13 @@ from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.splats.operations import moment_matching  # noqa: E402
-from shapeshift.runtime_models.splats.operations.decimate import decimate  # noqa: E402
-from shapeshift.runtime_models.splats.operations.morton import morton_order  # noqa: E402
-from shapeshift.runtime_models.splats.operations.prune_by_importance import (  # noqa: E402
+from shapeshift.runtime_models.splats.operations.decimate import (  # noqa: E402
+    decimate,
     evenly,
     largest,
     prune_by_importance,
 )
+from shapeshift.runtime_models.splats.operations.merge_pairs import morton_order  # noqa: E402
 from shapeshift.scene.cameras.framing import frame_points, model_points, orbit_path  # noqa: E402
 from shapeshift.scene.metrics import psnr  # noqa: E402
 from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402

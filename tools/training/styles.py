@@ -44,7 +44,7 @@ from shapeshift.training.styles.carried_pictures import (  # noqa: E402
 )
 from shapeshift.training.styles.image_network import ImageNetwork  # noqa: E402
 from shapeshift.training.styles.style_pictures import StyleView  # noqa: E402
-from shapeshift.training.styles.style_views import dome_views, resized_views  # noqa: E402
+from shapeshift.training.styles.train_stop import dome_views, resized_views  # noqa: E402
 
 COLUMNS = (
     "scene,style,cpu_s,bytes,bytes_before,drift_db,warp3_source,warp3,warp3_frames,warp24_source,"

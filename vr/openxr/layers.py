@@ -14,16 +14,16 @@ import numpy as np
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import FAR_M, NEAR_M
-from shapeshift.vr.openxr.gl_depth import NoDepth
-from shapeshift.vr.openxr.hands import posef_of
-from shapeshift.vr.openxr.instance import DEPTH_LAYER, Instance
-from shapeshift.vr.openxr.swapchain import (
+from shapeshift.vr.openxr.graphics import (
     DEPTH_FORMATS,
     DepthSwapchain,
+    NoDepth,
     Swapchain,
     SwapchainFormat,
     choose_format,
 )
+from shapeshift.vr.openxr.hands import posef_of
+from shapeshift.vr.openxr.instance import DEPTH_LAYER, Instance
 from shapeshift.vr.shown import Blit
 
 WriteDepth = Callable[[int, moderngl.Framebuffer], None]  # of an eye: NEAR_M is 0 and FAR_M is 1

@@ -12,8 +12,8 @@ pytest.importorskip("hypothesis")  # of the fuzzer, whose judge of sentences is 
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.point_clouds import read_points
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.scene.captures.read_points import read_points
 from tests.support.hostile.fuzz_mutations import SPECIAL_VALUES, places_of
 from tests.support.hostile.fuzz_run import check_sentence, watched
 from tests.support.scene.captures import CLOUD, whole, write_transforms

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.app.commands.outputs import as_steps
-from shapeshift.app.commands.png16 import write_png16
+from shapeshift.app.commands.outputs import as_steps, write_png16
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.normal_photo import load_normals, refuse_other_axes
 from shapeshift.scene.captures.read_capture import read_capture

@@ -9,7 +9,16 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import LOST, Hand
 from shapeshift.vr.glove import fingertip, glove
-from shapeshift.vr.panel.carried import Carried, carry, left_over
+from shapeshift.vr.panel.carried import (
+    MIDDLE,
+    MOVES,
+    RESTS,
+    SCROLLS,
+    SLIDES,
+    Carried,
+    carry,
+    left_over,
+)
 from shapeshift.vr.panel.plane import (
     ABOVE_M,
     ASIDE,
@@ -21,7 +30,6 @@ from shapeshift.vr.panel.plane import (
     hang,
     ray_place,
 )
-from shapeshift.vr.panel.stick import MIDDLE, MOVES, RESTS, SCROLLS, SLIDES
 from tests.support.vr.vr_hands import HEAD, OPEN, PLANE, a_frame, hand_at, moved
 
 LEFT = hand_at((-0.15, 1.15, -0.45))

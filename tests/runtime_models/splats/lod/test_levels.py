@@ -5,8 +5,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.splats.lod.leaves import Leaves, Tree, cut_leaves
-from shapeshift.runtime_models.splats.lod.levels import count_levels, make_levels
 from shapeshift.runtime_models.splats.operations.merge_pairs import (
     COLOR,
     merging_losses,
@@ -14,6 +12,13 @@ from shapeshift.runtime_models.splats.operations.merge_pairs import (
     pair_costs,
 )
 from shapeshift.runtime_models.splats.operations.moment_matching import merge_groups, shown_area
+from shapeshift.runtime_models.splats.sog.write_streamed import (
+    Leaves,
+    Tree,
+    count_levels,
+    cut_leaves,
+    make_levels,
+)
 from tests.support.splat_scenes import random_layers, shell
 
 

@@ -13,12 +13,12 @@ from scipy.spatial import cKDTree
 from shapeshift.runtime_models.files import memory
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.splats.lod import levels as module_levels
 from shapeshift.runtime_models.splats.operations.decimate import decimate
 from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.sog import sh_palette
 from shapeshift.runtime_models.splats.sog import write_streamed as module
+from shapeshift.runtime_models.splats.sog import write_streamed as module_levels
 from shapeshift.runtime_models.splats.sog.read_streamed import levels, read_level, read_tree
 from shapeshift.runtime_models.splats.sog.sh_palette import LEAST_WEIGHT, make_palette
 from shapeshift.runtime_models.splats.sog.write_sog import (

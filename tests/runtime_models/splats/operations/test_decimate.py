@@ -12,7 +12,11 @@ from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splat_motion import SplatMotion
-from shapeshift.runtime_models.splats.operations.decimate import MERGING, decimate
+from shapeshift.runtime_models.splats.operations.decimate import (
+    MERGING,
+    decimate,
+    prune_by_importance,
+)
 from shapeshift.runtime_models.splats.operations.merge_pairs import (
     AT_ONCE,
     COLOR,
@@ -28,7 +32,6 @@ from shapeshift.runtime_models.splats.operations.merge_pairs import (
     pair_groups,
 )
 from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
-from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.support.renderer.rasterizer_reference import render_reference

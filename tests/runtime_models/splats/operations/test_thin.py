@@ -8,7 +8,7 @@ import pytest
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.layers.read_layers import join_layers
-from shapeshift.runtime_models.splats.operations.prune_by_importance import (
+from shapeshift.runtime_models.splats.operations.decimate import (
     certain_ones,
     evenly,
     largest,
