@@ -344,7 +344,7 @@ def write_stubs() -> None:
     for site in [*VENV.glob("lib/python*/site-packages"), *VENV.glob("Lib/site-packages")][:1]:
         folder, texts = site / "shapeshift-stubs", stub_texts()
         try:
-            for old in sorted(folder.rglob("*.pyi")):
+            for old in sorted(folder.rglob("*.py*")):
                 if old.relative_to(folder).as_posix() not in texts:
                     old.unlink()
             for name, text in texts.items():
@@ -361,7 +361,8 @@ def stub_texts() -> dict[str, str]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     folders = set(project["tool"]["setuptools"]["package-dir"].values()) - {"shapeshift"}
     face = ROOT / "shapeshift" / "__init__.pyi"
-    texts = {face.name: face.read_text(encoding="utf-8")}  # some read no other beside this one
+    # Some read no other face beside this one; all that is typed may lead to what is no stub.
+    texts = {face.name: face.read_text(encoding="utf-8"), "py.typed": ""}
     for path in sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py")):
         name = path.relative_to(ROOT).with_suffix("")
         module = ".".join(name.parts).removesuffix(".__init__")

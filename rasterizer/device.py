@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from shapeshift.rasterizer.program import build
 
@@ -44,7 +45,7 @@ class Device:
     lanes: int = 8  # floats of the widest vectors that it computes with
     most_bytes: int = 0  # of one array, as the driver says; 0: it says nothing
 
-    def empty(self, shape, dtype=np.float32) -> "Array":
+    def empty(self, shape, dtype: DTypeLike = np.float32) -> "Array":
         """A device array with undefined contents."""
         import pyopencl as cl
         from pyopencl.array import Array
@@ -58,7 +59,7 @@ class Device:
                 "--max-splats, or draw it with --drawing quads."
             ) from error
 
-    def zeros(self, shape, dtype=np.float32) -> "Array":
+    def zeros(self, shape, dtype: DTypeLike = np.float32) -> "Array":
         """A device array of zeros."""
         array = self.empty(shape, dtype)
         self.clear(array)

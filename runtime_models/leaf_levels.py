@@ -63,15 +63,18 @@ class LeafSource(Protocol):
     @property
     def problem(self) -> str:
         """One sentence: what could not be read; "" = nothing."""
+        ...
 
     def share_memory(self, taken: int) -> None:
         """So many bytes of what the scene may keep in memory are not decoded parts."""
 
     def at_hand(self) -> np.ndarray:
         """(parts,) bool: what is decoded already."""
+        ...
 
     def broken(self) -> np.ndarray:
         """(parts,) bool: what can never be read."""
+        ...
 
     def load(self, part: int, pace: Throttle = unpaced) -> None:
         """Decodes a part, so that it is at hand; any thread.  pace is called after each piece of
@@ -80,3 +83,4 @@ class LeafSource(Protocol):
 
     def read(self, leaves: np.ndarray, levels: np.ndarray) -> Iterator[LeafSplats]:
         """Leaves (n,) at levels (n,), part by part.  Raises BadFile."""
+        ...

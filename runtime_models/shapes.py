@@ -56,7 +56,7 @@ def column_names(row: np.dtype) -> tuple[str, ...]:
 def column_offset(row: np.dtype, name: str) -> int:
     """Bytes of a record before one of its fields."""
     assert row.fields is not None, "a record has fields"
-    return row.fields[name][1]
+    return row.fields[name][1]  # pyright: ignore[reportArgumentType]  # any str is a key
 
 
 def all_finite(array: np.ndarray) -> bool:

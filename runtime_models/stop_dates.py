@@ -75,14 +75,6 @@ def x_of_date(text: str, stops: Sequence[Stop]) -> float:
     return float(np.interp(when, seconds, xs))
 
 
-def date_at(x: float, stops: Sequence[Stop]) -> datetime | None:
-    """The time at a place of the slider; None where the dated stops do not reach."""
-    seconds, xs = timeline(stops)
-    if len(xs) < 2 or not xs[0] <= x <= xs[-1]:
-        return None
-    return datetime.fromtimestamp(float(np.interp(x, xs, seconds)), UTC)
-
-
 def places_of(dates: Sequence[str]) -> list[float]:
     """x of stops with rising dates, 0 to 1: as their dates are apart, and never nearer than
     LEAST_GAP, which takes from the wider gaps.

@@ -6,7 +6,7 @@ refused (commands, SceneObject and selectors name the value, NaN too); what a ha
 is clamped (sliders, snap, Sweep).  So nothing below ever meets such a value.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -112,7 +112,9 @@ def unease(y: float) -> float:
     return 0.5 - float(np.sin(np.arcsin(1 - 2 * y) / 3))
 
 
-EASES = {  # name -> (part of the way at part t of the time, its inverse)
+Ease = Callable[[float], float]
+# Name -> (part of the way at part t of the time, its inverse).
+EASES: dict[str, tuple[Ease, Ease]] = {
     "smooth": (ease, unease),
     "even": (lambda t: t, lambda y: y),
     "slow start": (lambda t: t * t, lambda y: y**0.5),

@@ -54,8 +54,10 @@ def windowed(image: np.ndarray) -> np.ndarray:
     taps, half = window(), SIDE // 2
     height, width = image.shape[:2]
     padded = np.pad(image, ((half, half), (half, half), (0, 0)))
-    rows = sum(t * padded[i : i + height] for i, t in enumerate(taps))  # (H, W + 10, C)
-    return sum(t * rows[:, i : i + width] for i, t in enumerate(taps))
+    rows = np.asarray(  # (H, W + 10, C)
+        sum(t * padded[i : i + height] for i, t in enumerate(taps))
+    )
+    return np.asarray(sum(t * rows[:, i : i + width] for i, t in enumerate(taps)))
 
 
 def window() -> np.ndarray:

@@ -9,7 +9,7 @@ const RAY_REACH = 0.05;  // tangent of the angle up to which a point can be mean
 
 export class Camera {
     /**
-     * @param {HTMLCanvasElement} canvas @param {{eye: number[], target: number[], fovY: number}} view @param {() => void} onChange
+     * @param {HTMLCanvasElement} canvas @param {import("./entries.js").ViewEntry} view @param {() => void} onChange
      * @param {(e: PointerEvent) => boolean} takes  whether another tool takes a press
      * @param {(place: number[]) => void} onDouble  place on the canvas, 0..1 from upper left
      */

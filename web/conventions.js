@@ -19,3 +19,22 @@ export const LEG_S = 2.5;  // playing, from one stop to the next
 export const REST_S = 0.8;  // playing, at each stop
 export const RESORT_DEGREES = 1.0;  // a view that turns farther is sorted anew
 export const RESORT_PART = 0.01;  // of the scene's radius: so is one that moves farther
+// renderer/shaders/common/direction.glsl
+export const DIRECTION = `
+vec3 direction_from(vec3 eye, vec3 point) {
+    vec3 ray = point - eye;
+    float largest = max(abs(ray.x), max(abs(ray.y), abs(ray.z)));
+    if (!(largest > 0.0)) return vec3(0.0);
+    ray /= largest;  // squares of very short rays would be 0
+    return ray / length(ray);
+}
+`;
+// renderer/shaders/common/light.glsl
+export const LIGHT = `
+float light_along(vec4 low, vec4 high, vec3 d) {
+    vec3 products = 2.2360680 * d * d.yzx, squares = d * d;
+    float zone = 0.6454972 * (2.0 * squares.z - squares.x - squares.y);
+    float rest = 1.1180340 * (squares.x - squares.y);
+    return dot(low, vec4(d, products.x)) + dot(high, vec4(products.yz, zone, rest));
+}
+`;

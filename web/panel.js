@@ -44,7 +44,7 @@ export class Panel {
         return this.chosen ?? objects.reduce((a, b) => (b.model.stops.length > a.model.stops.length ? b : a));
     }
 
-    /** @returns {{name: string, x: Control, picture?: string}[]} */
+    /** @returns {import("./entries.js").StateEntry[]} */
     get stops() { return this.shown.states; }
 
     /** @param {Control} x @param {SceneObject | null} object */

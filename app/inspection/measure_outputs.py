@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from shapeshift.app.document import Document
     from shapeshift.renderer.renderer import Renderer
 
-Laid = list[tuple[str, list[Point]]]  # kind and points of each
 ENDINGS = (".html", ".pdf")
 LEAST_SCALE, MOST_SCALE = 1e-6, 1e6
 

@@ -5,7 +5,7 @@ import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
 
@@ -16,8 +16,15 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
 from shapeshift.runtime_models.web.limits import COLOR_BITS, MOST_SPLATS
-from shapeshift.runtime_models.web.web_model import control_entry, describe_model
-from shapeshift.runtime_models.web.write_container import Container
+from shapeshift.runtime_models.web.web_model import (
+    FORMAT,
+    Container,
+    ControlEntry,
+    ModelEntry,
+    TableEntry,
+    control_entry,
+    describe_model,
+)
 from shapeshift.scene.appearance import plain_color
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document.scene_file import SceneItem, named_stops
@@ -32,6 +39,10 @@ COARSE = 8  # a coarse scene has every so many-th anchor
 BOX = (1.0, 99.0)  # percentiles of an object's points that its bounding box holds
 Progress = Callable[[str, float], None]  # what is done, and how much of it, 0..1
 
+Profile = Literal["any", "quest"]  # what may be left out in a headset: sharpness.js
+Vec3 = tuple[float, float, float]
+Wxyz = tuple[float, float, float, float]
+
 
 @dataclass(frozen=True)
 class PageSettings:
@@ -40,7 +51,107 @@ class PageSettings:
     title: str
     exact: bool = False  # float32 instead of codes
     pictures: bool = True  # of the stops
-    profile: Literal["any", "quest"] = "any"  # what may be left out in a headset: sharpness.js
+    profile: Profile = "any"
+
+
+class ViewEntry(TypedDict):
+    """The first look: world metres; fovY in radians."""
+
+    eye: list[float]
+    target: list[float]
+    fovY: float
+
+
+class StateEntry(TypedDict):
+    """A button of the slider; picture: a data address."""
+
+    name: str
+    x: float
+    picture: NotRequired[str]
+
+
+class PartEntry(TypedDict):
+    """A part of an object with an x of its own; space: whose places are meant."""
+
+    x: ControlEntry
+    space: str
+
+
+class PaintedEntry(PartEntry):
+    """How much of each anchor is in it, 0 to 1."""
+
+    kind: Literal["painted"]
+    weight: TableEntry
+
+
+class ShapeEntry(PartEntry):
+    """What has a surface, and fades out over `border` metres outside it."""
+
+    border: float
+
+
+class HalfSpaceEntry(ShapeEntry):
+    """All behind a plane through a point; the normal has any length."""
+
+    kind: Literal["half"]
+    point: Vec3
+    normal: Vec3
+
+
+class BoxEntry(ShapeEntry):
+    """Half its sides, and how it is turned."""
+
+    kind: Literal["box"]
+    centre: Vec3
+    half: Vec3
+    wxyz: Wxyz
+
+
+class SphereEntry(ShapeEntry):
+    """A ball; metres."""
+
+    kind: Literal["sphere"]
+    centre: Vec3
+    radius: float
+
+
+RegionEntry = PaintedEntry | HalfSpaceEntry | BoxEntry | SphereEntry
+
+
+class ObjectEntry(TypedDict):
+    """model: its number; pose in the world; bounding box and sphere in the object; metres."""
+
+    name: str
+    model: int
+    position: list[float]
+    wxyz: list[float]
+    x: ControlEntry
+    visible: bool
+    centre: list[float]
+    half: list[float]
+    radius: float
+    movable: bool
+    solid: bool
+    restitution: float
+    states: list[StateEntry]
+    regions: list[RegionEntry]
+
+
+class SceneEntry(TypedDict):
+    """The table of contents; metres, m/s^2, display sRGB.  null: nobody knows."""
+
+    format: Literal["shapeshift web 1"]
+    title: str
+    profile: Profile
+    background: list[float]
+    brightest: float | None
+    radius: float
+    view: ViewEntry
+    gravity: float
+    floorY: float | None
+    models: list[ModelEntry]
+    objects: list[ObjectEntry]
+    palettes: dict[str, TableEntry]
 
 
 def page_scene(document: Document, settings: PageSettings, progress: Progress) -> bytes:
@@ -83,7 +194,7 @@ def refuse(document: Document) -> None:
 def described(
     out: Container, document: Document, settings: PageSettings, pictures: dict[float, str],
     every: int,
-) -> dict:  # fmt: skip
+) -> SceneEntry:  # fmt: skip
     """The table of contents."""
     models = list(document.models)
     number = {id(model): i for i, model in enumerate(models)}
@@ -97,6 +208,7 @@ def described(
         for model in models
     ]
     return {
+        "format": FORMAT,
         "title": settings.title,
         "profile": settings.profile,
         "background": [float(c) for c in plain_color(document.background)],
@@ -108,8 +220,10 @@ def described(
         "floorY": document.floor_y,
         "models": entries,
         "objects": [
-            object_entry(obj, items.get(obj.name), number[id(obj.model)], pictures)
-            | {"regions": [region_entry(out, obj, s, every) for s in obj.selectors]}
+            object_entry(
+                obj, items.get(obj.name), number[id(obj.model)], pictures,
+                [region_entry(out, obj, selector, every) for selector in obj.selectors],
+            )
             for obj in document.scene.objects
         ],
         "palettes": palettes_of(out, models),
@@ -132,7 +246,7 @@ def sample(model: Model, every: int) -> Model:
     return model.with_rows(rows)  # type: ignore[union-attr]  # refuse() lets no other kind pass
 
 
-def palettes_of(out: Container, models: list[Model]) -> dict:
+def palettes_of(out: Container, models: list[Model]) -> dict[str, TableEntry]:
     """All of them, where a stop has one: a page can choose."""
     if not any(stop.has_false_colors for m in models for stop in m.stops):
         return {}
@@ -144,12 +258,13 @@ def palettes_of(out: Container, models: list[Model]) -> dict:
 
 
 def object_entry(
-    obj: SceneObject, item: SceneItem | None, model: int, pictures: dict[float, str]
-) -> dict:
+    obj: SceneObject, item: SceneItem | None, model: int, pictures: dict[float, str],
+    regions: list[RegionEntry],
+) -> ObjectEntry:  # fmt: skip
     """One object: where it stands, its x, the stops of its slider, its body."""
     middle, half = bounding_box(obj.model)
     stops = named_stops(item, obj.model) if item else obj.model.stops
-    states = [{"name": stop.name, "x": float(stop.x)} for stop in stops]
+    states: list[StateEntry] = [{"name": stop.name, "x": float(stop.x)} for stop in stops]
     for state in states:
         if not item and state["x"] in pictures:
             state["picture"] = pictures[state["x"]]
@@ -163,23 +278,26 @@ def object_entry(
         "centre": middle.tolist(), "half": half.tolist(), "radius": float(np.linalg.norm(half)),
         "movable": item is not None and touched and not room and not item.static, "solid": touched,
         "restitution": item.restitution if item else 0.0, "states": states,
+        "regions": regions,
     }  # fmt: skip
 
 
-def region_entry(out: Container, obj: SceneObject, selector: Selector, every: int) -> dict:
+def region_entry(out: Container, obj: SceneObject, selector: Selector, every: int) -> RegionEntry:
     """A part of an object with an x of its own; every: of which sample of its anchors."""
-    entry = {"x": control_entry(obj.model, selector.x), "space": selector.space}
+    entry: PartEntry = {"x": control_entry(obj.model, selector.x), "space": selector.space}
     if isinstance(selector, Painted):
         weight = out.add_table("painted weights", selector.weight[::every, None], COLOR_BITS)
         return {**entry, "kind": "painted", "weight": weight}
     assert not isinstance(selector, Lens), "refuse() lets none pass"
-    entry["border"] = selector.border
+    shape: ShapeEntry = {**entry, "border": selector.border}
     if isinstance(selector, HalfSpace):
-        return {**entry, "kind": "half", "point": selector.point, "normal": selector.normal}
+        return {**shape, "kind": "half", "point": selector.point, "normal": selector.normal}
     if isinstance(selector, Box):
-        box = {"centre": selector.centre, "half": selector.half, "wxyz": selector.wxyz}
-        return {**entry, "kind": "box", **box}
-    return {**entry, "kind": "sphere", "centre": selector.centre, "radius": selector.radius}
+        return {
+            **shape, "kind": "box", "centre": selector.centre, "half": selector.half,
+            "wxyz": selector.wxyz,
+        }  # fmt: skip
+    return {**shape, "kind": "sphere", "centre": selector.centre, "radius": selector.radius}
 
 
 def bounding_box(model: Model) -> tuple[np.ndarray, np.ndarray]:

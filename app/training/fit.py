@@ -77,9 +77,9 @@ def run(options: Options) -> int:
     from shapeshift.app.paths import full
     from shapeshift.app.training.run_loop import calibrated
     from shapeshift.app.training.train_options import settings_of
-    from shapeshift.app.training.trials.run_trial import run_trial
     from shapeshift.app.training.trials.run_trials import (
         calibrated_once,
+        run_trial,
         say_of_clock,
     )
     from shapeshift.rasterizer.device import open_device

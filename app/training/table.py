@@ -11,7 +11,7 @@ from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED
-from shapeshift.app.training.table_rows import MEAN, NAMES, TableRow, VggRow, finish, mean_row
+from shapeshift.app.training.table_parts import MEAN, NAMES, TableRow, VggRow, finish, mean_row
 from shapeshift.app.training.train_options import OF_SPLATS, Asked, MachineOptions
 from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.training.baselines.plain_settings import PlainSettings
@@ -193,7 +193,7 @@ def pack_splats(capture: "Capture", out: Path, rows: list[TableRow]) -> "dict[st
     from shapeshift.app.errors import UsageError
     from shapeshift.app.training.train_baselines import TrainedFile
     from shapeshift.runtime_models.splats.formats import read_plain
-    from shapeshift.runtime_models.splats.layers.write_layer_list import (
+    from shapeshift.runtime_models.splats.layers.layer_list import (
         layer_name,
         write_layer_list,
     )

@@ -14,7 +14,6 @@ from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.photo import loaded
 
-BACKGROUND = 0
 MOST_LABEL = 254
 SILENT = 255  # this pixel says nothing
 PNG_MARK = b"\x89PNG\r\n\x1a\n"

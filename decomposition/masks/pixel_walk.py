@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import gaussian_filter, label
 
-from shapeshift.decomposition.masks.random_walk import conjugate_gradients
+from shapeshift.decomposition.masks.anchor_walk import conjugate_gradients
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 
 MOST_SIDE = 256  # pixels of what is walked over: more cost time and gain nothing
@@ -135,6 +135,7 @@ def seeds_of(prompt: Prompt, image: np.ndarray) -> tuple[np.ndarray, np.ndarray,
             seeds[max(y - 1, 0) : max(y + 2, 0), max(x - 1, 0) : max(x + 2, 0)] = value
     inner = seeds == INSIDE
     if prompt.box is not None:
+        left, top, right, bottom = prompt.box
         half = max((right - left) * CORE, 1.0), max((bottom - top) * CORE, 1.0)
         across, down = (
             (columns - (left + right) / 2) / half[0],
@@ -166,7 +167,8 @@ def color_odds(image: np.ndarray, inner: np.ndarray, outer: np.ndarray) -> np.nd
     groups = [cells[..., :3], *(cells[..., c : c + 1] for c in range(3, image.shape[2]))]
     total = np.zeros(image.shape[:2])
     for group in groups:
-        index = np.ravel_multi_index(tuple(np.moveaxis(group, 2, 0)), (BINS,) * group.shape[2])
+        each = tuple(np.moveaxis(group, 2, 0))
+        index = np.asarray(np.ravel_multi_index(each, (BINS,) * group.shape[2]))
         total += np.log(
             shares_of(index, inner, group.shape[2]) / shares_of(index, outer, group.shape[2])
         )

@@ -3,14 +3,12 @@
 The paper's object specifications (OWD section 3.1), docs/objects.md.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from shapeshift.decomposition.masks.label_maps import MOST_LABEL
 from shapeshift.runtime_models.files.json_fields import Fields, is_number, read_json
-from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.document.scene_file import BACKGROUND, HULLS
 from shapeshift.scene.pose import MOST_SIDE
@@ -160,12 +158,6 @@ def is_point(value: object) -> bool:
         and len(value) == 2
         and all(is_number(n) and 0 <= n <= MOST_SIDE for n in value)
     )
-
-
-def write_specs(specs: ObjectSpecs, path: str | Path) -> None:
-    """The inverse of read_specs: whole or not at all; what has its usual value is left out."""
-    out = {"format": FORMAT, "objects": [object_row(spec) for spec in specs.objects]}
-    write_whole(Path(path), (json.dumps(out, indent=1, ensure_ascii=False) + "\n").encode())
 
 
 def object_row(spec: ObjectSpec) -> dict:

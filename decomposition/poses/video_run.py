@@ -22,6 +22,7 @@ def take_frames(name: str, into: str, count: int, hear: Callable[..., None]) -> 
     Gives how many.  Raises Unreadable.
     """
     import av
+    import av.error
 
     video = Path(name)
     try:

@@ -202,6 +202,13 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   }
 }
 
+// For every eight rows of the box of `splat`, whose bounds are `here`.  Both walks of a box take
+// the same operations, or a list would overflow.
+#define EIGHT_ROWS_OF_BOX                                                             \
+  const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * splat, here); \
+  const int rows = here.y >> 16;                                                      \
+  for (int first = 0; first < rows; first += LANES)
+
 // HIDDEN = 1: tiles whose `shown` (bins,) is 0 get empty lists, whatever touches them.
 #ifdef HIDDEN
 #define AND_SHOWN , __global const uchar* shown
@@ -245,10 +252,7 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
         count_row(corner + 3 * tiles_x, here.y >> 24);
       }
     } else if (here.x & BOX) {
-      // Both walks of a box take the same operations, or a list would overflow.
-      const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * splat, here);
-      const int rows = here.y >> 16;
-      for (int first = 0; first < rows; first += LANES) {
+      EIGHT_ROWS_OF_BOX {
         int start[LANES], end[LANES];
         columns_of_eight_rows(&ellipse, first, start, end);
         for (int k = 0; k < min(LANES, rows - first); k++) {
@@ -313,9 +317,7 @@ __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int tot
         VISIT(tile + (bit >> 3) * tiles_x + (bit & 7), 1);
       }
     } else if (here.x & BOX) {
-      const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * splat, here);
-      const int rows = here.y >> 16;
-      for (int first = 0; first < rows; first += LANES) {
+      EIGHT_ROWS_OF_BOX {
         int start[LANES], end[LANES];
         columns_of_eight_rows(&ellipse, first, start, end);
         for (int k = 0; k < min(LANES, rows - first); k++)

@@ -21,12 +21,6 @@
 #define COARSE 1   // samples alone
 #define SEAM 2     // both
 
-// Pixel centres of a block, from its corner: lane k is column k % 4, row k / 4.
-#define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
-                         0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
-#define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
-                         2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
-
 // A kernel's arguments and those of its calls, with and without the heat of value stops.
 #ifdef HEAT
 #define AND_HEAT , __global const float4* heat, __global float2* heat_image
@@ -182,8 +176,8 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
   // Pixel centres of the columns and rows of blocks.
   float16 column_x[SIDE], row_y[SIDE];
   for (int k = 0; k < SIDE; k++) {
-    column_x[k] = LANE_X * (float)step + (float)(x0 + k * SIDE);
-    row_y[k] = LANE_Y * (float)step + (float)(y0 + k * SIDE);
+    column_x[k] = FOUR_BY_FOUR_X * (float)step + (float)(x0 + k * SIDE);
+    row_y[k] = FOUR_BY_FOUR_Y * (float)step + (float)(y0 + k * SIDE);
   }
   // T is the transmittance so far, R G B the sum of c alpha T, of all 16 blocks of the tile.
   float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];

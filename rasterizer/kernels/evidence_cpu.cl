@@ -18,11 +18,10 @@
 
 // alpha T of a splat in a block, and what it leaves of T: as in rasterize of raster_cpu.cl, which
 // says why.
-#define WEIGH(k)                                                                        \
-  const float8 dx = block_x[k] - mx, dy = block_y[k] - my;                              \
-  const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);                     \
-  float8 alpha = fmin(s[OPACITY] * exp2p(power), MAX_ALPHA);                           \
-  const float8 weight = select((float8)(0), alpha, power >= least) * T[k];              \
+#define WEIGH(k)                                                               \
+  POWER_IN(k)                                                                  \
+  float8 alpha = fmin(s[OPACITY] * exp2p(power), MAX_ALPHA);                   \
+  const float8 weight = select((float8)(0), alpha, power >= least) * T[k];     \
   T[k] -= weight;
 
 __kernel void evidence(int width, int height, int tiles_x, __global const int* tile_start,
@@ -53,8 +52,7 @@ __kernel void evidence(int width, int height, int tiles_x, __global const int* t
   int same[BLOCKS];  // the place that all pixels of a block have, or SEVERAL
   int whole = NO;    // the same of the tile
   for (int k = 0; k < BLOCKS; k++) {
-    block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);
-    block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
+    BLOCK_CENTRES(k)
     T[k] = inside(k, x0, y0, width, height);
     int lanes[LANES];
     for (int lane = 0; lane < LANES; lane++) {
@@ -68,10 +66,7 @@ __kernel void evidence(int width, int height, int tiles_x, __global const int* t
     of[k] = vload8(0, lanes);
     whole = k == 0 || whole == same[k] ? same[k] : SEVERAL;
   }
-  Batch batch;
-  uint open = ALL_BLOCKS;
-  int p = tile_start[tile];
-  const int end = tile_start[tile + 1];
+  OPEN_TILE
   while (p < end && open) {
     const int n = fetch(p, end, x0, y0, intersections, record, &batch);
     // Rows lie anywhere in the table: ahead of use, so that their misses overlap.
@@ -80,8 +75,7 @@ __kernel void evidence(int width, int height, int tiles_x, __global const int* t
     for (int j = 0; j < n; j++) {
       const float* s = batch.splats + RECORD * j;
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
-      const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
-      const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[POWER_THRESHOLD];
+      EXPONENTS(s[CONIC_A], s[CONIC_B], s[CONIC_C])
       uint left = open & batch.blocks[j];
       if (!left) continue;
       // Tiles meet in rows of the table: atomics, of integers, which any order leaves equal.

@@ -3,8 +3,7 @@
 // Reads:   as evidence_cpu.cl.
 // Writes:  table (rows, columns), added to.
 // Units:   pixels, row 0 on top; table in 1 / steps pixels; local sums in 1 / FINE pixels.
-#include "common/raster.cl"
-#define PIXELS (TILE * TILE)
+#include "common/raster_pixels.cl"
 #define BATCH 64  // splats in local memory: 7 kB with their sums
 #define SILENT 255
 #define LABELS 16  // of a tile that a pass sums
@@ -23,10 +22,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void evidence(
   // Which labels the tile has, one an item: there are as many labels as pixels in a tile.
   __local uchar there[PIXELS];
   __local int label_of[LABELS], present, open;
-  const int tile = get_group_id(0), l = get_local_id(0);
-  const int px = tile % tiles_x * TILE + l % TILE, py = tile / tiles_x * TILE + l / TILE;
-  const float x = px + 0.5f, y = py + 0.5f;
-  const bool inside = px < width && py < height;
+  PIXEL_OF_ITEM
   const int label = inside ? labels[(size_t)py * width + px] : SILENT;
   const bool says = label < columns && label != SILENT;
   there[l] = 0;
@@ -51,12 +47,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void evidence(
   int p = tile_start[tile];
   const int end = tile_start[tile + 1];
   while (p < end) {
-    // The group goes on as long as one of its pixels does.
-    if (l == 0) open = 0;
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (T >= STOP) open = 1;
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (!open) break;
+    END_WHERE_ALL_ARE_DONE
     const int n = min(BATCH, end - p);
     for (int k = l; k < n * RECORD; k += PIXELS)
       batch[k] = record[(size_t)RECORD * intersections[p + k / RECORD] + k % RECORD];
@@ -66,10 +57,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void evidence(
     // Near to far: the weight alpha T of each splat, as rasterize of raster_gpu.cl blends it.
     for (int j = 0; j < n && T >= STOP; j++) {
       __local const float* s = batch + j * RECORD;
-      const float dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
-      const float q = s[CONIC_A] * dx * dx + 2 * s[CONIC_B] * dx * dy + s[CONIC_C] * dy * dy;
-      if (!(q <= s[POWER_THRESHOLD])) continue;
-      const float weight = fmin(MAX_ALPHA, s[OPACITY] * exp(-0.5f * q)) * T;
+      WEIGHT_OF(s, weight)
       T -= weight;
       if (place != NONE) atomic_add(sums + j * present + place, (uint)rint(weight * FINE));
     }

@@ -2,19 +2,14 @@
 // Reads:   record (N, 12) of project or project_arena.
 // Writes:  number (H, W), which begins as zeros.
 // Units:   pixels, row 0 on top; splats.
-#include "common/record.cl"
+#include "common/box.cl"
 
 __kernel void overdraw(int count, int width, int height, __global const float* record,
                        __global int* number) {
   const int i = get_global_id(0);
   if (i >= count) return;
   __global const float* r = record + (size_t)RECORD * i;
-  if (!(r[EXTENT_X] > 0.0f && r[EXTENT_Y] > 0.0f)) return;
-  // Pixels whose centres lie in the box; clamped as floats, because a box may be as wide as any.
-  const int x0 = (int)clamp(ceil(r[MEAN_X] - r[EXTENT_X] - 0.5f), 0.0f, (float)width);
-  const int x1 = (int)clamp(floor(r[MEAN_X] + r[EXTENT_X] - 0.5f) + 1.0f, 0.0f, (float)width);
-  const int y0 = (int)clamp(ceil(r[MEAN_Y] - r[EXTENT_Y] - 0.5f), 0.0f, (float)height);
-  const int y1 = (int)clamp(floor(r[MEAN_Y] + r[EXTENT_Y] - 0.5f) + 1.0f, 0.0f, (float)height);
+  BOX_OF(r)
   // The very test of raster: no tiles, no early stop, so this counts what each pixel could blend.
   for (int y = y0; y < y1; y++) {
     const float dy = y + 0.5f - r[MEAN_Y];

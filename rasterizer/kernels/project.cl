@@ -8,6 +8,12 @@
 #include "common/record.cl"
 #include "common/ewa.cl"
 
+// The steps of the paper: R, M = W R S, J, Sigma' = (J M)(J M)^T + low pass.
+#define PROJECT_SPLATS(s)              \
+  const floatn4 q = LOAD4(wxyz, 4, 0); \
+  const Splat s =                      \
+      project_splat(LOAD3(means), LOAD3(scales), q.x, q.y, q.z, q.w, camera, low_pass);
+
 __kernel void project(int count, int width, int height, float near, float min_alpha,
                       float low_pass, __constant float* camera, __global const float* means,
                       __global const float* scales, __global const float* wxyz,
@@ -15,10 +21,7 @@ __kernel void project(int count, int width, int height, float near, float min_al
                       __global float* record, __global float* depth) {
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
-  // The steps of the paper: R, M = W R S, J, Sigma' = (J M)(J M)^T + low pass.
-  const floatn4 q = LOAD4(wxyz, 4, 0);
-  const Splat s =
-      project_splat(LOAD3(means), LOAD3(scales), q.x, q.y, q.z, q.w, camera, low_pass);
+  PROJECT_SPLATS(s)
   const floatn alpha = LOAD(opacity, 1, 0);
   const floatn3 rgb = LOAD3(color);
   // alpha(d) = o exp(-power / 2) >= min_alpha  <=>  power <= 2 ln(o / min_alpha), the threshold;
@@ -60,9 +63,7 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
   // Computed again: cheaper than to store it between the passes.
-  const floatn4 q = LOAD4(wxyz, 4, 0);
-  const Splat s =
-      project_splat(LOAD3(means), LOAD3(scales), q.x, q.y, q.z, q.w, camera, low_pass);
+  PROJECT_SPLATS(s)
   const intn seen = LOAD(record, RECORD, EXTENT_X) > 0;
   const floatn none = 0;
   // What of a record and of its gradient is needed, in the order of record.cl.

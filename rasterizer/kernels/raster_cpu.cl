@@ -44,24 +44,18 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
   // Transmittance and colours of all 256 pixels.
   floatp T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
-    block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
-    block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
+    BLOCK_CENTRES(k)
     T[k] = inside(k, x0, y0, width, height);
     R[k] = G[k] = B[k] = 0;
   }
-  Batch batch;
-  uint open = ALL_BLOCKS;
-  int p = tile_start[tile];  // the next intersection, near to far
-  const int end = tile_start[tile + 1];
+  OPEN_TILE
   while (p < end && open) {
     const int n = fetch(p, end, x0, y0, intersections, record, &batch);
     for (int j = 0; j < n; j++) {
       const float* s = batch.splats + RECORD * j;
       // Means from the tile's corner: small numbers, whose differences keep their digits.
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
-      // Exponents of 2: the conic times -log2(e) / 2.
-      const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
-      const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[POWER_THRESHOLD];
+      EXPONENTS(s[CONIC_A], s[CONIC_B], s[CONIC_C])
 #ifdef SURFACE
       const float8 f = vload8(intersections[p + j], surface);
 #endif
@@ -70,9 +64,7 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
       drawn_blocks[p + j] = drawn;
       for (uint left = drawn; left; left &= left - 1) {
         const int k = lowest(left);
-        const floatp dx = block_x[k] - mx, dy = block_y[k] - my;
-        // power here is log2 of exp(-power / 2): largest at the mean, `least` at the threshold.
-        const floatp power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        POWER_IN(k)
         floatp alpha = fmin(s[OPACITY] * exp2p(power), MAX_ALPHA);
         // Not drawn where the power is beyond its threshold (alpha below min alpha).
         alpha = select((floatp)(0), alpha, power >= least);
@@ -147,8 +139,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
   floatp grad_z[BLOCKS];
 #endif
   for (int k = 0; k < BLOCKS; k++) {
-    block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
-    block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
+    BLOCK_CENTRES(k)
     float r[PIXELS], g[PIXELS], b[PIXELS], d[PIXELS];
 #ifdef SHARE
     float e[PIXELS];
@@ -215,8 +206,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       // As in the forward pass, to the bit: the same exponents, so the same decisions.
       const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
-      const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
-      const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[POWER_THRESHOLD];
+      EXPONENTS(A, B, C)
       // Sums over the tile's pixels: of the colour, of the power and of its products with dx and
       // dy, from which the gradients of mean and conic follow at the end.
       floatp sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
@@ -229,8 +219,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES,
       // The same blocks in the same order as in the forward pass, so the same T.
       for (uint left = drawn_blocks[p + j]; left; left &= left - 1) {
         const int k = lowest(left);
-        const floatp dx = block_x[k] - mx, dy = block_y[k] - my;
-        const floatp power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        POWER_IN(k)
         // Before 0.99 holds it, for the gradient below.
         const floatp raw = s[OPACITY] * exp2p(power);
         const floatp alpha = select((floatp)(0), fmin(raw, MAX_ALPHA), power >= least);

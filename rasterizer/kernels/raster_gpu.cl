@@ -5,8 +5,7 @@
 // Writes:  image (3, H, W) and transmittance (H, W), or with RGBA image (H, W, 4); tile_end;
 //          backward the slots (count, 12).
 // Units:   pixels, row 0 on top; display sRGB; transmittance 0..1; depths in metres.
-#include "common/raster.cl"
-#define PIXELS (TILE * TILE)
+#include "common/raster_pixels.cl"
 #define LANES 32  // of the backward pass: splats in flight
 
 #ifdef SURFACE  // as in raster_cpu.cl
@@ -40,22 +39,13 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
 #endif
   __local float batch[PIXELS * RECORD];
   __local int open;
-  const int tile = get_group_id(0), l = get_local_id(0);
-  const int px = tile % tiles_x * TILE + l % TILE, py = tile / tiles_x * TILE + l / TILE;
-  const float x = px + 0.5f, y = py + 0.5f;
-  const bool inside = px < width && py < height;
+  PIXEL_OF_ITEM
   // Outside the image T is 0, so these items only load and wait.
   float T = inside ? 1 : 0, r = 0, g = 0, b = 0;
   int p = tile_start[tile];
   const int end = tile_start[tile + 1];
   while (p < end) {
-    // The group goes on as long as one of its pixels does (3DGS counts them in the same way).
-    // A barrier before and after: nobody reads `open` while it is being reset or set.
-    if (l == 0) open = 0;
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (T >= STOP) open = 1;  // every writer writes the same
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (!open) break;
+    END_WHERE_ALL_ARE_DONE
     const int n = min(PIXELS, end - p);
     // Every item fetches one splat, then all items read all of them.
     if (l < n) {
@@ -72,13 +62,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
     // Near to far: C += c alpha T, T *= 1 - alpha (3DGS, eq. 3; paper eq. 2).
     for (int j = 0; j < n && T >= STOP; j++) {
       __local const float* s = batch + j * RECORD;
-      // d from the mean, and power = d^T Q d with the conic Q.
-      const float dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
-      const float q = s[CONIC_A] * dx * dx + 2 * s[CONIC_B] * dx * dy + s[CONIC_C] * dy * dy;
-      // alpha below min alpha, found without its exponential; NaN is skipped, too.
-      if (!(q <= s[POWER_THRESHOLD])) continue;
-      // The weight alpha T, with alpha = min(0.99, o exp(-power / 2)).
-      const float w = fmin(MAX_ALPHA, s[OPACITY] * exp(-0.5f * q)) * T;
+      WEIGHT_OF(s, w)
       // Sums stay in registers: a pixel is written once, at the end.
       r += w * s[RED];
       g += w * s[GREEN];

@@ -4,7 +4,7 @@
 // Reads:   record (N, 12) of project_arena; order (n,), splats from near to far.
 // Writes:  front (H, W): the place in the order, least where several are; begins as INT_MAX.
 // Units:   pixels, row 0 on top; powers are squared sigmas.
-#include "common/record.cl"
+#include "common/box.cl"
 
 __kernel void splat_edges(int count, int width, int height, float edge_power, float radius,
                           float band, __global const float* record, __global const uint* order,
@@ -12,12 +12,7 @@ __kernel void splat_edges(int count, int width, int height, float edge_power, fl
   const int k = get_global_id(0);
   if (k >= count) return;
   __global const float* r = record + (size_t)RECORD * order[k];
-  if (!(r[EXTENT_X] > 0.0f && r[EXTENT_Y] > 0.0f)) return;
-  // Pixels whose centres lie in the box; clamped as floats, because a box may be as wide as any.
-  const int x0 = (int)clamp(ceil(r[MEAN_X] - r[EXTENT_X] - 0.5f), 0.0f, (float)width);
-  const int x1 = (int)clamp(floor(r[MEAN_X] + r[EXTENT_X] - 0.5f) + 1.0f, 0.0f, (float)width);
-  const int y0 = (int)clamp(ceil(r[MEAN_Y] - r[EXTENT_Y] - 0.5f), 0.0f, (float)height);
-  const int y1 = (int)clamp(floor(r[MEAN_Y] + r[EXTENT_Y] - 0.5f) + 1.0f, 0.0f, (float)height);
+  BOX_OF(r)
   // A faint splat ends before the edge of the others: where its alpha does.
   const float power_edge = fmin(edge_power, r[POWER_THRESHOLD]);
   for (int y = y0; y < y1; y++) {

@@ -10,12 +10,18 @@ from typing import Protocol
 import numpy as np
 
 from shapeshift.renderer import layout
-from shapeshift.renderer.debug.classify import Points, classify, eye_places, runs
-from shapeshift.renderer.debug.debug_map import birdseye
-from shapeshift.renderer.debug.points import dim, dot_size, paint_points
+from shapeshift.renderer.debug.debug_map import (
+    Points,
+    birdseye,
+    classify,
+    dim,
+    dot_size,
+    eye_places,
+    paint_points,
+    runs,
+)
 from shapeshift.renderer.settings import (
     CULL_REASONS,
-    DEBUG_VIEWS,
     EDGES,
     FrameStats,
     RenderSettings,
@@ -57,7 +63,6 @@ DISTANT = np.asarray(
      [0.99, 0.91, 0.14]]
 , np.float32)  # fmt: skip
 LEGEND_STEPS = 5  # rows that stand for a ramp
-DEBUG_NAMES = tuple(name for name in DEBUG_VIEWS if name)
 MOST_LABELS = 24  # rows of a legend
 RECOLORED = ("depth", "object")  # drawn with other colours than the scene's
 
@@ -145,7 +150,8 @@ def debug_image(
     antialiased = tuple(is_antialiased(obj.model) for obj in scene.objects)
     reason, pixel, depth = classify(points, poses, view, settings, antialiased)
     numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
-    facts = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
+    reasons = ("drawn", *CULL_REASONS)
+    facts: dict[str, float] = dict(zip(reasons, map(float, numbers), strict=True))
     colors = np.asarray([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)], np.float32)
     if settings.debug == "birdseye":
         picture, metres = birdseye(points, poses, reason, colors, view, settings)

@@ -7,7 +7,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
-from shapeshift.renderer.gl.window.window_bytes import WindowBytes
+from shapeshift.renderer.gl.window.layered import WindowBytes
 from shapeshift.scene.appearance import Background, Sky, up_of_eye
 from shapeshift.scene.pose import View
 
@@ -23,7 +23,7 @@ class Resolve:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._program = gpu.program("resolve.vert", "resolve.frag")
+        self._program = gpu.program("full.vert", "resolve.frag")
         self._triangle = gpu.ctx.vertex_array(self._program, [])
         self._palette = gpu.ctx.texture((STEPS, 1), 3, dtype="f4")
         self._palette_now: np.ndarray | None = None

@@ -28,7 +28,7 @@ class StereoPairSplatter:
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
         self._program = gpu.program("stereo_pair.vert", "stereo_pair.frag")
-        self._move = gpu.program("resolve.vert", "stereo_pair_crop.frag")
+        self._move = gpu.program("full.vert", "stereo_pair_crop.frag")
         self._triangles = gpu.ctx.vertex_array(self._program, [])
         self._screen = gpu.ctx.vertex_array(self._move, [])
         self.targets: moderngl.Framebuffer | None = None

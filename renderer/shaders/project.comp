@@ -16,13 +16,10 @@
 #define ANTIALIASED 0     // 1: what the low pass makes wider becomes fainter
 #define KEY_RANGE 0       // 1: the least and largest key are wanted
 #define OWN_COLORS 0      // 1: the second view has colours of its own
-#define PAGED 0           // 1: the rows are drawn from pages, each for an object of its own
 #endif
 #include "common/finite.glsl"
 #include "common/record.glsl"
-#if PAGED
 #include "common/pages.glsl"
-#endif
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };

@@ -17,8 +17,7 @@ uniform vec3 up;             // the world's +Y along the axes of the eye
 uniform float unit;          // the display value that 1 in the image stands for
 uniform bool top_first;      // the image's first row is the upper one
 out vec4 shown;
-
-const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);  // Rec. 709, on display values
+#include "common/luminance.glsl"
 
 // By hand: a driver's own filter may keep 8 bits of the place between two entries.
 vec3 palette_color(float luminance) {

@@ -4,12 +4,7 @@
 // Reads:   order, records, counts; with HEAT heat.
 // Writes:  gl_Position, sigmas, color_opacity; with HEAT value_weight.
 // Units:   pixels from lower left; sigmas along the ellipse's own axes.
-#include "common/record.glsl"
-#include "common/triangle.glsl"
-
-layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  // near to far
-layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
-layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
+#include "common/sorted.glsl"
 #if HEAT
 layout(std430, binding = SLOT_HEAT) readonly buffer Heat { vec4 heat[]; };
 flat out vec2 value_weight;   // of a thermal stop: value times weight, weight

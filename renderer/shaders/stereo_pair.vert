@@ -3,12 +3,7 @@
 // Reads:   order, records of both views, counts.
 // Writes:  gl_Position; sigmas in both ellipses, colours, opacities.
 // Units:   pixels of the grid from lower left; sigmas along each ellipse's own axes.
-#include "common/record.glsl"
-#include "common/triangle.glsl"
-
-layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  // near to far
-layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
-layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
+#include "common/sorted.glsl"
 uniform vec2 size;    // pixels of the grid
 uniform vec2 disparity_offsets;  // x in the grid minus x in the left and right picture, pixels
 uniform uint count;   // splats; records of the right view start there

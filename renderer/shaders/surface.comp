@@ -7,12 +7,7 @@
 // Reads:   mean_opacity, covariance; the object's pose, the lens; pages, where rows are of these.
 // Writes:  surfaces, three vec4 a splat.
 // Units:   metres; x right, y up, z forward; slopes in 1/pixel; pixels count from lower left.
-#ifndef PAGED
-#define PAGED 0        // 1: the rows are drawn from pages, each for an object of its own
-#endif
-#if PAGED
 #include "common/pages.glsl"
-#endif
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };

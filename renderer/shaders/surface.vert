@@ -2,12 +2,7 @@
 // Reads:   order, records, counts, surfaces.
 // Writes:  gl_Position, sigmas, opacity, centre, depth and normal.
 // Units:   pixels from lower left; metres.
-#include "common/record.glsl"
-#include "common/triangle.glsl"
-
-layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  // near to far
-layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
-layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
+#include "common/sorted.glsl"
 layout(std430, binding = SLOT_SURFACES) readonly buffer Surfaces { vec4 surfaces[]; };
 uniform vec2 size;   // pixels
 uniform uint first;  // record of splat 0 in this view

@@ -78,13 +78,6 @@ class BlockModel(AnchorModel):
         return BlockModel(**parts, block=np.ascontiguousarray(self.block[rows]), more=self.more)
 
 
-def runs_of(model: AnchorModel) -> tuple[BlockRun, ...]:
-    """The runs of a model in blocks; of another one run, itself."""
-    if isinstance(model, BlockModel):
-        return model.runs
-    return (BlockRun(slice(0, len(model.anchors)), slice(0, model.splat_count), model),)
-
-
 def joined(models: Sequence[AnchorModel], names: Sequence[str]) -> BlockModel:
     """The models as one, in their order.  Raises BadFile where they do not fit together.
 

@@ -20,7 +20,6 @@ from shapeshift.runtime_models.files.memory import Account, Memory
 from shapeshift.runtime_models.files.zip_files import (
     DAMAGED,
     is_zip,
-    member_names,
     opened_zip,
 )
 from shapeshift.runtime_models.model import BadFile
@@ -31,11 +30,6 @@ INDEX_A_BYTE = 256  # bytes of memory: an opcode of one byte may become a dictio
 MOST_DIMENSIONS = 8
 LONGEST = 1 << 31  # of a tensor that holds nothing
 OLD_MAGIC = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."  # torch.save before 1.6
-
-
-def is_torch_archive(path: Path) -> bool:
-    """A zip with an index of tensors, by content."""
-    return any(name == INDEX or name.endswith(f"/{INDEX}") for name in member_names(path))
 
 
 def read_tensors(

@@ -25,10 +25,10 @@ def basis(direction: np.ndarray, count: int) -> np.ndarray:
         xx, yy, zz = x * x, y * y, z * z
         out += [C2[0] * x * y, -C2[1] * y * z, C2[2] * (2 * zz - xx - yy)]
         out += [-C2[3] * x * z, C2[4] * (xx - yy)]
-    if count > 9:
-        out += [-C3[0] * y * (3 * xx - yy), C3[1] * x * y * z, -C3[2] * y * (4 * zz - xx - yy)]
-        out += [C3[3] * z * (2 * zz - 3 * xx - 3 * yy), -C3[2] * x * (4 * zz - xx - yy)]
-        out += [C3[1] / 2 * z * (xx - yy), -C3[0] * x * (xx - 3 * yy)]
+        if count > 9:
+            out += [-C3[0] * y * (3 * xx - yy), C3[1] * x * y * z, -C3[2] * y * (4 * zz - xx - yy)]
+            out += [C3[3] * z * (2 * zz - 3 * xx - 3 * yy), -C3[2] * x * (4 * zz - xx - yy)]
+            out += [C3[1] / 2 * z * (xx - yy), -C3[0] * x * (xx - 3 * yy)]
     return np.stack(out, 1)
 
 

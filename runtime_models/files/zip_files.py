@@ -18,7 +18,6 @@ DAMAGED = (
     NotImplementedError, RuntimeError, ValueError,
 )  # fmt: skip
 KNOWN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # unpacking the others stops at no limit
-ENTRY = 46  # bytes of the directory that an entry has at least
 END, END_MARK = struct.Struct("<4s4H2LH"), b"PK\5\6"
 END_64, END_64_MARK = struct.Struct("<4sQ2H2L4Q"), b"PK\6\6"
 LOCATOR_MARK = b"PK\6\7"  # 20 bytes that say where the record of 64 bits is

@@ -190,7 +190,7 @@ def widened(
 
 def with_hidden_layer(mlp: Mlp) -> Mlp:
     """A network of one layer as one with a hidden layer: v = relu(v) - relu(-v)."""
-    if len(mlp.weights) > 1:
+    if len(mlp.weights) != 1:
         return mlp
     weight, bias = mlp.weights[0], mlp.biases[0]
     both = np.hstack([np.eye(len(bias)), -np.eye(len(bias))]).astype(np.float32)

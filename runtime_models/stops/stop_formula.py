@@ -48,7 +48,7 @@ class Formula:
         pile: list[np.ndarray] = []
         with np.errstate(all="ignore"):
             for step in self.steps:
-                if isinstance(step, float):
+                if not isinstance(step, str):
                     pile.append(np.array(step))
                 elif step[0] == "=":
                     pile.append(np.asarray(values[step[1:]], np.float64))

@@ -1,17 +1,16 @@
-"""Where to stand: robust bounds of splats, the views that show them, the point under a ray."""
+"""Where to stand: robust bounds of splats, and the views that show them."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from shapeshift.runtime_models.bounds import (
+from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.runtime_models.parts import (
     FALLBACK_RADIUS,
-    MIN_OPACITY,
     PERCENTILES,
     frame_points,
     seen_points,
 )
-from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.scene.scene import Scene
@@ -24,8 +23,6 @@ OUTLYING = 1.25  # times the distance for 98 % of the splats: more only floaters
 COMMON = 0.5  # mean length of the cameras' directions: of a full circle 0, of a half one 0.64
 FAR_RADII = 200.0
 NEAR_RADII = 0.01
-RAY_POINTS = 24
-RAY_REACH = 0.05  # tangent of the angle up to which a point can be meant by a ray
 MOMENTS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of what moves in time
 
 
@@ -200,28 +197,3 @@ def default_background(
     if not all(isinstance(c, int | float) and 0 <= c <= 1 for c in found):
         return otherwise
     return three(found)
-
-
-def point_under(
-    means: np.ndarray,
-    opacity: np.ndarray,
-    origin: np.ndarray,
-    direction: np.ndarray,
-) -> np.ndarray | None:
-    """The point (3,) that a ray meets first in a cloud (N, 3), or None where it meets nothing.
-
-    Of the RAY_POINTS nearest to the ray the first ones give the depth: works for sparse and for
-    dense clouds, and a floater or two before the surface do not win.
-    """
-    ray = np.asarray(direction, np.float64)
-    ray = ray / np.linalg.norm(ray)
-    to_point = means - origin  # (N, 3)
-    depth = to_point @ ray  # (N,) metres
-    off = np.linalg.norm(to_point - depth[:, None] * ray, axis=1)
-    ahead = np.flatnonzero((depth > 0) & (off < depth * RAY_REACH) & (opacity > MIN_OPACITY))
-    if not len(ahead):
-        return None
-    if len(ahead) > RAY_POINTS:
-        ahead = ahead[np.argpartition(off[ahead], RAY_POINTS)[:RAY_POINTS]]
-    first = float(np.percentile(depth[ahead], 15, method="lower"))  # between two is on neither
-    return np.asarray(origin) + first * ray

@@ -116,17 +116,6 @@ def at_pixels(values: np.ndarray, photo: Photo, factor: int) -> np.ndarray:
     return values[np.ix_(rows, columns)]
 
 
-def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """(H, W) in another size (width, height): what lies at each new pixel's centre."""
-    if size == depth.shape[::-1]:
-        return depth
-    rows, columns = (
-        np.minimum(((np.arange(new) + 0.5) * old / new).astype(int), old - 1)
-        for new, old in zip(size[::-1], depth.shape, strict=True)
-    )
-    return depth[np.ix_(rows, columns)]
-
-
 def in_millimetres(capture: Capture, entries: Sequence[Mapping]) -> Capture:
     """The capture, with its depth of floats taken for millimetres where nobody states a unit and
     points, or else where the cameras look, lie a thousandth as deep: as nerfstudio has them.

@@ -382,19 +382,3 @@ def shares(
     low, high = counts
     with np.errstate(invalid="ignore", over="ignore"):
         return np.clip(np.nan_to_num((grey - low) / (high - low)), 0, 1).astype(np.float32)
-
-
-def shrink(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """(H, W, C) -> (height, width, C), each new pixel the mean over the area it covers."""
-    rows = area_weights(pixels.shape[0], size[1])
-    columns = area_weights(pixels.shape[1], size[0])
-    return np.stack([rows @ plane @ columns.T for plane in np.moveaxis(pixels, 2, 0)], axis=2)
-
-
-def area_weights(old: int, new: int) -> np.ndarray:
-    """(new, old) float32 rows that add up to 1: how much of each old pixel a new one covers."""
-    edges = np.arange(new + 1) * old / new
-    start, end = edges[:-1, None], edges[1:, None]
-    cell = np.arange(old)
-    covered = np.minimum(end, cell + 1) - np.maximum(start, cell)
-    return (np.maximum(covered, 0) * new / old).astype(np.float32)

@@ -113,7 +113,7 @@ def intrinsics(photo: Photo) -> dict:
 
 
 def write_points(path: Path, capture: Capture) -> None:
-    arrays = {"xyz": np.asarray(capture.points, np.float32)}
+    arrays: dict[str, np.ndarray] = {"xyz": np.asarray(capture.points, np.float32)}
     if capture.point_colors is not None:
         arrays["rgb"] = np.round(np.asarray(capture.point_colors) * 255).astype(np.uint8)
     with whole_file(path) as file:

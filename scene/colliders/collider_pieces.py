@@ -75,7 +75,9 @@ def write_collider(hulls: tuple[np.ndarray, ...], mesh: TriangleMesh, path: Path
         turned = vertices @ HALF_TURN_Y.astype(np.float32)
         part = trimesh.Trimesh(turned, faces, process=False, validate=False)
         scene.add_geometry(part, node_name=name, geom_name=name)
-    write_whole(path, scene.export(file_type="glb", include_normals=False))
+    data = scene.export(file_type="glb", include_normals=False)
+    assert isinstance(data, bytes), "as of every binary format"
+    write_whole(path, data)
 
 
 def hull_faces(points: np.ndarray) -> np.ndarray:

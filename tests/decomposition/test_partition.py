@@ -20,9 +20,9 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.model import BadFile, ObjectLabel, SplatLayers, Stop
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.synthetic.labels import OBJECTS, label_map, labels_of_places
 from shapeshift.training.synthetic.workshop import dome
 from tests.support.models import make_random_model
+from tools.synthetic.labels import OBJECTS, label_map, labels_of_places
 
 NAMES = tuple(ObjectLabel(label, name) for label, name in enumerate(OBJECTS, 1))
 SIZE = (192, 144)

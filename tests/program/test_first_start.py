@@ -227,8 +227,8 @@ def test_every_module_of_the_package_leads_into_the_checkout(stubs):
     modules = {path.relative_to(ROOT).with_suffix(".pyi") for parts in folders
                if parts and (ROOT / parts[0]).is_dir()
                for path in ROOT.joinpath(*parts).glob("*.py")}  # fmt: skip
-    written = {path.relative_to(stubs) for path in stubs.rglob("*.pyi")}
-    assert len(modules) > 400 and written == modules | {Path("__init__.pyi")}
+    written = {path.relative_to(stubs) for path in stubs.rglob("*.*")}
+    assert len(modules) > 400 and written == modules | {Path("__init__.pyi"), Path("py.typed")}
     assert (
         (stubs / "renderer/renderer.pyi")
         .read_text()

@@ -5,7 +5,6 @@ import pytest
 
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.files.blocks import BLOCK, WORTH_A_THREAD, each_block
-from shapeshift.runtime_models.lint.invalid_rows import invalid_rows
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.rotation import covariance
@@ -13,6 +12,7 @@ from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.operations.activate import activate
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import AXES, RawSplats, Reading
+from tests.support.splats.lint_scenes import invalid_rows
 from tests.support.splats.ply_files import some_splats
 
 COUNTS = (1, 256, 257, BLOCK, BLOCK + 1, WORTH_A_THREAD * BLOCK + 1)
@@ -109,7 +109,7 @@ def test_a_row_at_each_end_of_a_block_is_dropped_and_the_rest_stays(tmp_path):
     raw.labels = np.arange(2 * BLOCK + 2, dtype=np.int32)
     plain = judge(raw, Reading(allow_huge=True))
     kept = np.setdiff1d(np.arange(2 * BLOCK + 2), rows)
-    np.testing.assert_array_equal(plain.means, was.means[kept] * np.float32([1, -1, -1]))
+    np.testing.assert_array_equal(plain.means, was.means[kept] * np.array([1, -1, -1], np.float32))
     assert plain.extra["kept"].tolist() == plain.labels.tolist() == kept.tolist()
     (found,) = [f for f in plain.findings if f.done == "dropped"]
     assert found.count == 4 and found.rows == tuple(rows)
@@ -146,7 +146,7 @@ def test_a_real_file_is_the_same_by_the_plain_forms(data):
     from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
 
     raw, plain = read_raw_ply(path, Reading()), read_plain(path)
-    np.testing.assert_array_equal(plain.means, raw.means * np.float32([1, -1, -1]))
+    np.testing.assert_array_equal(plain.means, raw.means * np.array([1, -1, -1], np.float32))
     np.testing.assert_allclose(plain.scales, np.exp(raw.scales.astype(float)), rtol=3e-7)
     np.testing.assert_allclose(
         plain.opacity, 1 / (1 + np.exp(-raw.opacity.astype(float))), rtol=3e-7

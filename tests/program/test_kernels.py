@@ -67,6 +67,38 @@ def test_three_lines_in_ten_carry_a_comment(folder):
     assert commented >= LEAST_SHARE * code, f"{commented} lines of {code}"
 
 
+def said_twice(texts: dict[str, str], lines: int) -> list[str]:
+    """Places where so many lines of code follow each other as they do in an earlier place."""
+    seen, found = {}, []
+    for path, text in texts.items():
+        code = [
+            (number, " ".join(words.split()))
+            for number, line in enumerate(text.splitlines(), 1)
+            if re.search(r"\w", words := line.split("//")[0])
+        ]
+        for i in range(len(code) - lines + 1):
+            window = tuple(line for _, line in code[i : i + lines])
+            here = f"{path}:{code[i][0]}"
+            if seen.setdefault(window, here) != here:
+                found.append(f"{here} ~ {seen[window]}")
+    return found
+
+
+def test_what_is_said_alike_stands_once():
+    """Five lines that stand twice belong in a chunk of common/, which both include."""
+    page = {
+        path.name: "\n".join(path.read_text(encoding="utf-8").split("`")[1::2])
+        for path in sorted((ROOT / "web").rglob("*.js"))
+    }
+    kernels = {path: text for path, text in FILES.items() if path.endswith(".cl")}
+    shaders = {path: text for path, text in FILES.items() if path not in kernels}
+    for texts in (kernels, shaders, page):
+        assert sum("main()" in text or "__kernel" in text for text in texts.values()) >= 6
+        assert not said_twice(texts, 5)
+    text = "int a;\nint b;  // why\n\n}\nint c;\n"
+    assert said_twice({"x": text, "y": f"int d;\n  {text}"}, 3) == ["y:2 ~ x:1"]
+
+
 def test_no_line_is_too_long_and_no_file():
     """100 columns and 400 lines, as in Python; comments of the one kind that is counted right."""
     for path, text in FILES.items():

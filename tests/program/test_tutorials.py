@@ -1,4 +1,5 @@
-"""README and docs/: commands and options that are named exist, links lead to files.
+"""README and docs/: commands and options that are named exist, links lead to files and headings,
+pages are short and begin with what they are for.
 
 The tutorials run whole in tests/slow/test_tutorials_run.py.
 """
@@ -17,12 +18,19 @@ from shapeshift.app.command_line import parse, wants_help
 from shapeshift.app.errors import UsageError
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+DOCS = sorted((ROOT / "docs").rglob("*.md"))
+PAGES = sorted([ROOT / "README.md", *DOCS])
+LINKED = [*PAGES, *(ROOT / name for name in ("CONTRIBUTING.md", "CONVENTIONS.md",
+                                             "examples/README.md"))]  # fmt: skip
+MOST_WORDS, MOST_NEWS = 35_000, 15_000  # of docs/; bytes of CHANGELOG.md
+TOP = 40  # lines in which a page's example has to begin
 TUTORIALS = sorted((ROOT / "docs/tutorials").glob("*.md"))
 SHELL = re.compile(r"^```sh\n(.*?)^```", re.M | re.S)
 INLINE = re.compile(r"`((?:python3 )?launch\.py [^`]+)`")
 USAGE = re.compile(r"\[-|[|]|\.\.\.|\b(COMMAND|SCENE SCENE)\b")  # a form to fill in, no command
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
+ANCHORED = re.compile(r"\]\(([^)#\s]*)#([^)\s]+)\)")
+FENCE = re.compile(r"^```.*?^```", re.M | re.S)
 FOLDERS = (
     "app|assets|docs|examples|rasterizer|renderer|runtime_models|scene|shapeshift|tests|tools|"
 )
@@ -106,6 +114,60 @@ def test_links_and_named_files_are_there(page):
     lost = {link for link in links if not (page.parent / link).exists()}
     lost |= {name for name in NAMED.findall(text) if not (ROOT / name).exists()}
     assert not lost
+
+
+def words_of(text: str) -> int:
+    """As `wc -w` counts, without the bars and rules of tables."""
+    return sum(1 for word in text.split() if re.search(r"\w", word))
+
+
+def anchors_of(page: Path) -> set[str]:
+    """What GitHub makes of its headings."""
+    heads = re.findall(r"^#+ (.+)$", FENCE.sub("", page.read_text("utf-8")), re.M)
+    kept = (re.sub(r"[^\w\- ]", "", re.sub(r"\[(.*?)\]\(.*?\)", r"\1", head)) for head in heads)
+    return {head.lower().replace(" ", "-") for head in kept}
+
+
+@pytest.mark.parametrize("page", LINKED, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_headings_that_are_there(page):
+    """Files are looked at above; here what stands behind #."""
+    lost = set()
+    for path, anchor in ANCHORED.findall(FENCE.sub("", page.read_text("utf-8"))):
+        there = (page.parent / path).resolve() if path else page
+        if "://" not in path and (not there.exists() or anchor not in anchors_of(there)):
+            lost.add(f"{path}#{anchor}")
+    assert not lost
+
+
+def test_docs_are_short():
+    """All pages under docs/, tables and examples with them; rows of docs/bench are .csv."""
+    assert sum(words_of(page.read_text("utf-8")) for page in DOCS) <= MOST_WORDS
+    assert (ROOT / "CHANGELOG.md").stat().st_size <= MOST_NEWS
+
+
+@pytest.mark.parametrize("page", DOCS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_a_page_begins_with_what_it_is_for_and_an_example(page):
+    lines = page.read_text("utf-8").splitlines()
+    assert lines[0].startswith("# ")
+    first = next(line for line in lines[1:] if line)
+    assert len(first.split()) >= 10 and not first.startswith(("|", "```", "#", "- ", "!", "<"))
+    if page.name != "README.md" or page.parent.name != "tutorials":  # a list of five pages
+        assert any(line.startswith("```") for line in lines[:TOP])
+
+
+def test_the_glossary_has_the_public_names():
+    """Types of the library, settings of a frame and of a training; functions are commands'."""
+    from dataclasses import fields
+
+    from shapeshift.training.settings import TrainSettings
+
+    page = FENCE.sub("", (ROOT / "docs/glossary.md").read_text("utf-8"))
+    told = {word for each in re.findall(r"`([^`]+)`", page) for word in re.findall(r"\w+", each)}
+    public = {name for name in ss.__all__ if name[0].isupper()} | {"tile_bounds", "intersections"}
+    public |= {f.name for kind in (ss.RenderSettings, ss.FrameStats, TrainSettings)
+               for f in fields(kind)}  # fmt: skip
+    plain = {"background", "seed", "splats", "sorts"}  # what they say
+    assert public - told - plain == set()
 
 
 def test_every_page_is_in_the_index():

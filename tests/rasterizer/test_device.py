@@ -172,6 +172,22 @@ def test_a_broken_kernel_names_file_and_line(tmp_path):
         device().program(tmp_path / "whole.cl")
 
 
+def test_a_condition_needs_names_that_are_defined(tmp_path):
+    """A compiler takes others for 0, and a slip of the pen leaves out what it should switch on."""
+    part, path = tmp_path / "part.cl", tmp_path / "whole.cl"
+    part.write_text(
+        "#define FEW 3\n#if FEW > 0x2u && GIVEN  /* no NAME */ // nor THIS\n#endif\n"
+        "#ifdef MAYBE\n#elif defined(OTHER) && OTHER > 1 || !defined ELSE\n#endif\n"
+        "#if __has_builtin(__builtin_prefetch)\n#endif\n"
+    )
+    path.write_text('#include "part.cl"\n\n#if FEW == 4\n#elif GIVEM\n#endif\n')
+    with pytest.raises(BuildError, match=r"^whole\.cl:4: #if GIVEM, which nobody has defined$"):
+        read_source(path, ["GIVEN"])
+    assert read_source(path, ["GIVEN", "GIVEM"]) == read_source(path)
+    with pytest.raises(BuildError, match=r"^part\.cl:2: #if GIVEN, which nobody has defined$"):
+        device().program(path, GIVEM=1)
+
+
 def test_a_missing_include_is_named(tmp_path):
     (tmp_path / "whole.cl").write_text('#include "nowhere.cl"\n')
     with pytest.raises(BuildError, match=r"whole\.cl:1: no file for"):

@@ -7,7 +7,7 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import LEAST_ALPHA, Camera, project
 from shapeshift.rasterizer.project_arena import project_arena
 from shapeshift.rasterizer.raster import rasterize, rasterize_rgba, rasterize_rgba_views
-from shapeshift.rasterizer.reference import project_reference, rasterize_reference
+from tests.support.renderer.rasterizer_reference import project_reference, rasterize_reference
 from tests.support.renderer.rasterizer_scenes import (
     arena,
     as_double,

@@ -7,7 +7,8 @@ import pytest
 
 from shapeshift.rasterizer.project import CULL_REASONS, LEAST_ALPHA, Camera, project
 from shapeshift.rasterizer.project_arena import Limits, SortFrames, project_arena
-from shapeshift.rasterizer.reference import project_reference, rotations
+from shapeshift.rasterizer.reference import rotations
+from tests.support.renderer.rasterizer_reference import project_reference
 from tests.support.renderer.rasterizer_scenes import (
     arena,
     as_double,

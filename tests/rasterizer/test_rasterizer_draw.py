@@ -18,7 +18,7 @@ from shapeshift.rasterizer.raster import (
     rasterize_rgba,
     rasterize_rgba_views,
 )
-from shapeshift.rasterizer.reference import project_reference, rasterize_reference
+from tests.support.renderer.rasterizer_reference import project_reference, rasterize_reference
 from tests.support.renderer.rasterizer_scenes import (
     as_double,
     device,

@@ -7,7 +7,7 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.evidence import LARGEST, SILENT, STEPS, Evidence, most_in_a_tile
 from shapeshift.rasterizer.project import project
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
-from shapeshift.rasterizer.reference import (
+from tests.support.renderer.rasterizer_reference import (
     evidence_reference,
     finite_differences,
     project_reference,

@@ -12,8 +12,8 @@ import pytest
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera, project, project_backward
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
-from shapeshift.rasterizer.reference import finite_differences, render_reference
 from shapeshift.rasterizer.surface import rasterize_depth, rasterize_depth_backward, surface
+from tests.support.renderer.rasterizer_reference import finite_differences, render_reference
 from tests.support.renderer.rasterizer_scenes import (
     GROUPS,
     as_double,

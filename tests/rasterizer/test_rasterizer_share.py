@@ -6,7 +6,7 @@ import pytest
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import project
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
-from shapeshift.rasterizer.reference import render_reference
+from tests.support.renderer.rasterizer_reference import render_reference
 from tests.support.renderer.rasterizer_scenes import (
     as_double,
     device,

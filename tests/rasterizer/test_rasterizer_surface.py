@@ -6,7 +6,6 @@ import pytest
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera, project, project_backward
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.rasterizer.surface import (
     rasterize_depth,
     rasterize_depth_backward,
@@ -14,7 +13,7 @@ from shapeshift.rasterizer.surface import (
     surface_arena,
     surface_backward,
 )
-from shapeshift.rasterizer.surface_reference import render_depth_reference
+from tests.support.renderer.rasterizer_reference import finite_differences
 from tests.support.renderer.rasterizer_scenes import (
     GROUPS,
     arena,
@@ -24,6 +23,7 @@ from tests.support.renderer.rasterizer_scenes import (
     random_splats,
     upload,
 )
+from tests.support.renderer.surface_reference import render_depth_reference
 
 FORMS = ("cpu", "gpu")
 BACKGROUND = (0.2, 0.5, 0.9)

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from shapeshift.renderer.reference.reference import project_object, reference_image
+from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene
+from tests.support.renderer.reference_reasons import project_object
 from tests.support.splat_scenes import (
     FIELDS,
     alone,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.splat_edges import BAND_PX, EDGE_POWER, POINT_PX
-from shapeshift.renderer.reference.reference import project_object
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import EDGES, RenderSettings
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer.heat_scenes import VIEW
+from tests.support.renderer.reference_reasons import project_object
 from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import random_layers
 

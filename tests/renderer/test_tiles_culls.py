@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.debug.classify import classify
-from shapeshift.renderer.reference.reference import reference_counts, reference_image
+from shapeshift.renderer.debug.debug_map import classify
+from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.scene.scene import Scene
 from tests.support.renderer.cull_scenes import FRONT, LIMITS, SCENES, THRESHOLDS
+from tests.support.renderer.reference_reasons import reference_counts
 from tests.support.splat_scenes import alone, front_view, psnr_db, stereo_views, two_objects
 
 

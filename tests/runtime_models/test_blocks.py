@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.blocks.block_box import BlockBox, turned
 from shapeshift.runtime_models.blocks.block_model import BlockModel, joined, one_network
 from shapeshift.runtime_models.blocks.read_blocks import (
+    BlockBox,
     BlockList,
     ListedBlock,
     read_block_list,
     read_blocks,
+    turned,
 )
 from shapeshift.runtime_models.blocks.write_blocks import write_blocks
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
@@ -155,7 +156,6 @@ def test_what_stands_on_a_cut_belongs_to_one_block():
     at = np.array([[0.1, 0, 0], [np.nextafter(0.1, 0), 0, 0], [np.nan, 0, 0], [np.inf, 0, 0]])
     assert LEFT.holds(at).tolist() == [False, True, False, False]
     assert RIGHT.holds(at).tolist() == [True, False, False, False]  # the last has no end at all
-    assert not LEFT.overlaps(RIGHT)
     assert LEFT.holds(at, margin=0.01).tolist() == [True, True, False, False]
 
 

@@ -6,8 +6,8 @@ import pytest
 pytest.importorskip("pyopencl")
 
 import shapeshift as ss
-from shapeshift.training.synthetic.labels import LABELS
 from tests.support.decomposition.demo_photos import box_of_object, true_maps, write_demo_capture
+from tools.synthetic.labels import LABELS
 
 LABEL = LABELS["mug"]
 

@@ -9,9 +9,9 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.project_arena import project_arena
 from shapeshift.rasterizer.raster import rasterize_rgba
-from shapeshift.rasterizer.reference import project_reference, rasterize_reference
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.read_scene import read_model
+from tests.support.renderer.rasterizer_reference import project_reference, rasterize_reference
 from tests.support.renderer.rasterizer_scenes import arena, as_double, device, psnr
 
 pytestmark = pytest.mark.slow

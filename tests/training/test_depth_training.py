@@ -9,27 +9,30 @@ from PIL import Image
 
 from shapeshift.app.training.evaluate import print_table
 from shapeshift.rasterizer.device import open_device
-from shapeshift.rasterizer.reference import finite_differences
-from shapeshift.rasterizer.surface_reference import render_depth_reference
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.depth_photo import load_depth
-from shapeshift.training.baselines.plain_reference import decode_plain_reference
 from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.evaluate import evaluate_model, report
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.losses.surface_losses import DepthLoss, DepthTerm
 from shapeshift.training.photos import read
-from shapeshift.training.reference import decode_reference, image_loss_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.supervision.targets import Targets
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.renderer.rasterizer_reference import finite_differences
+from tests.support.renderer.surface_reference import render_depth_reference
 from tests.support.training.depth_photos import depth_error, depth_loss_reference, depth_photo
 from tests.support.training.plain_situations import situation as plain_situation
+from tests.support.training.reference import (
+    decode_plain_reference,
+    decode_reference,
+    image_loss_reference,
+)
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 SHARE = 0.7
@@ -197,7 +200,7 @@ def test_eval_knows_where_the_zeros_of_scene_and_capture_lie(device, balls, zero
     for away in ((0, 0, 0), (1.0, -0.5, 2.0), (-1000.0, 0.0, 1000.0)):
         moved = replace(
             wall,
-            means=(wall.means - np.float32(away)).astype(np.float32),
+            means=(wall.means - np.array(away, np.float32)).astype(np.float32),
             origin=tuple(np.add(zero, away).tolist()),
         )
         found = evaluate_model(device, moved, capture)["RGB"]
@@ -213,7 +216,7 @@ def wall_of(capture: Capture) -> SplatLayers:
     return SplatLayers(
         capture.points,
         np.full((count, 3), 0.01, np.float32),
-        np.tile(np.float32([1, 0, 0, 0]), (count, 1)),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)),
         ones * np.float32(0.99),
         np.zeros((count, 1, 3), np.float32),
         np.arange(count, dtype=np.int32) % 2,

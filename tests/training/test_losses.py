@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.training.evaluation.metrics import psnr, ssim, weighted_mean
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.reference import image_loss_reference
+from tests.support.training.reference import image_loss_reference
 
 
 def photo_and_image(width, height, seed=0):

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.min_scale import SLOPE, MinScale
+from shapeshift.training.losses.splat_losses import SLOPE, MinScale
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.renderer.rasterizer_reference import finite_differences
 from tests.support.training.training_runs import bits, run, run_keeping
 
 RNG = np.random.default_rng

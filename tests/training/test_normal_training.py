@@ -6,26 +6,31 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.raster import RasterFrame
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.rasterizer.surface import DepthFrame
-from shapeshift.rasterizer.surface_reference import render_depth_reference
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.normal_photo import load_normals
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of
-from shapeshift.training.first_anchors import point_sources
+from shapeshift.training.first_anchors import initial
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.losses.normal_loss import NormalLoss, NormalTerm, pairs_of
+from shapeshift.training.losses.surface_losses import (
+    DepthLoss,
+    DepthTerm,
+    NormalLoss,
+    NormalTerm,
+    pairs_of,
+)
 from shapeshift.training.photos import read
-from shapeshift.training.reference import decode_reference, image_loss_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.renderer.rasterizer_reference import finite_differences
+from tests.support.renderer.surface_reference import render_depth_reference
 from tests.support.training.depth_photos import depth_error, depth_loss_reference, depth_photo
+from tests.support.training.reference import decode_reference, image_loss_reference
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 SHARE = 0.7
@@ -154,15 +159,17 @@ def test_edges_creases_and_what_is_not_known_pull_nothing(device):
         ([front] * 4, [np.nan, 0.9, np.nan, 0.9], 3),
     )
     for normals, through, known in cases:
-        frame = RasterFrame(None, device.upload(np.float32([through])), None)
-        drawn = DepthFrame(frame, None, device.upload(np.float32([[1, 2, 3, 4]])))
+        frame = RasterFrame(None, device.upload(np.array([through], np.float32)), None)
+        drawn = DepthFrame(frame, None, device.upload(np.array([[1, 2, 3, 4]], np.float32)))
         target = loss.target(np.array([normals], np.int8), view)
         assert target.known == known
         for grad in loss.compare(drawn, target, 1.0):
             assert not device.download(grad).any()
         assert loss.value() == 0
-    half = RasterFrame(None, device.upload(np.float32([[0.5] * 4])), None)  # exactly half counts
-    drawn = DepthFrame(half, None, device.upload(np.float32([[1, 2, 3, 4]])))
+    half = RasterFrame(
+        None, device.upload(np.array([[0.5] * 4], np.float32)), None
+    )  # exactly half counts
+    drawn = DepthFrame(half, None, device.upload(np.array([[1, 2, 3, 4]], np.float32)))
     target = loss.target(np.array([[front] * 4], np.int8), view)
     assert device.download(loss.compare(drawn, target, 1.0)[0]).all() and loss.value() > 0.1
 
@@ -192,7 +199,7 @@ def test_normal_maps_bring_the_shape_nearer_where_photos_are_few(device, tmp_pat
     this seed, 0.032 against 0.063 with another.  From points two pixels apart, as a run takes them,
     there is less to mend: 0.037 against 0.053.
     """
-    monkeypatch.setattr(point_sources, "one_a_cell", lambda points, edge: points)
+    monkeypatch.setattr(initial, "one_a_cell", lambda points, edge: points)
     balls = with_normals(make_balls(tmp_path / "balls", 64, 3, 3, depth=True), tmp_path)
     mapped = load_normals(balls.photos[0])
     assert mapped[..., 3].mean() > 0.3 and (mapped[..., 2][mapped[..., 3] > 0] > -30).mean() > 0.9

@@ -8,7 +8,7 @@ from shapeshift.runtime_models.model import STOP_KINDS
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View, look_at
-from shapeshift.training.synthetic import balls, one_shape, workshop
+from shapeshift.training.synthetic import balls, workshop
 from shapeshift.training.synthetic.openness import FAR, Clearance
 from shapeshift.training.synthetic.placing import elbow, frame, inside, noise, run_of_pipe, turned
 from shapeshift.training.synthetic.solids import Ball, Cuboid, Cylinder, Disc, Ring, unit
@@ -25,6 +25,7 @@ from shapeshift.training.synthetic.tracer import (
     surface_points,
     trace,
 )
+from tools.synthetic import one_shape
 
 PLAIN = Material()
 SHAPES = {

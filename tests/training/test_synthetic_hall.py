@@ -6,8 +6,8 @@ from PIL import Image
 
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View
-from shapeshift.training.synthetic.hall import hall
 from shapeshift.training.synthetic.tracer import Place, at_edges, blocked, pixel_rays, trace
+from tools.synthetic.hall import hall
 
 FREE = 0.2  # metres round a camera where nothing is
 LEAST_VIEWS = 3  # that show a fault from nearby: two give its place, a third confirms it

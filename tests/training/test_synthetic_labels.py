@@ -6,7 +6,8 @@ import pytest
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.synthetic import workshop
 from shapeshift.training.synthetic.furniture import MOTOR, MUG
-from shapeshift.training.synthetic.labels import (
+from shapeshift.training.synthetic.tracer import photograph, pixel_rays, trace
+from tools.synthetic.labels import (
     LABELS,
     OBJECTS,
     is_opened,
@@ -14,7 +15,6 @@ from shapeshift.training.synthetic.labels import (
     labels_of_places,
     labels_of_solids,
 )
-from shapeshift.training.synthetic.tracer import photograph, pixel_rays, trace
 
 SIZE = (96, 72)
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import tests.support.training.fit_scenes as fit_scenes
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.min_opacity import (
+from shapeshift.training.losses.splat_losses import (
     MIN_OPACITY,
     SHARE,
     UNTIL,
@@ -20,6 +19,7 @@ from shapeshift.training.losses.min_opacity import (
 from shapeshift.training.schedule import LEAST_RATE, WARM_UP_STEPS, LrWarmup
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
+from tests.support.renderer.rasterizer_reference import finite_differences
 from tests.support.training.training_runs import run
 
 # With one base colour for both stops, what each photo shows white draws the colours of both to

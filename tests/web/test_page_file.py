@@ -11,12 +11,11 @@ import pytest
 
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.page.conventions import conventions_text
-from shapeshift.app.page.export_page import export_page
 from shapeshift.app.page.page_file import (
     MODULES,
     START,
     digest,
+    export_page,
     one_file,
     one_script,
     packed,
@@ -27,6 +26,7 @@ from shapeshift.runtime_models.model import BadFile, ScaffoldModel
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
 from tests.support.web.page_scenes import paced_model, plain_splats
+from tools.web.conventions import conventions_text, entries_text
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "web"
@@ -42,6 +42,11 @@ def nothing(*_):
 def test_constants_are_those_of_python():
     text = (WEB / "conventions.js").read_text()
     assert text == conventions_text(), "run python3 tools/web/write_conventions.py"
+
+
+def test_types_are_those_of_python():
+    text = (WEB / "entries.d.ts").read_text()
+    assert text == entries_text(), "run python3 tools/web/write_conventions.py"
 
 
 def test_each_module_comes_after_what_it_imports():

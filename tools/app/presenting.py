@@ -24,6 +24,7 @@ from dataclasses import replace
 from itertools import cycle, repeat
 from pathlib import Path
 from statistics import median
+from typing import Any, cast
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
@@ -34,11 +35,11 @@ import numpy as np  # noqa: E402
 from shapeshift.app.editor.options import Options  # noqa: E402
 from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer  # noqa: E402
 from shapeshift.app.editor.state.editor_state import EditorState  # noqa: E402
-from shapeshift.app.editor.state.files.refine import Refiner  # noqa: E402
 from shapeshift.app.editor.window.overlay.presented import Presented  # noqa: E402
 from shapeshift.app.editor.window.viewer import Viewer  # noqa: E402
 from shapeshift.app.editor.window.window import Window  # noqa: E402
 from shapeshift.app.paths import DEMO  # noqa: E402
+from shapeshift.app.streaming.refine import Refiner  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.settings import FrameStats  # noqa: E402
 
@@ -121,7 +122,7 @@ class Alone:
 
 def measure(viewer: Viewer) -> list[str]:
     window = viewer.window
-    if not window.presented.keeps:
+    if not cast(Any, window.presented).keeps:
         raise SystemExit("GL runs on a GPU here, which keeps no picture.")
     ways = {"each time": way_of_a_gpu(window.presented), "kept": window.presented}
     watch, rows = Watch(window), []

@@ -4,7 +4,7 @@
 
 Prints the tables of docs/scale.md, which a test compares; with --photos and --splats those of
 another capture.  All figures come from rows of docs/bench, from the arrays of a training step
-(training/memory.py) and from limits in the code; what is assumed stands in `Assumed`.
+(tools/app/step_memory.py) and from limits in the code; what is assumed stands in `Assumed`.
 """
 
 import argparse
@@ -20,8 +20,8 @@ sys.path[:0] = [str(ROOT)]
 
 from shapeshift.runtime_models.splats.sog.read_streamed import LARGEST_TREE  # noqa: E402
 from shapeshift.scene.document.read_scene_file import MOST_OBJECTS  # noqa: E402
-from shapeshift.training.memory import StepMemory, step_memory  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
+from tools.app.step_memory import StepMemory, step_memory  # noqa: E402
 
 BENCH = ROOT / "docs" / "bench"
 PLUSH_PIXELS = (989 // 4) * (742 // 4)  # of a photo in step_cost.csv, --downscale 4
@@ -219,7 +219,7 @@ def lines(cases: Sequence[Case], measured: Measured, assumed: Assumed = Assumed(
         f"| a step, an anchor | {measured.anchor_ms * 1e6:.0f} ns of a core (step_cost.csv) |",
         f"| a step, a pixel | {measured.pixel_ms * 1e6:.0f} ns of a core (step_cost.csv) |",
         f"| a step's memory | {measured.step.anchor:,} bytes an anchor, {measured.step.slot} a "
-        f"slot, {measured.step.pixel} a pixel (training/memory.py) |",
+        f"slot, {measured.step.pixel} a pixel (tools/app/step_memory.py) |",
         f"| a package | {measured.anchor_bytes:.1f} bytes an anchor (growth.csv) |",
         f"| a photo, 640x480 | {measured.store_mb:.2f} MB on disk, read in "
         f"{measured.read_ms:.1f} ms (photo_store.csv) |",
@@ -234,12 +234,15 @@ def lines(cases: Sequence[Case], measured: Measured, assumed: Assumed = Assumed(
     for words, name, form, unit in ROWS:
         values = [f"{getattr(each, name):{form}}{unit}" for each in plans]
         told.append(f"| {words} | {' | '.join(values)} |")
-    for case, needed in zip(cases, plans, strict=True):
-        broken = [row for row in limits(case, needed, measured, assumed) if row[0] > 1]
-        told += ["", f"**{case.name}**, what breaks first:" if broken else
-                 f"**{case.name}**: nothing breaks."]  # fmt: skip
-        told += [f"{i}. {times:,.1f} times too much: {what}." for i, (times, what) in
-                 enumerate(broken, 1)]  # fmt: skip
+    broken: dict[str, list[str]] = {}  # what: how often too much, a case
+    for number, (case, needed) in enumerate(zip(cases, plans, strict=True)):
+        for times, what in limits(case, needed, measured, assumed):
+            broken.setdefault(what, ["no"] * len(cases))
+            broken[what][number] = f"{times:,.1f} times" if times > 1 else "no"
+    told += ["", f"| breaks, too much by | {' | '.join(c.name for c in cases)} |"]
+    told.append("|---" * (len(cases) + 1) + "|")
+    told += [f"| {what} | {' | '.join(values)} |" for what, values in broken.items()
+             if set(values) != {"no"}]  # fmt: skip
     return told
 
 

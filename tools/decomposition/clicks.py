@@ -25,13 +25,13 @@ from shapeshift.decomposition.masks.anchor_click import Growth, grow  # noqa: E4
 from shapeshift.decomposition.masks.anchor_walk import make_graph, nodes_of  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
-from shapeshift.training.synthetic.labels import (  # noqa: E402
+from shapeshift.training.synthetic.workshop import dome  # noqa: E402
+from tools.synthetic.labels import (  # noqa: E402
     LABELS,
     OBJECTS,
     label_map,
     labels_of_places,
 )
-from shapeshift.training.synthetic.workshop import dome  # noqa: E402
 
 SIZE, VIEWS, BOXES, CLICKS = (384, 288), 48, 3, 15
 EYE = np.array([[0.0, 0.6, 1.8]])  # metres: where somebody looks from who has no cameras of it

@@ -11,8 +11,12 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "decomposition")]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import AnchorLooks, looks_of  # noqa: E402
-from shapeshift.decomposition.completion.plane import Plane, support_plane  # noqa: E402
+from shapeshift.decomposition.completion.plane import (  # noqa: E402  # noqa: E402
+    AnchorLooks,
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.partition import (  # noqa: E402
     LabelledView,
     gather_evidence,
@@ -28,11 +32,11 @@ from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, ObjectLab
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.rotation import product  # noqa: E402
 from shapeshift.scene.pose import Pose, View, look_at, perspective  # noqa: E402
-from shapeshift.training.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 from shapeshift.training.synthetic.openness import Clearance  # noqa: E402
 from shapeshift.training.synthetic.placing import frame, inside, turned  # noqa: E402
 from shapeshift.training.synthetic.tracer import Place, look, photograph, shade  # noqa: E402
 from shapeshift.training.synthetic.workshop import GOLDEN, GREY, LIGHT, dome, things  # noqa: E402
+from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 
 VIEWS, SIZE = 24, (384, 288)  # that label
 BELOW, BELOW_SIZE = 8, (256, 192)  # that judge
@@ -70,7 +74,9 @@ def cut_objects(device: Device, names: list[str]) -> Iterator[Cut]:
     model = read_model(DEMO)
     pictures = [LabelledView(view, 0.0, label_map(view)) for view in dome(VIEWS, 0.0, SIZE)]
     sums = gather_evidence(device, model, pictures, len(LABELS))
+    assert isinstance(model, AnchorModel)
     model = partition(model, sums, tuple(ObjectLabel(LABELS[n], n) for n in OBJECTS))
+    assert isinstance(model, AnchorModel) and model.labels is not None
     looks = looks_of(model)
     for name in names:
         label = LABELS[name]
@@ -144,7 +150,8 @@ def draw_together(device: Device, parts: list[AnchorModel], view: View) -> np.nd
         device.upload(np.concatenate(each).astype(np.float32))
         for each in zip(*columns, strict=True)
     ]
-    projected = project(device, *arrays, Camera(*view.pinhole(), view.size, view.near))
+    camera = Camera(*view.pinhole(), view.size, view.near)
+    projected = project(device, *arrays, camera=camera)
     tiles = bin_tiles(device, projected, view.size)
     return rasterize_rgba(device, projected, tiles, view.size).copy()
 

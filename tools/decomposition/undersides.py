@@ -44,8 +44,11 @@ from second_capture import (  # noqa: E402
     second_capture,
 )
 
-from shapeshift.decomposition.completion.draw import over  # noqa: E402
-from shapeshift.decomposition.completion.verify import OPEN, decibels  # noqa: E402
+from shapeshift.decomposition.completion.verify import (  # noqa: E402
+    OPEN,
+    decibels,
+    over,
+)
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.scene.pose import Pose  # noqa: E402
@@ -183,8 +186,9 @@ def rows_of(device: Device, asked: argparse.Namespace, folder: Path) -> Iterator
             word = verdict_of(before, after, agreeing)
             yield row(way, f"{agreeing:.2f}", counts, after, ["", ""], seconds, word)
             begun = time.process_time()
-        second = second_capture(device, cut, folder, asked.seconds, asked.held)
-        for way, iou, parts, *counts, off in by_second_capture(device, cut, *second, asked.held):
+        model, photos = second_capture(device, cut, folder, asked.seconds, asked.held)
+        merged = by_second_capture(device, cut, model, photos, asked.held)
+        for way, iou, parts, *counts, off in merged:
             seconds = time.process_time() - begun
             after, shown = score(device, parts, truth)
             sheet.append(shown)

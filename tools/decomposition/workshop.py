@@ -37,8 +37,8 @@ from shapeshift.rasterizer.raster import rasterize_rgba  # noqa: E402
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.training.synthetic.labels import OBJECTS, label_map, labels_of_places  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome  # noqa: E402
+from tools.synthetic.labels import OBJECTS, label_map, labels_of_places  # noqa: E402
 
 SIZE = (384, 288)
 NAMES = tuple(ObjectLabel(label, name) for label, name in enumerate(OBJECTS, 1))
@@ -80,6 +80,7 @@ def quality_rows(device: Device, model: AnchorModel) -> list[str]:
     for name, views in given.items():
         sums = gather_evidence(device, model, views, COUNT)
         cut = partition(model, sums, NAMES)
+        assert isinstance(cut, AnchorModel)
         for x in tests:
             rows.append(f"{name},{x},anchors at .4,{quality(device, cut, tests[x])}")
             sys.stdout.write(rows[-1] + "\n")
@@ -105,7 +106,7 @@ def speed_rows(device: Device, model: AnchorModel) -> list[str]:
         shown = []
         for v in views:
             camera = Camera(*v.view.pinhole(), SIZE, v.view.near, v.view.widest_tangents())
-            projected = project(device, *splats, camera)
+            projected = project(device, *splats, camera=camera)
             shown.append((projected, bin_tiles(device, projected, SIZE)))
         return shown
 
@@ -113,11 +114,11 @@ def speed_rows(device: Device, model: AnchorModel) -> list[str]:
 
     def weigh() -> None:
         for pair, labels in zip(shown, sixteen, strict=True):
-            evidence.add(*pair, labels)
+            evidence.add(pair[0], pair[1], labels)
 
     def draw() -> None:
         for pair in shown:
-            rasterize_rgba(device, *pair, SIZE)
+            rasterize_rgba(device, pair[0], pair[1], SIZE)
 
     found = {}
     for name, work in (("lists", lists), ("evidence", weigh), ("draw", draw)):
@@ -141,6 +142,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     device, model = open_device("cpu"), read_model(DEMO)
+    assert isinstance(model, AnchorModel)
     rows = quality_rows(device, model)
     speed = speed_rows(device, model)
     head = [

@@ -2,7 +2,7 @@
 
     python3 tools/inspection/hall.py WORK --seconds 1200 --out docs/bench/hall.csv
 
-WORK gets the capture that training/synthetic/hall ray-traces, and the package; what is there
+WORK gets the capture that tools/synthetic/hall ray-traces, and the package; what is there
 already is used as it is.  Rows: PSNR a modality on held-out photos (mean, median, worst), the
 package's megabytes; a fault's degrees as the scene reads them in a view that no photo was taken
 from, the hottest within REACH metres of the fault, beside the tracer's own.
@@ -23,7 +23,8 @@ import shapeshift as ss  # noqa: E402
 from shapeshift.app.charts.chart_rows import write_text  # noqa: E402
 from shapeshift.scene.cameras.camera_list import moved  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
-from shapeshift.training.synthetic.hall.hall import (  # noqa: E402
+from shapeshift.training.synthetic.tracer import pixel_rays, trace  # noqa: E402
+from tools.synthetic.hall.hall import (  # noqa: E402
     Fault,
     degrees,
     faults,
@@ -31,7 +32,6 @@ from shapeshift.training.synthetic.hall.hall import (  # noqa: E402
     photo_views,
     place,
 )
-from shapeshift.training.synthetic.tracer import pixel_rays, trace  # noqa: E402
 
 REACH = 0.35  # metres
 OTHER_POSES = 150  # of a walk that meets none of the photos' poses

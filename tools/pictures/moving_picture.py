@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -73,7 +74,8 @@ def touch_frames(renderer: ss.Renderer) -> Iterator[Image.Image]:
     acts = read_script(script, items)
     view = replace(
         scene.views("front", 1, SIZE)[0],
-        world_from_eye=ss.look_at(EYE, TARGET), tangents=ss.perspective(FOV_Y, SIZE),
+        world_from_eye=ss.look_at(np.array(EYE), np.array(TARGET)),
+        tangents=ss.perspective(FOV_Y, SIZE),
     )  # fmt: skip
     states = {state.name: state.x for item in items if item.name == THROWN for state in item.states}
     times = [TOUCH_FROM_S + i / PER_SECOND for i in range(TOUCH_FRAMES)]
@@ -84,7 +86,7 @@ def touch_frames(renderer: ss.Renderer) -> Iterator[Image.Image]:
         picture = to_image(renderer.render(step.scene, view))
         draw_hand(picture, view, acts, step.seconds)
         (x,) = (each.x for each in step.scene.objects if each.name == THROWN)
-        draw_slider(picture, states, float(x))
+        draw_slider(picture, states, float(cast(Any, x)))
         yield picture
 
 
@@ -99,11 +101,11 @@ def turned(view: ss.View, centre: np.ndarray, angle: float) -> ss.View:
 
 def to_image(picture: np.ndarray) -> Image.Image:
     """(H, W, 3) display sRGB as 8 bits, with room for the slider below."""
-    whole = np.concatenate([picture, np.tile(np.float32(BACKGROUND), (BAND, SIZE[0], 1))])
+    whole = np.concatenate([picture, np.tile(np.array(BACKGROUND, np.float32), (BAND, SIZE[0], 1))])
     return Image.fromarray((np.clip(whole, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
-def draw_slider(picture: Image.Image, stops: dict[str, float], x: float) -> None:
+def draw_slider(picture: Image.Image, stops: dict[str, Any], x: float) -> None:
     """The track with the names of the stops, the nearest one bright, and the knob at x."""
     draw, font = ImageDraw.Draw(picture), ImageFont.load_default(13)
     left, right, y = 70, SIZE[0] - 70, SIZE[1] + BAND - 11

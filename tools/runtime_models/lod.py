@@ -44,11 +44,12 @@ FAR = 3  # times the distance
 def orbits(model: SplatLayers) -> list[list]:
     """Views from the usual distance and from FAR times as far."""
     target, radius, *rest = frame_points(*model_points(model))
-    return [orbit_path(VIEWS, target, radius * far, *rest, SIZE) for far in (1, FAR)]
+    return [orbit_path(VIEWS, target, radius * far, *rest, size=SIZE) for far in (1, FAR)]
 
 
 def measure(path: Path, renderer) -> list[str]:
     model = read_model(path)
+    assert isinstance(model, SplatLayers)
     own = round(model.sh.shape[1] ** 0.5) - 1
     return [row for degree in sorted({0, own}) for row in rows_of(path, model, degree, renderer)]
 

@@ -60,6 +60,7 @@ def made(source: Path, folder: Path, count: int) -> Path:
             "file_path": file.name, "transform_matrix": pose.tolist(), "fl_x": fx * x,
             "fl_y": fy * y, "cx": cx * x, "cy": cy * y, "w": SIZE[0], "h": SIZE[1],
         })  # fmt: skip
+    assert capture.points is not None
     np.savez(folder / "points.npz", xyz=capture.points)
     about = {"frames": frames, "up": [0, 1, 0], "points": "points.npz"}
     (folder / "transforms.json").write_text(json.dumps(about))
@@ -102,7 +103,7 @@ def measure(folder: Path, megabytes: int) -> dict:
 def in_turns(folder: Path) -> list[dict]:
     """All in memory, and from the store, whose window holds a tenth, after it was filled."""
     megabytes = FEW * SIZE[0] * SIZE[1] * 4 // 10 / 1e6
-    ways = [trainer_of(folder, ALL, TURNS), trainer_of(folder, megabytes, TURNS)]
+    ways = [trainer_of(folder, ALL, TURNS), trainer_of(folder, megabytes, TURNS)]  # pyright: ignore[reportArgumentType]
     store = ways[1].photos.store
     for number in range(FEW):
         store.get(number)
@@ -154,7 +155,7 @@ def main() -> None:
         words = [Path(w).name if Path(w) == options.capture else w for w in sys.argv[1:]]
         file.write(f"# python3 tools/scene/photo_store.py {shlex.join(words)}\n# {processor()}, ")
         file.write(f"{os.cpu_count()} cores\n")
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        table: csv.DictWriter[str] = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         for count, sizes in ((FEW, (0, ALL, WINDOW // 10)), (options.photos, (WINDOW, ALL))):
             with tempfile.TemporaryDirectory() as place:

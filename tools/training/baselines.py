@@ -16,6 +16,7 @@ import sys
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
+from typing import Any, cast
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
@@ -24,7 +25,7 @@ from ways import add_cluster, write_rows  # noqa: E402
 
 from shapeshift.app.charts.chart_rows import RowsFile  # noqa: E402
 from shapeshift.app.training.table import Options, run  # noqa: E402
-from shapeshift.app.training.table_rows import TableRow, VggRow  # noqa: E402
+from shapeshift.app.training.table_parts import TableRow, VggRow  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
 
@@ -57,7 +58,7 @@ def main() -> int:
             asked_of, of_splats = caps(size, asked)
             asked_of |= {"seed": seed} if seed else {}
             options = Options(
-                folder, out, asked_of, seconds=seconds, methods=methods, vgg=asked.vgg,
+                folder, out, asked_of, seconds=seconds, methods=cast(Any, methods), vgg=asked.vgg,
                 splats=of_splats, cluster=asked.cluster, certificates=asked.certificates,
                 gpus=asked.gpus,
             )  # fmt: skip
@@ -107,7 +108,7 @@ def made(name: str, work: Path) -> Path:
 
             make_balls(folder)
         elif name == "one_shape":
-            from shapeshift.training.synthetic.one_shape import make_one_shape
+            from tools.synthetic.one_shape import make_one_shape
 
             make_one_shape(folder)
         else:

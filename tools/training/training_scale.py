@@ -6,8 +6,8 @@
 Anchors lie on a ball's surface in front of the camera, networks are fresh, photos are noise: the
 arithmetic and the memory of a real scene of that size, without its data.  slots: pairs of a splat
 and a tile of its box, listed: those whose ellipse touches the tile.  pool_mb: what the device's
-pool holds after the last step; said_mb: what training/memory.py says of it.  cpu_ms: processor time
-of all threads, mean of the steps but the first; the passes are wall time.
+pool holds after the last step; said_mb: what tools/app/step_memory.py says of it.  cpu_ms:
+processor time of all threads, mean of the steps but the first; the passes are wall time.
 """
 
 import argparse
@@ -23,12 +23,12 @@ sys.path.insert(0, str(ROOT))
 
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.scene.pose import View, look_at, perspective  # noqa: E402
-from shapeshift.training.density.densification_stats import DensificationStats  # noqa: E402
+from shapeshift.training.density.densify import DensificationStats  # noqa: E402
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded  # noqa: E402
 from shapeshift.training.heads.optimizer import Adam  # noqa: E402
 from shapeshift.training.losses.losses import ImageLoss  # noqa: E402
-from shapeshift.training.memory import step_memory  # noqa: E402
 from shapeshift.training.step import TrainingStep  # noqa: E402
+from tools.app.step_memory import step_memory  # noqa: E402
 
 PASSES = (
     "heads", "activate", "project", "bin", "rasterize", "loss", "rasterize backward",
@@ -65,7 +65,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
         "weights": initial_weights(layout, rng),
         "anchors": ball(anchors, rng),
         "features": features.astype(np.float32),
-        "frames": np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (anchors, 1)),
+        "frames": np.tile(np.array([0, 0, 0, 1, 0, 0, 0], np.float32), (anchors, 1)),
         "colors": np.zeros((anchors, 3), np.float32),
     }
     adam = Adam(device, values, {name: np.full(1, 1e-3, np.float32) for name in values})

@@ -11,13 +11,14 @@ import time
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
+from typing import Any, cast
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.headset.headset import DEMO, Options
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.panel_picture import PanelPicture
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.renderer.gl.context import open_context
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import FROM, LEFT, Wearer, a_state
@@ -51,7 +52,7 @@ def row(ctx, wearer: Wearer, case: str, hand) -> str:
 
         begun(measured, *given)
 
-    picture.draw = timed
+    cast(Any, picture).draw = timed
     for _ in range(FRAMES):
         ctx.finish()
         start = time.process_time()

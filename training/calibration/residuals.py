@@ -47,7 +47,9 @@ class ShapeResiduals:
         self.gray = np.zeros((self.count, SIDES))  # see `basis`
         self.gray[:, 0] = FIRST_GRAY
         self.means = device.download(shape[0]).astype(np.float64)
-        self.wanted = [p.over((behind,) * 3).mean(axis=2, dtype=np.float32) for p in photos]
+        self.wanted = [
+            p.over((behind, behind, behind)).mean(axis=2, dtype=np.float32) for p in photos
+        ]
         self.weights = [np.float32(1) if p.weight is None else p.weight for p in photos]
         self.values = sum(
             float(np.broadcast_to(weight, wanted.shape).sum(dtype=np.float64))
@@ -106,7 +108,7 @@ class ShapeResiduals:
             bright = (basis * gray).sum(axis=1, keepdims=True).astype(np.float32)
             color = device.upload(bright.repeat(3, axis=1))
             projected = self.projected(view, color)
-            frame = rasterize(device, projected, tiles, view.size, (behind,) * 3)
+            frame = rasterize(device, projected, tiles, view.size, (behind, behind, behind))
             grad = np.zeros(frame.image.shape, np.float32)
             grad[0] = answer(i, device.view(frame.image)[0])
             record = rasterize_backward(

@@ -128,7 +128,7 @@ def triangulate(pycolmap: Any, job: Any, model: Any, graph: Any) -> np.ndarray:
 def seen_enough(point: Any, least: np.ndarray) -> bool:
     """Whether so many photos show a point as it takes in its modality."""
     photos = {element.image_id - IMAGE for element in point.track.elements}
-    return len(photos) >= least[next(iter(photos))]
+    return bool(len(photos) >= least[next(iter(photos))])
 
 
 def main(given: str, wanted: str) -> None:

@@ -100,10 +100,7 @@ inline void second_layer(const Rows *k, int m, int c, int pair, __global const f
 }
 
 // One work-item ROWS anchors: every weight row is loaded once for them.
-__kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float eye_z,
-                            __global const float *weights, __global const float *bias,
-                            __global const float *anchors, __global const float *features,
-                            __global float *hidden, __global float *raw) {
+__kernel void heads_forward(HEADS_FORWARD_TAKES) {
   int first_anchor = get_global_id(0) * ROWS;
   if (!(first_anchor < anchors_count)) return;
   float3 eye = (float3)(eye_x, eye_y, eye_z);

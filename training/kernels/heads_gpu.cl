@@ -12,10 +12,7 @@
 #define SIDE 16
 
 // One work-item a head of an anchor: F of (f, delta, Psi), paper eq. 5.
-__kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float eye_z,
-                            __global const float *weights, __global const float *bias,
-                            __global const float *anchors, __global const float *features,
-                            __global float *hidden, __global float *raw) {
+__kernel void heads_forward(HEADS_FORWARD_TAKES) {
   const int m = get_global_id(0) / anchors_count, a = get_global_id(0) % anchors_count;
   if (!(m < 5)) return;
   __global const float *layer = weights + WEIGHTS_AT[m];

@@ -24,6 +24,11 @@
 #define COLOR 4
 #define LAST_AT ((INPUTS + 1) * HIDDEN)  // W2 in a head's weights
 #define UNITS_OF(a, m) (((long)(a) * 5 + (m)) * HIDDEN)  // in `hidden`
+// The arguments of both forms of heads_forward, in this order.
+#define HEADS_FORWARD_TAKES                                                                  \
+  int anchors_count, float eye_x, float eye_y, float eye_z, __global const float *weights,   \
+      __global const float *bias, __global const float *anchors,                             \
+      __global const float *features, __global float *hidden, __global float *raw
 
 __constant int OUT[5] = {OUT0, OUT1, OUT2, OUT3, OUT4};
 __constant int OUT_AT[5] = {OUT_AT0, OUT_AT1, OUT_AT2, OUT_AT3, OUT_AT4};

@@ -188,11 +188,7 @@ __kernel void derivative_rows(int width, int height, int stride,
 
 // Then along columns, joined with L1: the gradient of the whole image loss, and |a - b| a row.
 // scale is 1 over the number of values that count (three times the sum of the weights).
-__kernel void gradient_columns(int width, int height, int stride, int masked, float ssim_share,
-                               float scale, __global const float *blurred,
-                               __global const float *image, __global const float *target,
-                               __global const float *weight, __global float *grad_image,
-                               __global float *l1_rows) {
+__kernel void gradient_columns(GRADIENT_COLUMNS_TAKES, __global float *l1_rows) {
   int row = get_global_id(0), channel = row / height, y = row % height;
   int plane = channel * height * stride, map = 3 * height * stride;
   float l1 = 0;

@@ -123,11 +123,7 @@ __kernel void derivative_rows(int width, int height, int stride,
     blurred[at + m * map] = along_row(derivative + m * map + row * stride, x, width);
 }
 
-__kernel void gradient_columns(int width, int height, int stride, int masked, float ssim_share,
-                               float scale, __global const float *blurred,
-                               __global const float *image, __global const float *target,
-                               __global const float *weight, __global float *grad_image,
-                               __global float *difference_map) {
+__kernel void gradient_columns(GRADIENT_COLUMNS_TAKES, __global float *difference_map) {
   PIXEL
   // The chain rule ends: mean a, mean a^2 and mean a b depend on a by 1, 2 a and b.
   const float by_mean = along_column(blurred + first, x, y, height, stride);

@@ -95,4 +95,4 @@ def rim_of(rgb: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
 
 def near(rgb: np.ndarray, color: np.ndarray) -> np.ndarray:
     """(...) bool which of 8-bit colours (..., 3) are this one but for noise and uneven light."""
-    return (np.abs(rgb.astype(np.int16) - color) <= 255 * BACKDROP).all(axis=-1)
+    return np.asarray((np.abs(rgb.astype(np.int16) - color) <= 255 * BACKDROP).all(axis=-1))

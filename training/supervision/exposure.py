@@ -94,7 +94,7 @@ class Exposures:
         None while they are too few, or the model shows too little of its photos.
         """
         logs, like = (of[self.rows[modality]] for of in (self.log_gain, self.correlation))
-        seen = np.isfinite(logs).all(axis=1)
+        seen = np.asarray(np.isfinite(logs).all(axis=1))
         enough = seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE
         return logs[seen] if enough else None
 

@@ -55,7 +55,8 @@ def bar(start: Place3, end: Place3, radius: float, surface: Material, **more: An
     side = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
     side /= np.linalg.norm(side)
     keep = more.pop("keep", None)
-    shape = Cylinder(radius, length / 2, **({"bevel": 0.002} | more))
+    settings: dict[str, Any] = {"bevel": 0.002} | more
+    shape = Cylinder(radius, length / 2, **settings)
     rotation = np.stack([side, up, np.cross(side, up)], axis=1)
     return Solid(shape, surface, frame((first + last) / 2, rotation), keep)
 

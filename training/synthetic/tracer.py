@@ -190,7 +190,7 @@ def pattern_at(place: Place, hits: Hits, name: str, width: int) -> np.ndarray:
     for i in np.unique(hits.index[hits.index >= 0]):
         here, solid = hits.index == i, place.solids[i]
         value = getattr(solid.surface, name)
-        value = value(solid.local(hits.points[here])) if callable(value) else value
+        value = np.asarray(value(solid.local(hits.points[here])) if callable(value) else value)
         out[here] = np.reshape(value, (-1, width))
     return out
 
@@ -313,5 +313,5 @@ def color_of(place: Place, points: np.ndarray, solids: np.ndarray) -> np.ndarray
     for i in np.unique(solids):
         solid, mine = place.solids[i], solids == i
         color = solid.surface.color
-        out[mine] = color(solid.local(points[mine])) if callable(color) else color
+        out[mine] = np.asarray(color(solid.local(points[mine])) if callable(color) else color)
     return out

@@ -254,6 +254,6 @@ def colored_points(
             solid, mine = here.solids[i], xyz[solids == i]
             color = solid.surface.color
             points.append(mine)
-            paint = color(solid.local(mine)) if callable(color) else color
+            paint = np.asarray(color(solid.local(mine)) if callable(color) else color)
             colors.append(np.broadcast_to(paint, mine.shape))
     return np.concatenate(points).astype(np.float32), np.concatenate(colors).astype(np.float32)

@@ -9,12 +9,9 @@ uniform sampler2D picture;
 uniform sampler2D coverage;  // in alpha
 uniform bool top_first;      // row 0 of the coverage is on top
 out vec4 shown;
+#include "srgb.glsl"
 
 // IEC 61966-2-1
-vec3 linear_from_srgb(vec3 c) {
-    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
-}
-
 vec3 srgb_from_linear(vec3 c) {
     return mix(c * 12.92, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
 }

@@ -9,11 +9,7 @@ uniform sampler2D image;  // display sRGB
 uniform vec4 part;        // left, bottom, width, height of the image, 0..1
 uniform bool linear;      // the framebuffer holds light, not display values
 out vec4 shown;
-
-// IEC 61966-2-1
-vec3 linear_from_srgb(vec3 c) {
-    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
-}
+#include "srgb.glsl"
 
 void main() {
     vec4 color = texture(image, part.xy + part.zw * place);

@@ -33,7 +33,7 @@ export async function offerHeadsets(page) {
 }
 
 export class Headset {
-    /** @param {any} page @param {string} kind  "immersive-vr" or "immersive-ar" */
+    /** @param {{renderer: import("../renderer/renderer.js").Renderer} & Record<string, any>} page @param {string} kind  "immersive-vr" or "immersive-ar" */
     constructor(page, kind) {
         this.page = page;
         this.kind = kind;
@@ -123,6 +123,7 @@ export class Headset {
         renderer.leaveOut(levers);
         renderer.draw(views, target, this.through);
         if (this.overlayOf !== renderer) {
+            /** @type {import("../renderer/renderer.js").Renderer | undefined} */
             this.overlayOf = renderer;
             this.overlay = new Overlay(renderer.gpu);
         }

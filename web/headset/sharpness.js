@@ -7,7 +7,7 @@ import { MIN_ALPHA, RESORT_DEGREES } from "../conventions.js";
 
 /** @type {Levers} what a page draws with */
 export const EXACT = { minAlpha: MIN_ALPHA, direct: false, resortDegrees: RESORT_DEGREES, recolorDegrees: 0, foveation: 0, rate: 0 };
-/** @type {Record<string, Levers>} */
+/** @type {Record<import("../entries.js").SceneEntry["profile"], Levers>} */
 const PROFILES = {
     any: { ...EXACT, recolorDegrees: 2 },
     quest: { minAlpha: 2 / 255, direct: true, resortDegrees: 5, recolorDegrees: 2, foveation: 1, rate: 72 },
@@ -18,7 +18,7 @@ const SCALE_STEP = 0.05, LEAST_SCALE = 0.5, WINDOW = 20, LATE = 1.15;  // frames
 const FIRST_PATIENCE = 6, MOST_PATIENCE = 192;  // windows in time before more pixels are tried
 const PAUSE_MS = 2000;  // a headset that was put away is not late
 
-/** What a scene asks for; of a stranger's word for it only the known ones count. @param {any} name @returns {Levers} */
+/** What a scene asks for; of a stranger's word for it only the known ones count. @param {keyof typeof PROFILES} name @returns {Levers} */
 export const leversOf = (name) => (typeof name === "string" && Object.hasOwn(PROFILES, name) ? PROFILES[name] : PROFILES.any);
 
 /** Each lever in words with its price. @param {Levers} levers @returns {string[]} */

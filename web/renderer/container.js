@@ -1,16 +1,23 @@
-// container: reads what runtime_models/web/write_container.py wrote: 8 bytes "SHIFTWEB", length of
+// container: reads what runtime_models/web/web_model.py wrote: 8 bytes "SHIFTWEB", length of
 // the JSON (uint32), the JSON, then arrays at multiples of 4.  The file is a stranger's: nothing in
 // it runs, and every count and length is checked here, before anything is allocated for it.
 import { MOST_ANCHORS, MOST_SPLATS, MOST_BYTES, MOST_WEIGHTS } from "../conventions.js";
 
-/** @typedef {[string, number, number]} Section  type, byte offset, count of numbers */
-/** @typedef {{codes: Section, ends: Section, width: number}} Table  codes between the ends of each column */
-/** @typedef {any} SceneJson  as write_container.py and web_model.py lay it out; checked by checkScene */
-/** @typedef {{scene: SceneJson, array: (section: Section) => Float32Array | Uint16Array | Uint8Array,
+// What Python writes; whether it is what a file has, checkScene asks.
+/** @typedef {import("../entries.js").SceneEntry} SceneEntry */
+/** @typedef {import("../entries.js").ModelEntry} ModelEntry */
+/** @typedef {import("../entries.js").NetworkEntry} NetworkEntry */
+/** @typedef {import("../entries.js").RegionEntry} RegionEntry */
+/** @typedef {import("../entries.js").Section} Section  type, byte offset, count of numbers */
+/** @typedef {import("../entries.js").TableEntry} Table  codes between the ends of each column */
+/** @typedef {{scene: SceneEntry, array: (section: Section) => Float32Array | Uint16Array | Uint8Array,
  *   table: (table: Table, rows: number) => Float32Array}} Container */
 
 const MAGIC = "SHIFTWEB";
+/** @typedef {import("../entries.js").SectionKind} Kind */
+/** @type {Record<Exclude<Kind, `p${number}`>, Float32ArrayConstructor | Uint16ArrayConstructor | Uint8ArrayConstructor>} */
 const TYPES = { f32: Float32Array, f16: Uint16Array, u16: Uint16Array, u8: Uint8Array };
+/** @type {Record<Extract<Kind, `p${number}`>, number>} */
 const PLANES = { p8: 1, p16: 2, p24: 3 };  // bytes a code, all lowest bytes first: such deflate better
 
 class BadScene extends Error {}
@@ -56,7 +63,7 @@ export function readContainer(buffer) {
         if (type in PLANES) return bytes.subarray(start + offset, start + offset + count * size);
         return new (/** @type {any} */ (TYPES)[type])(buffer, start + offset, count);
     };
-    const table = (/** @type {any} */ coded, /** @type {number} */ rows) => {
+    const table = (/** @type {Table} */ coded, /** @type {number} */ rows) => {
         const width = whole(coded?.width, 1, 1024, "the width of a table"), ends = array(coded.ends), type = coded.codes?.[0];
         if (type === "f32") {
             const values = array(coded.codes);
@@ -65,7 +72,7 @@ export function readContainer(buffer) {
         }
         if (!(type in PLANES) || coded.codes[2] !== rows * width || coded.ends[0] !== "f32" || ends.length !== 2 * width)
             refuse("the scene's tables do not fit its counts");
-        return decodeColumns(array(coded.codes), ends, rows, width, /** @type {any} */ (PLANES)[type], coded.most);
+        return decodeColumns(array(coded.codes), ends, rows, width, /** @type {any} */ (PLANES)[type], /** @type {number} */ (coded.most));
     };
     return { scene, array, table };
 }
@@ -117,31 +124,31 @@ export function checkScene({ scene, array }) {
     }
     if (!(splats <= MOST_SPLATS)) refuse(`the scene has ${splats} splats, and a page shows at most ${MOST_SPLATS}`);
     for (const palette of Object.values(scene.palettes ?? {}))
-        if (/** @type {any} */ (palette)?.width !== 3 || /** @type {any} */ (palette).codes?.[2] !== 768) refuse("a palette has not 256 colours");
+        if (palette?.width !== 3 || palette.codes?.[2] !== 768) refuse("a palette has not 256 colours");
 }
 
-/** @param {any} regions @param {number} stops */
+/** @param {RegionEntry[]} regions @param {number} stops */
 function checkRegions(regions, stops) {
     whole(Array.isArray(regions) ? regions.length : -1, 0, 64, "the count of regions");
-    const fields = /** @type {Record<string, [string, number][]>} */ ({
+    const fields = /** @type {{[K in RegionEntry["kind"]]: [keyof Extract<RegionEntry, {kind: K}>, number][]}} */ ({
         sphere: [["centre", 3]], box: [["centre", 3], ["half", 3], ["wxyz", 4]], half: [["point", 3], ["normal", 3]], painted: [],
     });
     for (const region of regions) {
         if (!Object.hasOwn(fields, region?.kind)) refuse("a region is of a kind that this page does not know");
-        for (const [name, count] of fields[region.kind]) numbers(region[name], count, "a region");
+        for (const [name, count] of fields[region.kind]) numbers(/** @type {any} */ (region)[name], count, "a region");
         if (region.kind === "sphere") numbers([region.radius], 1, "a region");
         if (region.kind === "painted" ? region.weight?.width !== 1 : !Number.isFinite(region.border)) refuse("a region is not whole");
         checkControl(region.x, stops);
     }
 }
 
-/** @param {any} x @param {number} stops */
+/** @param {import("../entries.js").ControlEntry} x @param {number} stops */
 function checkControl(x, stops) {
     const sound = (/** @type {any} */ value) => value >= 0 && value <= 1;
     if (!(sound(x) && typeof x === "number") && !(Array.isArray(x) && x.length === stops && x.every(sound))) refuse("the x of an object is not from 0 to 1");
 }
 
-/** @param {any} model @param {(section: any) => ArrayLike<number>} array */
+/** @param {ModelEntry} model @param {Container["array"]} array */
 function checkModel(model, array) {
     const anchors = whole(model?.anchors, 1, MOST_ANCHORS, "the count of anchors"), k = whole(model.perAnchor, 1, 64, "the count of splats an anchor");
     whole(anchors * k, 1, MOST_SPLATS, "the count of splats");
@@ -177,10 +184,10 @@ function checkModel(model, array) {
     for (const [name, outs] of Object.entries(vectors)) checkNetwork(model.networks?.[name], features, name === "color" ? lookVectors(model) : 1, outs, d, array);
 }
 
-/** How many vectors the colours' network takes of the eye: the direction and light of one channel, or of three. @param {any} model */
+/** How many vectors the colours' network takes of the eye: the direction and light of one channel, or of three. @param {{light?: {width: number}}} model */
 export const lookVectors = (model) => (model.light?.width === 24 ? 2 : 1);
 
-/** @param {any} net @param {number} features @param {number} looks  vectors @param {number} outs @param {number} d @param {(section: any) => ArrayLike<number>} array */
+/** @param {NetworkEntry} net @param {number} features @param {number} looks  vectors @param {number} outs @param {number} d @param {Container["array"]} array */
 function checkNetwork(net, features, looks, outs, d, array) {
     const wrong = "the scene's networks do not fit together";
     if (!Array.isArray(net?.layers) || !(net.layers.length >= 1 && net.layers.length <= 4)) refuse(wrong);

@@ -11,7 +11,10 @@ import { Shader } from "./shade.js";
 /** @typedef {import("./gl.js").Gpu} Gpu */
 /** @typedef {import("./gl.js").Program} Program */
 /** @typedef {import("./stops.js").Control} Control */
+/** @typedef {import("./models.js").AnchorModel} AnchorModel */
+/** @typedef {import("./networks.js").Network} Network */
 /** @typedef {import("./networks.js").Part} Part */
+/** @typedef {import("./renderer.js").SceneObject} SceneObject */
 /** @typedef {import("./false_colors.js").Shade} Shade */
 /** @typedef {{first: number, rows: number}} Batch  first anchor, rows of anchors */
 /** @typedef {{texture: WebGLTexture, rows: number, layers: number, framebuffers: Map<string, WebGLFramebuffer>}} Stage */
@@ -39,10 +42,10 @@ export class Decoder {
         this.runs = 0;  // of networks, for who counts them
     }
 
-    /** What the networks of a model need on the GPU; compiles their shaders early. @param {any} model */
+    /** What the networks of a model need on the GPU; compiles their shaders early. @param {import("./models.js").Model} model */
     prepare(model) {
         const { gpu } = this;
-        for (const net of Object.values(model.networks ?? {}))
+        for (const net of Object.values("networks" in model ? model.networks : {}))
             for (const layer of net.layers) {
                 const size = partSize(layer, this.most);
                 layer.parts = [];
@@ -67,17 +70,17 @@ export class Decoder {
 
     /**
      * One network for the anchors of a batch, into layers of the stage "out" from `layer` on.
-     * @param {any} object @param {string} name @param {Control | null} control  null: the object's own weights, times `mask`
+     * @param {SceneObject} object @param {string} name @param {Control | null} control  null: the object's own weights, times `mask`
      * @param {Batch} batch @param {number} layer @param {number[]} eye @param {number[]} mask
      */
     run(object, name, control, batch, layer, eye = [0, 0, 0], mask = []) {
-        const { model } = object, net = model.networks[name], { gpu } = this, stops = control === null && net.control ? model.stops.length : 0;
+        const model = /** @type {AnchorModel} */ (object.model), net = model.networks[name], { gpu } = this, stops = control === null && net.control ? model.stops.length : 0;
         if (control !== null && net.control) this.fold(net, model.blend.psi(model.encoding, control));
         else if (net.control) this.fold(net, new Float64Array(model.encoding.d));
         let inputs = model.featureLayers, inputRow = batch.first / WIDTH;
-        net.layers.forEach((/** @type {any} */ of, /** @type {number} */ l) => {
+        net.layers.forEach((of, l) => {
             const last = l + 1 === net.layers.length, target = last ? this.stages.out : this.stage(`hidden${l % 2}`, batch.rows, of.outs), looks = net.looks && !l;
-            for (const part of /** @type {Part[]} */ (of.parts)) {
+            for (const part of of.parts) {
                 const program = /** @type {Program} */ (this.programs.get(part.outs)), first = part.first + (last ? layer : 0), key = `${first} ${part.outs}`;
                 let framebuffer = target.framebuffers.get(key);
                 if (!framebuffer) target.framebuffers.set(key, (framebuffer = gpu.framebufferOfLayers(target.texture, first, part.outs)));
@@ -96,22 +99,22 @@ export class Decoder {
         this.runs++;
     }
 
-    /** Psi into the first biases. @param {any} net @param {Float64Array} psi */
+    /** Psi into the first biases. @param {Network} net @param {Float64Array} psi */
     fold(net, psi) {
         const [layer] = net.layers, bias = foldedBias(layer.bias, net.control, psi);
-        for (const { first, outs, bias: buffer } of /** @type {Part[]} */ (layer.parts)) this.gpu.updateUniforms(buffer, bias.subarray(4 * first, 4 * (first + outs)));
+        for (const { first, outs, bias: buffer } of layer.parts) this.gpu.updateUniforms(buffer, bias.subarray(4 * first, 4 * (first + outs)));
     }
 
-    /** What each stop adds to a part of the first layer: C Psi(x_s). @param {any} net @param {any} model @param {Part} part */
+    /** What each stop adds to a part of the first layer: C Psi(x_s). @param {Network} net @param {AnchorModel} model @param {Part} part */
     stopsOf(net, model, part) {
         if (part.ofStops) return part.ofStops;
         const values = new Float32Array(64 * 4 * MOST_OUTPUTS), none = new Float32Array(net.layers[0].bias.length);
-        model.stops.forEach((/** @type {any} */ stop, /** @type {number} */ s) =>
+        model.stops.forEach((stop, s) =>
             values.set(foldedBias(none, net.control, model.blend.psi(model.encoding, stop.x)).subarray(4 * part.first, 4 * (part.first + part.outs)), 4 * s * part.outs));
         return (part.ofStops = this.gpu.uniformBuffer(values));
     }
 
-    /** Means, opacities and covariances at the object's control. @param {any} object */
+    /** Means, opacities and covariances at the object's control. @param {SceneObject} object */
     decodeShape(object) {
         const { model } = object, k = model.perAnchor, { arena, gpu } = this;
         if (model.kind === "layers") return this.shader.weighLayers(object, this.pack);
@@ -128,7 +131,7 @@ export class Decoder {
         }
     }
 
-    /** Colours, and heat, towards an eye in the object's frame. @param {any} object @param {Shade} shade @param {import("./false_colors.js").Way} way @param {number[]} eye */
+    /** Colours, and heat, towards an eye in the object's frame. @param {SceneObject} object @param {Shade} shade @param {import("./false_colors.js").Way} way @param {number[]} eye */
     decodeColors(object, shade, way, eye) {
         const { model } = object, k = model.perAnchor;
         if (model.kind === "layers") return this.shader.shade(object, shade, way, eye, null, 0, object.rows, () => {});
@@ -141,12 +144,12 @@ export class Decoder {
     }
 }
 
-/** @param {any} model @returns {Batch[]} */
+/** @param {AnchorModel} model @returns {Batch[]} */
 function batchesOf(model) {
     const rows = rowsOf(model.anchors), out = [];
     for (let row = 0; row < rows; row += BATCH_ROWS) out.push({ first: row * WIDTH, rows: Math.min(BATCH_ROWS, rows - row) });
     return out;
 }
 
-/** Rows of the arena that a batch fills. @param {Batch} batch @param {any} object */
+/** Rows of the arena that a batch fills. @param {Batch} batch @param {SceneObject} object */
 const splatRows = (batch, object) => Math.min(batch.rows * object.model.perAnchor, object.rows - (batch.first * object.model.perAnchor) / WIDTH);

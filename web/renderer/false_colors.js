@@ -13,25 +13,25 @@ import { hasFalseColors } from "./stops.js";
 /**
  * The colours that an object shows: `rest` where the final ones are decoded, `heats` what stops
  * of values have in them.  own: each anchor has weights of its own, and these stops are met somewhere.
- * @param {any} model @param {Control} control @param {number[] | null} own @returns {Shade}
+ * @param {import("./models.js").Model} model @param {Control} control @param {number[] | null} own @returns {Shade}
  */
 export function shadeOf(model, control, own = null) {
     const { blend } = model, { stops } = blend, follows = model.colorsFollow, weights = own ?? blend.weights(control);
     const at = follows ? control : 0;
-    const measured = stops.map((/** @type {any} */ _, /** @type {number} */ s) => s)
-        .filter((/** @type {number} */ s) => hasFalseColors(stops[s]) && weights[s] > 0);
+    const measured = stops.map((_, s) => s)
+        .filter((s) => hasFalseColors(stops[s]) && weights[s] > 0);
     if (!measured.length) return { rest: at, heats: [], pure: false };
-    const others = weights.map((/** @type {number} */ weight, /** @type {number} */ s) => (measured.includes(s) ? 0 : weight));
-    const left = others.reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0), pure = !left && measured.length === 1;
+    const others = weights.map((weight, s) => (measured.includes(s) ? 0 : weight));
+    const left = others.reduce((a, b) => a + b, 0), pure = !left && measured.length === 1;
     const layered = model.kind === "layers" && model.mode === "exclusive" && !pure;
-    const heats = measured.map((/** @type {number} */ s) => ({
+    const heats = measured.map((s) => ({
         stop: s, palette: stops[s].palette, ofLayer: layered,
         control: pure && !own ? at : follows ? stops[s].x : 0,
         weight: pure ? 1 : weights[s],
     }));
     if (pure) return { rest: null, heats, pure: true };
     if (layered) return { rest: 0, heats, pure: false };
-    return { rest: left ? (follows ? others.map((/** @type {number} */ weight) => weight / left) : 0) : null, heats, pure: false };
+    return { rest: left ? (follows ? others.map((weight) => weight / left) : 0) : null, heats, pure: false };
 }
 
 /** How all shades of a scene together come about. @param {Shade[]} shades @returns {{way: Way, palette: string}} */

@@ -5,23 +5,32 @@ import { hasFalseColors, StopBlend } from "./stops.js";
 
 /** @typedef {import("./gl.js").Gpu} Gpu */
 /** @typedef {import("./container.js").Container} Container */
+/** @typedef {import("./container.js").Table} Table */
+/** @typedef {Omit<import("../entries.js").AnchorsEntry, "positions"> & Lists} Anchors */
+/** @typedef {Omit<import("../entries.js").LayersEntry, "positions"> & Lists} Layers */
+/** @typedef {{blend: StopBlend, positions: Float32Array, anchorList: WebGLTexture, frameList: WebGLTexture | null}} Lists  of any kind of model */
+/** @typedef {ReturnType<typeof loadNetworks>} AnchorModel */
+/** @typedef {ReturnType<typeof loadLayers>} LayerModel */
+/** @typedef {AnchorModel | LayerModel} Model */
 
-/** A model with its lists; `described` is checked already. @param {Gpu} gpu @param {any} described @param {Container} container */
+/** A model with its lists; `described` is checked already. @param {Gpu} gpu @param {import("./container.js").ModelEntry} described @param {Container} container @returns {Model} */
 export function loadModel(gpu, described, { array, table }) {
     const count = described.anchors, positions = table(described.positions, count);
-    const model = {
-        ...described, blend: new StopBlend(described.stops, described.pace ?? [], described.direct === true), positions,
+    const lists = {
+        blend: new StopBlend(described.stops, described.pace ?? [], described.direct === true), positions,
         anchorList: gpu.list("rgba32f", count, vec4s(positions, 3)),
-        frameList: described.scales ? gpu.list("rgba32f", 2 * count, pairs(table(described.scales, count), table(described.wxyz, count))) : null,
+        frameList: described.scales ? gpu.list("rgba32f", 2 * count, pairs(table(described.scales, count), table(/** @type {Table} */ (described.wxyz), count))) : null,
     };
-    return described.kind === "layers" ? loadLayers(gpu, model, array, table) : loadNetworks(gpu, model, array, table);
+    return described.kind === "layers" ? loadLayers(gpu, { ...described, ...lists }, array, table) : loadNetworks(gpu, { ...described, ...lists }, array, table);
 }
 
-/** @param {Gpu} gpu @param {any} model @param {Container["array"]} array @param {Container["table"]} table */
+/** @param {Gpu} gpu @param {Anchors} model @param {Container["array"]} array @param {Container["table"]} table */
 function loadNetworks(gpu, model, array, table) {
+    const floats = (/** @type {import("./container.js").Section} */ section) => /** @type {Float32Array} */ (array(section));
+    /** @type {Record<string, import("./networks.js").Network>} */
     const networks = Object.fromEntries(Object.entries(model.networks).map(([name, net]) => [name, {
-        ...net, control: net.control ? array(net.control) : null,
-        layers: net.layers.map((/** @type {any} */ layer) => ({ ...layer, bias: array(layer.bias), weights: array(layer.weights) })),
+        ...net, control: net.control ? floats(net.control) : null,
+        layers: net.layers.map((layer) => ({ ...layer, bias: floats(layer.bias), weights: floats(layer.weights), parts: [] })),
     }]));
     const shapes = ["offset", "scale", "rotation", "opacity"];
     return {
@@ -40,7 +49,7 @@ function layers(gpu, features, count, vectors) {
     return gpu.texture("rgba32f", WIDTH, rows, planes, vectors);
 }
 
-/** Plain splats: lists of what networks would have made. @param {Gpu} gpu @param {any} model @param {Container["array"]} array @param {Container["table"]} table */
+/** Plain splats: lists of what networks would have made. @param {Gpu} gpu @param {Layers} model @param {Container["array"]} array @param {Container["table"]} table */
 function loadLayers(gpu, model, array, table) {
     const count = model.anchors, layer = array(model.layer), stops = model.stops.length, vectors = Math.ceil(stops / 4) + 1;
     const harmonics = joined(table(model.sh, count), model.shRest ? table(model.shRest, count) : new Float32Array(0), count), exclusive = new Float32Array(4 * vectors * count);

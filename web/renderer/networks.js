@@ -2,9 +2,11 @@
 // in registers while it walks over its inputs, so each weight is fetched once an anchor.  (A fragment
 // for each four outputs needs 1.5 times as long on software GL; all layers of a network unrolled into
 // one shader run 1.4 times as fast there, but take its compiler more than a minute.)
-import { BLOCK_VEC4S } from "../conventions.js";
+import { BLOCK_VEC4S, DIRECTION, LIGHT } from "../conventions.js";
 
-/** @typedef {{ins: number, outs: number, weights: Float32Array, bias: Float32Array}} Layer  counts of vec4s */
+/** @typedef {import("../entries.js").NetworkEntry} NetworkEntry */
+/** @typedef {Pick<import("../entries.js").LayerEntry, "ins" | "outs"> & {weights: Float32Array, bias: Float32Array, parts: Part[]}} Layer  counts of vec4s */
+/** @typedef {Pick<NetworkEntry, "looks" | "head" | "clip" | "gain"> & {layers: Layer[], control: Float32Array | null}} Network */
 /** @typedef {{first: number, outs: number, weights: WebGLBuffer, bias: WebGLBuffer, ofStops: WebGLBuffer | null}} Part  of a layer */
 
 const HEADS = ["none", "tanh", "sigmoid", "softplus", "exp", "relu"];
@@ -42,23 +44,8 @@ vec4 activate(vec4 z) {
     return z;
 }
 
-// Away from the eye (paper eq. 4); zero where the two coincide.
-vec3 direction_from(vec3 eye, vec3 point) {
-    vec3 ray = point - eye;
-    float largest = max(abs(ray.x), max(abs(ray.y), abs(ray.z)));
-    if (!(largest > 0.0)) return vec3(0.0);
-    ray /= largest;  // squares of very short rays would be 0
-    return ray / length(ray);
-}
-
-// What coefficients of the spherical harmonics of degree 1 and 2 give along d, in units of degree 1.
-float light_along(vec4 low, vec4 high, vec3 d) {
-    vec3 products = 2.2360680 * d * d.yzx, squares = d * d;
-    float zone = 0.6454972 * (2.0 * squares.z - squares.x - squares.y);
-    float rest = 1.1180340 * (squares.x - squares.y);
-    return dot(low, vec4(d, products.x)) + dot(high, vec4(products.yz, zone, rest));
-}
-
+${DIRECTION}
+${LIGHT}
 float channel_along(int c, int a, vec3 d) {
     int low = 2 * (lit * a + c);
     return light_along(texelFetch(light, at(low), 0), texelFetch(light, at(low + 1), 0), d);

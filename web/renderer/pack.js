@@ -12,6 +12,11 @@ mat3 rotation(vec4 q) {  // w x y z, of any length
         2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
 }`;
 
+// In programs with a fragment a splat: which splat j of which anchor a.
+export const SPLAT_OF_FRAGMENT = `
+    int i = (int(gl_FragCoord.y) - first_row) * WIDTH + int(gl_FragCoord.x);
+    int a = i / per_anchor, j = i - a * per_anchor;`;
+
 export const PACK = `
 uniform sampler2DArray staged;   // offsets, scales, quaternions, opacities of an anchor's splats, side by side
 uniform sampler2D anchors;       // plain splats: their means
@@ -29,9 +34,7 @@ ivec3 here;  // of the anchor
 float number(int first, int n) { return texelFetch(staged, here + ivec3(0, 0, first + (n >> 2)), 0)[n & 3]; }
 vec3 triple(int first, int j) { return vec3(number(first, 3 * j), number(first, 3 * j + 1), number(first, 3 * j + 2)); }
 
-void main() {
-    int i = (int(gl_FragCoord.y) - first_row) * WIDTH + int(gl_FragCoord.x);
-    int a = i / per_anchor, j = i - a * per_anchor;
+void main() {${SPLAT_OF_FRAGMENT}
     mean_opacity = vec4(0.0, 0.0, 0.0, -1.0);
     covariance0 = covariance1 = vec4(0.0);
     if (a >= count) return;

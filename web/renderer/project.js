@@ -62,7 +62,7 @@ export class Projector {
         this.program = gpu.program(null, PROJECT);
     }
 
-    /** @param {number} view  number of its records @param {any[]} objects @param {View} from @param {number[]} size */
+    /** @param {number} view  number of its records @param {import("./renderer.js").SceneObject[]} objects @param {View} from @param {number[]} size */
     project(view, objects, from, size) {
         const { arena, gpu } = this, records = arena.recordsOf(view), [left, right, down, up] = from.tangents;
         for (const object of objects) {
@@ -70,7 +70,7 @@ export class Projector {
                 mean_opacity: { texture: arena.meanOpacity }, covariance0: { texture: arena.covariance0 }, covariance1: { texture: arena.covariance1 },
                 frame: { vec4s: object.seenFrom(from.worldFromEye) }, tangents: from.tangents, size, near: from.near,
                 clamps: [JACOBIAN_MARGIN * Math.max(-left, right), JACOBIAN_MARGIN * Math.max(-down, up)],
-                min_alpha: arena.minAlpha, low_pass: LOW_PASS, antialiased: { int: object.model.antialiased ? 1 : 0 },
+                min_alpha: arena.minAlpha, low_pass: LOW_PASS, antialiased: { int: /** @type {import("./models.js").LayerModel} */ (object.model).antialiased ? 1 : 0 },
             });
             gpu.fill(records.framebuffer, object.rows, object.row);
         }

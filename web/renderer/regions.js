@@ -6,10 +6,11 @@ import { rowsOf } from "./gl.js";
 import { add, conjugate, dot, length, moved, turn } from "../poses.js";
 import { hasFalseColors } from "./stops.js";
 
-/** @typedef {{kind: string, x: import("./stops.js").Control, border: number, space: string, centre?: number[], half?: number[],
- *   wxyz?: number[], radius?: number, point?: number[], normal?: number[], weight?: ArrayLike<number>}} Region */
+/** @typedef {Exclude<import("../entries.js").RegionEntry, {kind: "painted"}>} Shape */
+/** @typedef {Omit<import("../entries.js").PaintedEntry, "weight"> & {weight: ArrayLike<number>}} Painted */
+/** @typedef {Shape | Painted} Region  with the table of a painted one */
 
-/** Metres from the surface, negative inside. @param {any} region @param {number[]} place */
+/** Metres from the surface, negative inside. @param {Shape} region @param {number[]} place */
 function distance(region, place) {
     if (region.kind === "sphere") return length(add(place, region.centre, -1)) - region.radius;
     if (region.kind === "half") return dot(add(place, region.point, -1), region.normal);
@@ -19,7 +20,7 @@ function distance(region, place) {
 
 /** How much of a place is inside, 0 to 1. @param {Region} region @param {number[]} place @param {number} anchor */
 function inside(region, place, anchor) {
-    if (region.kind === "painted") return /** @type {ArrayLike<number>} */ (region.weight)[anchor];
+    if (region.kind === "painted") return region.weight[anchor];
     const away = distance(region, place);
     if (!(region.border > 0)) return away <= 0 ? 1 : 0;
     const out = Math.min(1, Math.max(0, away / region.border));
@@ -27,7 +28,7 @@ function inside(region, place, anchor) {
 }
 
 export class Regions {
-    /** @param {import("./gl.js").Gpu} gpu @param {any} object @param {Region[]} regions */
+    /** @param {import("./gl.js").Gpu} gpu @param {import("./renderer.js").SceneObject} object @param {Region[]} regions */
     constructor(gpu, object, regions) {
         const { model } = object, stops = model.stops.length;
         this.gpu = gpu;
@@ -40,7 +41,7 @@ export class Regions {
         this.key = "";
     }
 
-    /** Weights where x, or the place of the object, is another one; whether they are. @param {any} object */
+    /** Weights where x, or the place of the object, is another one; whether they are. @param {import("./renderer.js").SceneObject} object */
     update(object) {
         const key = JSON.stringify([object.x, this.regions.some((region) => region.space === "world") && object.pose]);
         if (key === this.key) return false;

@@ -21,7 +21,7 @@ import { Splatter } from "./splat.js";
 
 /** What is in the world: a model with a pose and a control, and what of it is decoded. */
 export class SceneObject {
-    /** @param {any} described @param {any} model @param {number} row  of the arena */
+    /** @param {import("../entries.js").ObjectEntry} described @param {import("./models.js").Model} model @param {number} row  of the arena */
     constructor(described, model, row) {
         this.name = String(described.name);
         this.model = model;
@@ -39,7 +39,7 @@ export class SceneObject {
         this.shaped = false;
         /** @type {string} */ this.coloredFor = "";  // the shade that is decoded
         /** @type {number[] | null} */ this.coloredFrom = null;
-        /** @type {any} */ this.own = null;  // of an object with regions: each anchor's weights of the stops
+        /** @type {Regions | null} */ this.own = null;  // of an object with regions: each anchor's weights of the stops
     }
 
     /** Rows of eye_from_object; a hidden object is nowhere. @param {Pose} worldFromEye */
@@ -59,20 +59,20 @@ export class Renderer {
         /** @type {number[]} */ this.background = scene.background;
         this.onChange = onChange;
         /** @type {Record<string, Float32Array>} */
-        this.palettes = Object.fromEntries(Object.entries(scene.palettes ?? {}).map(([name, coded]) => [name, table(/** @type {any} */ (coded), 256)]));
-        this.models = scene.models.map((/** @type {any} */ described) => loadModel(this.gpu, described, container));
+        this.palettes = Object.fromEntries(Object.entries(scene.palettes ?? {}).map(([name, coded]) => [name, table(coded, 256)]));
+        this.models = scene.models.map((described) => loadModel(this.gpu, described, container));
         let row = 0;
         /** @type {SceneObject[]} */
-        this.objects = scene.objects.map((/** @type {any} */ described) => {
+        this.objects = scene.objects.map((described) => {
             const object = new SceneObject(described, this.models[described.model], row);
             row += object.rows;
             if (described.regions?.length) {
-                const regions = described.regions.map((/** @type {any} */ region) => (region.weight ? { ...region, weight: table(region.weight, object.model.anchors) } : region));
+                const regions = described.regions.map((region) => (region.kind === "painted" ? { ...region, weight: table(region.weight, object.model.anchors) } : region));
                 object.own = new Regions(this.gpu, object, regions);
             }
             return object;
         });
-        const hasHeat = this.models.some((/** @type {any} */ model) => model.stops.some(hasFalseColors));
+        const hasHeat = this.models.some((model) => model.stops.some(hasFalseColors));
         this.arena = new Arena(this.gpu, row, this.palettes, hasHeat, scene.brightest ?? Infinity);
         this.decoder = new Decoder(this.gpu, this.arena);
         this.projector = new Projector(this.gpu, this.arena);

@@ -2,9 +2,12 @@
 // and weigh.comp of renderer/shaders.  One fragment a splat; of several parts the later are added.
 import { LUMINANCE, WIDTH } from "../conventions.js";
 import { rowsOf } from "./gl.js";
+import { SPLAT_OF_FRAGMENT } from "./pack.js";
 
 /** @typedef {import("./false_colors.js").Shade} Shade */
 /** @typedef {import("./stops.js").Control} Control */
+/** @typedef {import("./models.js").LayerModel} LayerModel */
+/** @typedef {import("./renderer.js").SceneObject} SceneObject */
 
 export const PALETTE_COLOR = `
 vec3 palette_color(float value) {
@@ -59,9 +62,7 @@ vec3 shaded(int a) {
     return max(rgb, 0.0);
 }
 
-void main() {
-    int i = (int(gl_FragCoord.y) - first_row) * WIDTH + int(gl_FragCoord.x);
-    int a = i / per_anchor, j = i - a * per_anchor;
+void main() {${SPLAT_OF_FRAGMENT}
     color = heat = vec4(0.0);
     if (a >= count) return;
     ${harmonics ? "" : "ivec2 here = at(a - first_anchor);"}
@@ -91,12 +92,12 @@ export class Shader {
     }
 
     /**
-     * @param {any} object @param {Shade} shade @param {import("./false_colors.js").Way} way @param {number[]} eye
+     * @param {SceneObject} object @param {Shade} shade @param {import("./false_colors.js").Way} way @param {number[]} eye
      * @param {WebGLTexture | null} staged @param {number} first  anchor @param {number} rows
      * @param {(control: Control, heat: boolean) => void} decode  fills the staging texture
      */
     shade(object, shade, way, eye, staged, first, rows, decode) {
-        const { gpu, arena } = this, { gl } = gpu, { model, own } = object, program = staged ? this.ofNetworks : this.ofHarmonics;
+        const { gpu, arena } = this, { gl } = gpu, { own } = object, model = /** @type {LayerModel} */ (object.model), program = staged ? this.ofNetworks : this.ofHarmonics;
         const heats = way === "picture" ? [] : shade.heats, kept = heats.reduce((left, heat) => left - heat.weight, 1);
         const parts = heats.map((heat) => ({ control: heat.control, role: way === "splats" ? 2 : 1, share: heat.weight, channel: own || heat.ofLayer ? heat.stop : -1, palette: heat.palette }));
         const rest = way === "picture" && shade.pure ? shade.heats[0].control : shade.rest;
@@ -119,9 +120,9 @@ export class Shader {
         });
     }
 
-    /** Opacity of plain splats = their own times how much of their layer there is. @param {any} object @param {import("./gl.js").Program} pack */
+    /** Opacity of plain splats = their own times how much of their layer there is. @param {SceneObject} object @param {import("./gl.js").Program} pack */
     weighLayers(object, pack) {
-        const { model } = object, rows = rowsOf(model.anchors), { gpu } = this, texels = new Float32Array(4 * WIDTH * rows);
+        const model = /** @type {LayerModel} */ (object.model), rows = rowsOf(model.anchors), { gpu } = this, texels = new Float32Array(4 * WIDTH * rows);
         const there = (/** @type {number[]} */ weights) => weights.map((weight, layer) => (model.mode !== "cumulative" ? weight : weights.reduce((sum, w, s) => sum + (s >= layer ? w : 0), 0)));
         const all = there(model.blend.weights(object.x)), own = object.own?.weights, stops = model.stops.length;
         for (let i = 0; i < model.anchors; i++) {
@@ -130,7 +131,7 @@ export class Shader {
         }
         gpu.updateList(model.opacityList, rows, texels);
         pack.use({
-            staged: { layers: this.arena.noLayers }, anchors: { texture: model.anchorList }, frames: { texture: model.frameList }, opacities: { texture: model.opacityList },
+            staged: { layers: this.arena.noLayers }, anchors: { texture: model.anchorList }, frames: { texture: model.frameList ?? model.anchorList }, opacities: { texture: model.opacityList },
             per_anchor: { int: 1 }, count: { int: model.anchors }, first_anchor: { int: 0 }, first_row: { int: object.row }, source: { int: 2 }, swell: model.swell ?? 1,
         });
         gpu.fill(this.arena.shapes, object.rows, object.row);

@@ -2,11 +2,11 @@
 // enters the first layer of every network linearly, so x between two stops stands for a blend of
 // their encodings, Psi = sum of w_s Psi(x_s), at the pace that makes even steps look even.
 
-/** @typedef {{name: string, x: number, kind: string, palette: string, valueRange: number[] | null, unit: string, digits: number}} Stop */
-/** @typedef {number | number[]} Control  x on the slider, 0 to 1, or the weights of all stops */
-/** @typedef {{d: number, spacing: number, sigma: number}} Encoding */
+/** @typedef {import("../entries.js").StopEntry} Stop */
+/** @typedef {import("../entries.js").ControlEntry} Control  x on the slider, 0 to 1, or the weights of all stops */
+/** @typedef {import("../entries.js").EncodingEntry} Encoding */
 
-/** Whether a palette makes the colours of a stop: it shows values, heat or others. @param {any} stop */
+/** Whether a palette makes the colours of a stop: it shows values, heat or others. @param {Stop} stop */
 export const hasFalseColors = (stop) => (stop.kind === "thermal" || stop.kind === "values") && Boolean(stop.palette);
 
 /** @param {number} x @param {number[]} xs  rising @param {number[]} ys @returns {number} as numpy.interp */
@@ -25,7 +25,7 @@ const along = (/** @type {number[]} */ curve, /** @type {number} */ part) => int
 const partOf = (/** @type {number[]} */ curve, /** @type {number} */ share) => interpolate(share, curve, steps(curve));
 
 export class StopBlend {
-    /** @param {Stop[]} stops @param {{start: number, end: number, blend: number[]}[]} pace @param {boolean} direct */
+    /** @param {Stop[]} stops @param {import("../entries.js").PaceEntry[]} pace @param {boolean} direct */
     constructor(stops, pace = [], direct = false) {
         this.stops = stops;
         this.direct = direct;

@@ -21,7 +21,8 @@ from shapeshift.app.editor.window.window import (
     Release,
     Window,
 )
-from shapeshift.scene.cameras.framing import MIN_OPACITY, PERCENTILES, model_points
+from shapeshift.runtime_models.parts import MIN_OPACITY, PERCENTILES
+from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document.scene_file import FAR_M
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import SceneObject
@@ -179,7 +180,8 @@ def pose_after(obj: SceneObject, before: np.ndarray, after: np.ndarray, pivot: n
 
 def flat(matrix: np.ndarray) -> Matrix16:
     """A (4, 4) as ImGuizmo has it: column by column, float32."""
-    return Matrix16(np.asarray(matrix, np.float32).T.ravel().copy())
+    columns = np.asarray(matrix, np.float32).T.ravel().copy()
+    return Matrix16(columns)  # pyright: ignore[reportArgumentType]  # takes arrays, too
 
 
 def unflat(matrix: Matrix16) -> np.ndarray:

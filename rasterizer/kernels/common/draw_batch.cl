@@ -40,12 +40,8 @@ inline ushort16 transpose_bits(ushort16 a) {
                     high.s9, low.sa, high.sb, low.sc, high.sd, low.se, high.sf);
 }
 
-// Columns of a batch's ellipses for vectors of sixteen; x and y of the mean from the centre of the
-// tile's first pixel.
-typedef struct {
-  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH],
-      power_threshold[BATCH];
-} Columns;
+// Here x and y of the mean count from the centre of the tile's first pixel.
+#include "common/columns.cl"
 
 // The tile walk once more, for blocks in a tile: bit SIDE row + column of each block that the
 // ellipse reaches, for sixteen splats from 16 g on.  In every row of blocks the interval of x, with

@@ -4,7 +4,8 @@
 // Reads:   STOP (common/raster.cl), RECORD (common/record.cl); PIXELS; EVERY_BLOCK, for a test.
 // Defines: floatp, intp, their loads, stores and some(); BLOCK_W, BLOCK_H, BLOCKS, ALL_BLOCKS,
 //          BATCH; exp2p(), sums12(); copy_record(); Batch and fetch(); inside(), lowest(),
-//          still_open().
+//          still_open(); BLOCK_CENTRES, OPEN_TILE, EXPONENTS and POWER_IN, which every pass takes
+//          that walks over a tile: the same operations, so the same decisions.
 // Units:   pixels, row 0 on top; exponents are of 2.
 #include "common/vector.cl"
 #include "common/raster.cl"
@@ -30,10 +31,8 @@ typedef int16 intp;
 #define AS_INTP as_int16
 #define LOAD_PIXELS vload16
 #define STORE_PIXELS vstore16
-#define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
-                         0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
-#define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
-                         2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
+#define LANE_X FOUR_BY_FOUR_X
+#define LANE_Y FOUR_BY_FOUR_Y
 // Whether some lane of a comparison is true: its bytes as two words.
 inline int some(intp mask) {
   const ulong2 bytes = as_ulong2(convert_char16(mask));
@@ -110,11 +109,7 @@ typedef struct {
   uint blocks[BATCH];  // those that the splat's ellipse touches
 } Batch;
 
-// What of a batch the masks are made of, a column each.
-typedef struct {
-  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH],
-      power_threshold[BATCH];
-} Columns;
+#include "common/columns.cl"
 
 // The tile walk of tiles.cl, turned: columns of blocks instead of rows of tiles.  Bit k of each
 // block that the ellipse touches, for eight splats from 8 g on: in every column of blocks the
@@ -210,3 +205,26 @@ inline uint still_open(uint open, const floatp* T) {
     if (!some(T[k] >= STOP)) open &= ~(1u << k);
   return open;
 }
+
+// Of block k of the tile: its pixel centres, from the tile's corner.
+#define BLOCK_CENTRES(k)                             \
+  block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W); \
+  block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
+
+// A tile's list, near to far: p, its next intersection, and its end; the blocks that are open.
+#define OPEN_TILE           \
+  Batch batch;              \
+  uint open = ALL_BLOCKS;   \
+  int p = tile_start[tile]; \
+  const int end = tile_start[tile + 1];
+
+// Of splat s: its conic (A, B, C) and threshold times -log2(e) / 2, exponents of 2.
+#define EXPONENTS(A, B, C)                                    \
+  const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B; \
+  const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[POWER_THRESHOLD];
+
+// In the pixels of block k, log2 of exp(-power / 2): largest at the mean (mx, my), `least` at the
+// threshold.
+#define POWER_IN(k)                                        \
+  const floatp dx = block_x[k] - mx, dy = block_y[k] - my; \
+  const floatp power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);

@@ -8,7 +8,7 @@ from functools import lru_cache
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.fovea.fovea import Fovea
+from shapeshift.rasterizer.fovea.foveate import Fovea
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.splat import Splatter
@@ -67,7 +67,7 @@ class FoveatedSplatter:
 
     def _program_for(self, images: int) -> tuple[moderngl.Program, moderngl.VertexArray]:
         """What composes pictures, with or without a second one of heat."""
-        program = self._gpu.program("resolve.vert", "lenses/foveate.frag", HEAT=images - 1)
+        program = self._gpu.program("full.vert", "lenses/foveate.frag", HEAT=images - 1)
         if images not in self._triangles:
             self._triangles[images] = self._gpu.ctx.vertex_array(program, [])
         return program, self._triangles[images]

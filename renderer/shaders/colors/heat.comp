@@ -36,8 +36,7 @@ layout(std430, binding = SLOT_TINT) readonly buffer Weights { float weights[]; }
 uniform uint per_weight;         // splats side by side that have one weight
 uniform bool first;              // what heat there is is of no use
 uniform bool colored;            // through the palette
-
-const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);  // Rec. 709, on display values
+#include "common/luminance.glsl"
 
 void main() {
     uint i = start + gl_GlobalInvocationID.x;

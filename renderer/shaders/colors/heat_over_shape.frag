@@ -13,8 +13,7 @@ uniform sampler2D blurred, heat;
 uniform float detail;
 #endif
 out vec4 shown;
-
-const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);  // Rec. 709, on display values
+#include "common/luminance.glsl"
 
 #if SECOND
 float broad(ivec2 at, int last) {

@@ -6,16 +6,11 @@
 // Units:   metres in the object; display sRGB, from 0 on.
 #include "common/direction.glsl"
 #include "common/finite.glsl"
-#ifndef PAGED
-#define PAGED 0  // 1: of pages; sh is (stored pages, coefficients * 3, PAGE)
-#endif
-#if PAGED
 #include "common/pages.glsl"
-#endif
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };
-layout(std430, binding = SLOT_SH) readonly buffer Sh { float sh[]; };  // (coefficients * 3, count)
+layout(std430, binding = SLOT_SH) readonly buffer Sh { float sh[]; };  // see coefficient()
 layout(std430, binding = SLOT_COLOR) writeonly buffer Color { vec4 color[]; };
 uniform uint count;
 uniform uint start;         // arena row of the first; where pages begin
@@ -28,10 +23,12 @@ layout(std430, binding = SLOT_LISTED) readonly buffer Listed { uint listed[]; };
 
 vec3 coefficient(uint i, uint k) {
 #if PAGED
+    // Of stored pages: (pages, coefficients * 3, PAGE).
     uint at = (i / PAGE * 3u * coefficients + 3u * k) * PAGE + i % PAGE;
     return vec3(sh[at], sh[at + PAGE], sh[at + 2u * PAGE]);
 #else
-    // A stream a coefficient and channel: neighbouring invocations read neighbouring floats.
+    // (coefficients * 3, count), a stream a coefficient and channel: neighbouring invocations read
+    // neighbouring floats.
     uint at = 3u * k * count + i;
     return vec3(sh[at], sh[at + count], sh[at + 2u * count]);
 #endif

@@ -1,9 +1,13 @@
 // pages: the last rows of a frame are drawn from pages of an arena, each for an object of its own;
-// several may show the same page.
+// several may show the same page.  Nothing without PAGED.
 // Reads:   pages (mapped_pages.py): poses of all objects, and from first_entry on a uvec4 a page of
 //          PAGE splats: arena row, or NO_PAGE; where its object's pose begins; part; antialiased.
 // Defines: Page page_of(i): of splat i of the paged rows.
 // Units:   a part of a splat: 1 where all of it is drawn.
+#ifndef PAGED
+#define PAGED 0  // 1: the rows are drawn from pages, each for an object of its own
+#endif
+#if PAGED
 layout(std430, binding = SLOT_PAGES) readonly buffer Pages { uvec4 pages[]; };
 uniform uint first_entry;
 const uint NO_PAGE = 0xFFFFFFFFu;
@@ -25,3 +29,4 @@ Page page_of(uint i) {
 }
 
 vec4 pose_row(uint at) { return uintBitsToFloat(pages[at]); }
+#endif

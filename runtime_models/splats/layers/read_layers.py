@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -127,7 +128,7 @@ def join_layers(
     if width < filed:
         provenance["sh_degree"] = math.isqrt(filed) - 1  # of the files
     charge_joining(parts, width)
-    pieces = [vars(part) | {"extra": dict(part.extra)} for part in parts]
+    pieces: list[dict[str, Any]] = [vars(part) | {"extra": dict(part.extra)} for part in parts]
     parts.clear()
     shifts = [np.subtract(piece["origin"], origin) for piece in pieces]  # metres, float64
     means: list[np.ndarray | None] = [

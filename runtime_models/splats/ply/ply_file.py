@@ -156,24 +156,3 @@ def row_of(fields: list[list[str]], order: str, file: str) -> np.dtype | None:
     if len(set(names)) != len(names):
         raise BadFile(f"{file} names a property twice.")
     return np.dtype([(name, order + TYPES[kind]) for kind, name in fields])
-
-
-def read_table(path: Path, needed: tuple[str, ...], name: str = "vertex") -> np.ndarray:
-    """(N,) records of an element of a binary file, memory-mapped, with every column of `needed`.
-
-    Raises BadFile.
-    """
-    header = read_header(path)
-    if header.encoding == "ascii":
-        raise BadFile(f"{path.name} is an ASCII PLY; convert it to a binary one.")
-    element, begins = header.find(name)
-    element.require(needed, path.name)
-    return np.memmap(path, element.layout, "r", begins, (element.count,))
-
-
-def columns(table: np.ndarray, prefix: str, count: int) -> np.ndarray:
-    """(N, count) float32 of the columns prefix0, prefix1, ..."""
-    out = np.empty((len(table), count), np.float32)
-    for i in range(count):
-        out[:, i] = table[f"{prefix}{i}"]
-    return out

@@ -18,8 +18,8 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     checked_lens,
     world_from,
 )
+from shapeshift.scene.captures.foreign.read_blocks import finite, numbers_in, read_xml
 from shapeshift.scene.captures.foreign.read_realityscan import lens_of
-from shapeshift.scene.captures.foreign.xml_tree import finite, numbers_in, read_xml
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 
 MOST_FILES = 100_000
@@ -70,7 +70,7 @@ def xmp_lens(words: dict[str, str], size: tuple[int, int], where: str) -> Colmap
     each = numbers_in(bends, len(bends.split()), where)
     if model not in BROWN and any(each):
         return None
-    values = dict(zip(NAMES, each if model in BROWN else [], strict=False))
+    values: dict[str, float] = dict(zip(NAMES, each if model in BROWN else [], strict=False))
     for key, name in (
         ("f", "FocalLength35mm"),
         ("px", "PrincipalPointU"),

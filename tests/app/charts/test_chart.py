@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 from shapeshift.app import cli
 from shapeshift.app.charts import chart, decode_chart
 from shapeshift.app.charts.chart_measure import ChartRow, Pricing
-from shapeshift.app.charts.chart_picture import draw_chart, family, family_of, name_points
+from shapeshift.app.charts.chart_picture import (
+    draw_chart,
+    family,
+    family_of,
+    name_points,
+    pareto_front,
+)
 from shapeshift.app.charts.chart_rows import RowsFile
 from shapeshift.app.charts.chart_scene import (
     QUICK,
@@ -25,7 +31,6 @@ from shapeshift.app.charts.chart_scene import (
 )
 from shapeshift.app.charts.chart_settings import EXACT, SETTINGS, settings_of
 from shapeshift.app.charts.comparison import MOST_DB
-from shapeshift.app.charts.pareto import pareto_front
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.package.write_package import write_package
@@ -256,7 +261,7 @@ def test_a_whole_chart_is_what_a_budget_finds(package, tmp_path, monkeypatch):
 def test_scenes_stand_side_by_side():
     """Framed radii touch but do not overlap; the first stays; a shared model is one model."""
     small, large = make_random_model(60, seed=1), make_random_model(60, seed=2)
-    large = replace(large, anchors=large.anchors * 3 + np.float32([50, 2, 1]))
+    large = replace(large, anchors=large.anchors * 3 + np.array([50, 2, 1], np.float32))
     scene = side_by_side([Document.of(m) for m in (small, large, small)], 0.5)
     centres, radii = [], []
     for obj in scene.objects:

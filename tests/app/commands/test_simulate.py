@@ -173,7 +173,7 @@ def test_ctrl_c_leaves_whole_lines(tmp_path):
 
 
 def test_the_example_is_what_its_program_writes(tmp_path):
-    from shapeshift.training.synthetic.tabletop import write_example
+    from tools.synthetic.tabletop import write_example
 
     write_example(tmp_path)
     for path in sorted(p for p in tmp_path.rglob("*") if p.is_file()):

@@ -14,7 +14,6 @@ from shapeshift.decomposition.masks import sam_files
 from shapeshift.decomposition.masks.label_maps import SILENT, read_label_map, write_label_map
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.document.read_scene_file import read_scene_file
-from shapeshift.training.synthetic.labels import LABELS
 from tests.support.decomposition.demo_photos import (
     COUNT,
     SIZE,
@@ -25,6 +24,7 @@ from tests.support.decomposition.demo_photos import (
     write_demo_capture,
 )
 from tests.support.decomposition.sam_stand_ins import write_sam
+from tools.synthetic.labels import LABELS
 
 NAMES = ("cabinet", "mug")
 

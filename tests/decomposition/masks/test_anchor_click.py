@@ -10,7 +10,7 @@ from shapeshift.app.paths import DEMO
 from shapeshift.decomposition.masks.anchor_click import anchors_of, best_cut, grow, owners
 from shapeshift.decomposition.masks.anchor_walk import AnchorGraph, Nodes, make_graph, nodes_of
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.training.synthetic.labels import LABELS, labels_of_places
+from tools.synthetic.labels import LABELS, labels_of_places
 
 EYES = np.array([[0.0, 0.6, 1.8]])
 NOBODY = np.array([], int)

@@ -11,9 +11,9 @@ from shapeshift.decomposition.masks.specs import (
     ObjectSpecs,
     PhotoPrompt,
     read_specs,
-    write_specs,
 )
 from shapeshift.runtime_models.model import BadFile
+from tests.support.decomposition.spec_files import write_specs
 
 MUG = ObjectSpec(
     1,

@@ -3,18 +3,23 @@
 import numpy as np
 import pytest
 
+from shapeshift.decomposition.assemble import (
+    SNAP,
+    choose_proxy,
+    distinct,
+    is_within,
+    pressed,
+    slab,
+    without_diagonals,
+)
 from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.partition import LabelledView
-from shapeshift.decomposition.proxies.choose import choose_proxy
-from shapeshift.decomposition.proxies.ground import distinct, is_within, slab, without_diagonals
 from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
-from shapeshift.decomposition.proxies.standing import SNAP, pressed
-from shapeshift.decomposition.proxies.surface_scores import score_surfaces, surface_of
 from shapeshift.scene.colliders.collider import Collider, box_around
-from shapeshift.scene.colliders.collider_wrap import volume
+from shapeshift.scene.colliders.collider_wrap import is_watertight, volume
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
-from shapeshift.scene.colliders.stitch_mesh import is_watertight
 from shapeshift.scene.pose import View, look_at, perspective
+from tools.decomposition.surface_scores import score_surfaces, surface_of
 
 FLOOR = Plane(np.array([0.0, 1.0, 0.0]), 0.0)
 SIZE = (160, 120)
@@ -93,7 +98,9 @@ def test_distances_of_cubes_of_two_sizes():
 def test_faces_between_pieces_are_no_surface():
     left, right = (box_around(np.array([[x, -1, -1], [x + 1, 1, 1.0]])) for x in (-1, 0))
     halves = Collider((left.vertices - [1e-3, 0, 0], right.vertices), left)
-    overlapping = Collider((left.vertices + np.float32([0.1, 0, 0]), right.vertices), left)
+    overlapping = Collider(
+        (left.vertices + np.array([0.1, 0, 0], np.float32), right.vertices), left
+    )
     inner = np.abs(surface_of(overlapping)[:, 0]) < 0.05
     inner &= np.abs(surface_of(overlapping)[:, 1:]).max(1) < 0.99
     assert not inner.any()

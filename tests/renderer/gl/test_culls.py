@@ -10,12 +10,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.project import Projector
-from shapeshift.renderer.reference.reference import (
-    gate_object,
-    reference_counts,
-    reference_image,
-    reference_reasons,
-)
+from shapeshift.renderer.reference.reference import gate_object, reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate
@@ -23,6 +18,7 @@ from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 from tests.support.renderer.cull_scenes import FRONT, LIMITS, SCENES, THRESHOLDS, row_of
 from tests.support.renderer.gl_models import read
+from tests.support.renderer.reference_reasons import reference_counts, reference_reasons
 from tests.support.splat_scenes import (
     FIELDS,
     alone,

@@ -5,23 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.debug.classify import classify
 from shapeshift.renderer.debug.debug import (
-    DEBUG_NAMES,
     REASON_COLORS,
     debug_legend,
     object_color,
     object_poses,
 )
-from shapeshift.renderer.debug.debug_map import fit, heading
-from shapeshift.renderer.reference.reference import gate_object, reference_reasons
+from shapeshift.renderer.debug.debug_map import classify, fit, heading
+from shapeshift.renderer.reference.reference import gate_object
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.settings import CULL_REASONS, EDGES, RenderSettings
+from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, EDGES, RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer.cull_scenes import FRONT, LIMITS, SCENES, row_of
+from tests.support.renderer.reference_reasons import reference_reasons
 from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import (
     alone,
@@ -32,6 +31,8 @@ from tests.support.splat_scenes import (
     stereo_views,
     two_objects,
 )
+
+DEBUG_NAMES = [name for name in DEBUG_VIEWS if name]
 
 RENDERERS = EITHER_ON_GL
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.reference.surface_reference import reference_surface
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 from tests.support.renderer.renderers import EITHER_ON_GL
+from tests.support.renderer.surface_reference import reference_surface
 from tests.support.splat_scenes import alone, front_view, one_splat, shell, two_objects
 
 RENDERERS = EITHER_ON_GL

@@ -1,6 +1,7 @@
 """GLSL files: includes, defines, errors with file and line; and what holds for every shader."""
 
 import re
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,13 @@ FILES = sorted(
     if p.suffix in (".comp", ".vert", ".frag")
 )
 COMPUTE = [name for name in FILES if name.endswith(".comp")]
-MLP_DEFINES = {"LAYER_VECS": 16, "BLOCK_VECS": 1024, "STORED_WEIGHTS": 0}
+NO_DRIVER: Any = None
+DECODER = {"LAYER_VECS": 16, "BLOCK_VECS": 1024, "STORED_WEIGHTS": 0, "OWN_CONTROL": 0}
+NEEDS = {  # of shaders that say so at their head
+    "decode_mlp.comp": DECODER,
+    "colors/heat.comp": {"BLEND": 0},
+    "weigh.comp": {"OWN_CONTROL": 0},
+}
 
 
 @pytest.fixture
@@ -79,8 +86,32 @@ def test_a_fragment_error_is_not_looked_up_in_the_vertex_file(ctx, folder):
 
 @pytest.mark.parametrize("name", COMPUTE)
 def test_every_compute_shader_compiles(gpu, name):
-    defines = MLP_DEFINES if name == "decode_mlp.comp" else {}
+    defines = NEEDS.get(name, {})
     assert gpu.compute(name, **defines) is gpu.compute(name, **defines)
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_a_shader_that_is_not_given_what_it_needs_says_the_name(name):
+    """Before a driver sees it: some take a name that nobody has defined for 0."""
+    needed = list(NEEDS[name])[-1]
+    with pytest.raises(shader.ShaderError, match=rf"^{name}:\d+: #if {needed}, which nobody"):
+        shader.compile_compute(NO_DRIVER, name, **dict(list(NEEDS[name].items())[:-1]))
+
+
+def test_a_condition_of_an_include_names_that_file(folder):
+    (folder / "a.vert").write_text("void main() {}\n")
+    (folder / "common" / "outer.glsl").write_text("\n#if TWOO == 2  // once TWO\n#endif\n")
+    (folder / "a.frag").write_text('#include "common/outer.glsl"\nvoid main() {}\n')
+    with pytest.raises(shader.ShaderError, match=r"^common/outer\.glsl:2: #if TWOO, which nobody"):
+        shader.compile_program(NO_DRIVER, "a.vert", "a.frag", folder, TWO=2)
+
+
+def test_chunks_of_the_renderer_are_there_for_other_folders(folder):
+    """As vr/shaders has them; a file of that folder's own comes first."""
+    (folder / "b.frag").write_text('#include "common/finite.glsl"\n#include "common/inner.glsl"\n')
+    files = {file for file, _, _ in shader.read_shader("b.frag", folder)}
+    assert files == {"<defines>", "common/finite.glsl", "common/inner.glsl"}
+    assert shader.read_shader("full.vert", folder) == shader.read_shader("full.vert")
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.reference.reference import reference_image
-from shapeshift.renderer.reference.surface_reference import reference_surface
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 from tests.support.renderer.renderers import EITHER_ON_GL
+from tests.support.renderer.surface_reference import reference_surface
 from tests.support.splat_scenes import (
     alone,
     front_view,

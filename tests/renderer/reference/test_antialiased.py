@@ -5,15 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.debug.classify import classify
 from shapeshift.renderer.debug.debug import object_poses
-from shapeshift.renderer.reference.reference import (
-    gate_object,
-    project_object,
-    reference_counts,
-    reference_image,
-    reference_reasons,
-)
+from shapeshift.renderer.debug.debug_map import classify
+from shapeshift.renderer.reference.reference import gate_object, reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.splats.formats import read_plain
@@ -30,6 +24,11 @@ from tests.support.renderer.antialiased_scenes import (
     check_frame,
     decoded_all,
     thin,
+)
+from tests.support.renderer.reference_reasons import (
+    project_object,
+    reference_counts,
+    reference_reasons,
 )
 from tests.support.splat_scenes import (
     alone,

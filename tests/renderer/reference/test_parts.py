@@ -9,11 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shapeshift.renderer.debug.classify import classify
-from shapeshift.renderer.reference.reference import reference_image, reference_reasons
+from shapeshift.renderer.debug.debug_map import classify
+from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from tests.support.renderer.frames import draw
+from tests.support.renderer.reference_reasons import reference_reasons
 from tests.support.renderer.renderers import TILES, quads
 from tests.support.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model
 

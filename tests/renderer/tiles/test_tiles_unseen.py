@@ -7,13 +7,13 @@ import pytest
 
 from shapeshift.rasterizer.clusters.clusters import CLUSTER, bound_clusters
 from shapeshift.rasterizer.project_arena import Limits, clusters_unseen, project_arena
-from shapeshift.renderer.reference.reference import reference_counts
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.tiles import culling
+from shapeshift.renderer.tiles import arena as culling
 from shapeshift.renderer.tiles.inputs import camera_of
 from shapeshift.scene.pose import HiddenMesh, Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer import poison
+from tests.support.renderer.reference_reasons import reference_counts
 from tests.support.splat_scenes import only, random_layers, two_objects
 
 LEAST = 1 / 255

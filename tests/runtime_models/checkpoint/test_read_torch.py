@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.checkpoint.read_torch import (
-    is_torch_archive,
     read_script,
     read_tensors,
 )
@@ -94,8 +93,6 @@ def test_what_we_write_by_hand_is_read_back(tmp_path):
 def test_old_files_and_other_files_are_refused_by_name(tmp_path):
     with pytest.raises(BadFile, match=r"before version 1\.6.*save it again"):
         read_tensors(FIXTURES / "torch_old.pth")
-    assert is_torch_archive(FIXTURES / "torch_kinds.pth")
-    assert not is_torch_archive(FIXTURES / "torch_old.pth")
     for data in (b"", b"PK", b"\x00" * 50, b"PK\x03\x04" + b"\x00" * 60):
         path = tmp_path / "bad.pt"
         path.write_bytes(data)
@@ -185,7 +182,9 @@ def test_setstate_is_never_looked_for(tmp_path):
     state = b"}(" + made.text("__setstate__") + made.text("os.system") + made.text("w") + weight
     body = b"c__torch__.A\nB\n)\x81" + state + b"ub"
     path = tmp_path / "a.pt"
-    path.write_bytes(made.archive(made.program(body), {"0": np.float32([1, 2]).tobytes()}))
+    path.write_bytes(
+        made.archive(made.program(body), {"0": np.array([1, 2], np.float32).tobytes()})
+    )
     found = read_tensors(path)
     assert list(found) == ["w"]
     assert found["w"].tolist() == [1, 2]

@@ -10,7 +10,6 @@ import pytest
 
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.runtime_models.lint.invalid_rows import invalid_rows
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import format_of, read_plain, read_raw
@@ -20,6 +19,7 @@ from shapeshift.runtime_models.splats.spz.spz_axes import axes_extension
 from shapeshift.runtime_models.splats.spz.spz_file import is_spz
 from shapeshift.scene.pose import View, look_at
 from tests.support.splat_scenes import alone, psnr_db
+from tests.support.splats.lint_scenes import invalid_rows
 from tests.support.splats.spz_files import legacy, modern, random_streams, splat_by_hand
 
 BIKER = View(look_at((0.5, 1.2, -3), (0, 1.0, 0)), (-0.25, 0.25, -0.4, 0.4), 0.05, 50, (160, 256))

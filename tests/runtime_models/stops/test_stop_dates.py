@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from shapeshift.runtime_models.stop_dates import (
     LEAST_GAP,
     calendar_ticks,
     check_dates,
-    date_at,
     places_of,
     read_date,
     seconds_of,
@@ -66,8 +64,6 @@ def test_x_of_a_date_is_even_in_time_and_a_day_means_its_stop():
     assert x_of_date("2026-01-06", stops) == pytest.approx(5 / 360.5, abs=1e-12)
     assert x_of_date("2026-01-06T12:00+02:00", stops) == pytest.approx(5.41666667 / 360.5)
     assert parse_control("2026-01-06", stops) == pytest.approx(5 / 360.5)
-    assert date_at(5 / 360.5, stops) == datetime(2026, 1, 6, tzinfo=UTC)
-    assert date_at(0.5, stops[:1]) is None
     for text in ("2025-12-31", "2027-01-01"):
         with pytest.raises(ValueError, match="is outside of 2026-01-01 to 2026-12-27T12:00"):
             parse_control(text, stops)

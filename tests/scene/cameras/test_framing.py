@@ -15,7 +15,6 @@ from shapeshift.scene.cameras.framing import (
     frame_points,
     framing_view,
     orbit_path,
-    point_under,
     scene_points,
 )
 from shapeshift.scene.pose import Pose, View, look_at
@@ -143,23 +142,6 @@ def test_scene_points_are_in_the_world_and_of_visible_objects_only():
     np.testing.assert_allclose(means, [[-1, 0, 10]], atol=1e-6)
     assert opacity.shape == (1,)
     assert scene_points(Scene(()))[0].shape == (0, 3)
-
-
-@pytest.mark.parametrize(("count", "close"), [(1000, 0.2), (5000, 0.1), (50000, 0.02)])
-def test_point_under_is_the_near_side_whatever_the_density(count, close):
-    points, eye = ball(count), np.array([0, 0, 5.0])
-    for x, y in [(0, 0), (0.1, 0.05), (-0.1, 0.1)]:
-        hit = point_under(points, np.ones(count), eye, np.array([x, y, -2.0]))
-        assert np.cross(hit - eye, [x, y, -2.0]) == pytest.approx(np.zeros(3), abs=1e-9)
-        assert np.linalg.norm(hit) == pytest.approx(1, abs=close) and hit[2] > 0
-
-
-def test_point_under_is_none_beside_behind_and_where_all_is_faint():
-    points, opacity, eye = ball(), np.ones(2000), np.array([0, 0, 5.0])
-    assert point_under(points, opacity, eye, np.array([0, 0, 1.0])) is None
-    assert point_under(points, opacity, eye, np.array([1, 0, -1.0])) is None
-    assert point_under(points, opacity * 0.1, eye, np.array([0, 0, -1.0])) is None
-    assert point_under(points * np.nan, opacity, eye, np.array([0, 0, -1.0])) is None
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.stop_dates import date_at, x_of_date
+from shapeshift.runtime_models.stop_dates import x_of_date
 from shapeshift.scene.captures.capture_rules import spread_stops
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
@@ -88,4 +88,3 @@ def test_dates_go_through_training_into_the_package_and_through_the_capture_form
     stops = read_model(tmp_path / "a.shift").stops
     assert [stop.date for stop in stops] == list(DAYS)
     assert x_of_date("2026-04-25", stops) == pytest.approx(0.55)
-    assert str(date_at(0.55, stops))[:10] == "2026-04-25"

@@ -7,10 +7,9 @@ from PIL import Image
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
-from shapeshift.training.photos import load_photos
-from shapeshift.training.synthetic.strangers import make_stranger
-from shapeshift.training.view_checks import validate_views
+from shapeshift.training.photos import load_photos, validate_views
 from tests.support.scene.captures import colmap_model, simple, write_transforms
+from tools.synthetic.strangers import make_stranger
 
 SIZE = (80, 60)
 X, Y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)

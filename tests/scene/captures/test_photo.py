@@ -9,7 +9,7 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.photo import area_weights, load_photo
+from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.pose import Pose, View
 from tests.support.scene.captures import (
     save_image,
@@ -44,15 +44,6 @@ def test_alpha_is_the_mask_and_a_mask_file_goes_before_it(tmp_path):
     assert np.abs(rgb - over_black).max() <= 1
     with pytest.raises(BadFile, match="mask has 5x5 pixels, the photo 16x12"):
         load_photo(photo_at(path, save_image(tmp_path / "s.png", (5, 5), mode="L")))
-
-
-@pytest.mark.parametrize("old, new", [(8, 4), (7, 3), (5, 5), (4, 7), (1, 3), (3, 1)])
-def test_shrinking_is_the_mean_over_the_area(old, new):
-    """The twin: every old pixel as many equal cells, the new ones their plain means."""
-    row = np.random.default_rng(old).random(old)
-    cells = np.repeat(row, new)  # old * new cells, so both grids fall on them
-    np.testing.assert_allclose(area_weights(old, new) @ row, cells.reshape(new, old).mean(1), 1e-6)
-    np.testing.assert_allclose(area_weights(old, new).sum(1), 1, 1e-6)
 
 
 SIZES = [(16, 12), (17, 13), (19, 12), (7, 7), (3, 40), (1, 1)]

@@ -13,15 +13,13 @@ from shapeshift.scene.colliders.collider import (
     Collider,
     Making,
     collider_of_mesh,
-    mass_properties,
     parts_volume,
 )
 from shapeshift.scene.colliders.collider_pieces import hull_faces, read_pieces, write_collider
-from shapeshift.scene.colliders.collider_wrap import volume
-from shapeshift.scene.colliders.stitch_mesh import is_watertight
+from shapeshift.scene.colliders.collider_wrap import is_watertight, volume
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.document.read_scene_file import read_scene_file
-from tests.support.scene.collider_shapes import shapes
+from tests.support.scene.collider_shapes import shapes, solid
 
 ROOT = Path(__file__).resolve().parents[3]
 ASSETS = ROOT / "assets"
@@ -58,7 +56,7 @@ def test_a_collider_is_the_same_after_a_file(tmp_path):
     assert (tmp_path / "a.glb").read_bytes() == first
     found = collider_of_mesh(tmp_path / "a.glb")
     assert corners(found) == corners(Collider(hulls, skin))
-    assert mass_properties(found, 2.0).volume_m3 == pytest.approx(0.002, rel=1e-5)
+    assert solid(found).volume == pytest.approx(0.002, rel=1e-5)
     assert trimesh.load_scene(tmp_path / "a.glb").geometry.keys() == {
         "collider", "UCX_collider_00", "UCX_collider_01"}  # fmt: skip
 
@@ -194,13 +192,13 @@ def test_the_touch_scene_needs_no_collider_to_be_made(monkeypatch):
 
 @pytest.mark.slow
 def test_the_shipped_colliders_are_what_the_program_makes(tmp_path):
-    from shapeshift.training.synthetic.tabletop import write_colliders, write_example
+    from tools.synthetic.tabletop import write_colliders, write_example
 
     write_example(tmp_path)
     write_colliders(tmp_path)
     for name in ("ball", "ring"):
         made, kept = (collider_of_mesh(f / f"touch/{name}.glb") for f in (tmp_path, ASSETS))
         assert parts_volume(made) == pytest.approx(parts_volume(kept), rel=0.05)
-        one, two = (mass_properties(c, 1.0) for c in (made, kept))
-        assert one.volume_m3 == pytest.approx(two.volume_m3, rel=0.01)
-        np.testing.assert_allclose(one.centre, two.centre, atol=1e-4)
+        one, two = (solid(c) for c in (made, kept))
+        assert one.volume == pytest.approx(two.volume, rel=0.01)
+        np.testing.assert_allclose(one.center_mass, two.center_mass, atol=1e-4)

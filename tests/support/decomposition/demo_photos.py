@@ -16,8 +16,8 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import View
-from shapeshift.training.synthetic.labels import label_map
 from shapeshift.training.synthetic.workshop import dome
+from tools.synthetic.labels import label_map
 
 SIZE = (192, 144)
 COUNT = 8

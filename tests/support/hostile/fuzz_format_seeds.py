@@ -76,8 +76,8 @@ def mask_seeds(folder: Path) -> list[Seed]:
         ObjectSpecs,
         PhotoPrompt,
         read_specs,
-        write_specs,
     )
+    from tests.support.decomposition.spec_files import write_specs
 
     prompts = (PhotoPrompt("rgb/1.png", (1, 2, 30.5, 40), ((3, 4),), ((5, 6),)),
                PhotoPrompt("rgb/2.png", mask="masks/2.png", mask_label=3))  # fmt: skip

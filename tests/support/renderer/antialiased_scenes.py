@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.renderer.reference.reference import (
-    reference_counts,
-    reference_image,
-)
+from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
+from tests.support.renderer.reference_reasons import reference_counts
 from tests.support.splat_scenes import (
     alone,
     front_view,
@@ -52,7 +50,7 @@ def mixed(count: int = 3000) -> Scene:
 def flat(count: int) -> SplatLayers:
     """Needles, discs and balls, some of no extent at all."""
     rng = np.random.default_rng(8)
-    sizes = np.float32([0, 1e-12, 0.003, 0.05, 0.3])
+    sizes = np.array([0, 1e-12, 0.003, 0.05, 0.3], np.float32)
     return replace(thin(count, 7), scales=rng.choice(sizes, (count, 3)))
 
 

@@ -7,6 +7,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from shapeshift.runtime_models.rotation import quaternions_of
+from shapeshift.scene.colliders.collider import Collider
 
 
 @dataclass(frozen=True)
@@ -86,3 +87,7 @@ def distances(mesh: trimesh.Trimesh, other: trimesh.Trimesh, count: int = 20000)
     b, _ = trimesh.sample.sample_surface(other, count, seed=2)
     there, back = cKDTree(b).query(a)[0], cKDTree(a).query(b)[0]
     return (there.mean() + back.mean()) / 2, max(there.max(), back.max())
+
+
+def solid(collider: Collider) -> trimesh.Trimesh:
+    return trimesh.Trimesh(collider.mesh.vertices, collider.mesh.faces, process=False)

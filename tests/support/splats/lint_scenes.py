@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.runtime_models.files.blocks import each_block
 from shapeshift.runtime_models.lint.lint import judge
+from shapeshift.runtime_models.splats.operations.activate import any_invalid, invalid_in
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, RawSplats, Reading
 from tests.support.splats.ply_files import some_splats
 
@@ -38,3 +40,20 @@ def raw_splats(count: int, coefficients: int = 4, seed: int = 0, **coding) -> Ra
 def copied(raw: RawSplats) -> RawSplats:
     names = ("means", "scales", "wxyz", "opacity", "sh")
     return replace(raw, **{name: getattr(raw, name).copy() for name in names})
+
+
+def invalid_rows(raw: RawSplats) -> np.ndarray:
+    """(K,) rising rows with a number that is not usual as it is filed.
+
+    NaN or Inf anywhere, a quaternion of next to no or of boundless length, a scale or opacity that
+    its coding does not have.  A block is judged by its least and largest numbers; only where those
+    are odd is it looked at row by row.
+    """
+    found: list[np.ndarray] = []
+
+    def look(rows: slice, _: None) -> None:
+        if any_invalid(raw, rows):
+            found.append(rows.start + np.flatnonzero(invalid_in(raw, rows)))
+
+    each_block(len(raw.means), look)
+    return np.sort(np.concatenate(found)) if found else np.empty(0, np.intp)

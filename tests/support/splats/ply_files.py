@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.ply_file import read_header
 
 CODES = {"float": "f", "double": "d", "uchar": "B", "short": "h", "int": "i"}
 
@@ -72,3 +74,16 @@ def sh_of(row: dict, coefficients: int) -> list[list[float]]:
     rest = coefficients - 1
     first = [[row["f_dc_0"], row["f_dc_1"], row["f_dc_2"]]]
     return first + [[row[f"f_rest_{c * rest + j}"] for c in range(3)] for j in range(rest)]
+
+
+def read_table(path: Path, needed: tuple[str, ...], name: str = "vertex") -> np.ndarray:
+    """(N,) records of an element of a binary file, memory-mapped, with every column of `needed`.
+
+    Raises BadFile.
+    """
+    header = read_header(path)
+    if header.encoding == "ascii":
+        raise BadFile(f"{path.name} is an ASCII PLY; convert it to a binary one.")
+    element, begins = header.find(name)
+    element.require(needed, path.name)
+    return np.memmap(path, element.layout, "r", begins, (element.count,))

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.heads.networks import HeadLayout, initial_weights
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
-from shapeshift.training.reference import decode_reference, step_loss_reference
 from shapeshift.training.step import TrainingStep
+from tests.support.renderer.rasterizer_reference import finite_differences
+from tests.support.training.reference import decode_reference, step_loss_reference
 
 LAYOUT = HeadLayout(
     splats=2, features=8, hidden=8, control=4, attributes=("frame", "color", "light")

@@ -18,7 +18,6 @@ def main(drawing: str) -> None:
     sys.path.insert(0, str(ROOT))
     from shapeshift.app.headset.eyes import Eyes
     from shapeshift.renderer.gl.context import open_context
-    from shapeshift.renderer.reference.surface_reference import reference_surface
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.renderer.settings import RenderSettings
     from shapeshift.scene.pose import Pose
@@ -28,6 +27,7 @@ def main(drawing: str) -> None:
     from shapeshift.vr.locomotion.play_space import PlaySpace
     from shapeshift.vr.openxr.instance import Instance
     from shapeshift.vr.openxr.session import Session
+    from tests.support.renderer.surface_reference import reference_surface
     from tests.support.splat_scenes import alone, shell
 
     scene, scale = alone(shell(700)), 2.0  # metres of the world a metre of the room

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import finite_differences
-from shapeshift.training.baselines.plain_reference import decode_plain_reference
 from shapeshift.training.baselines.plain_step import (
     GROUPS,
     REST,
@@ -14,8 +12,9 @@ from shapeshift.training.baselines.plain_step import (
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
-from shapeshift.training.reference import step_loss_reference
+from tests.support.renderer.rasterizer_reference import finite_differences
 from tests.support.training.plain_situations import SIZE, situation
+from tests.support.training.reference import decode_plain_reference, step_loss_reference
 
 BACKGROUND = (0.2, 0.5, 0.9)
 SHARES = SSIM_SHARE, 0.0  # no loss of faint splats

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.training.baselines.plain import one_modality
 from shapeshift.training.calibration.extrinsics import (
     about_pivot,
@@ -29,11 +28,12 @@ from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
 from shapeshift.training.photos import LoadedPhoto
-from shapeshift.training.reference import decode_reference, step_loss_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.renderer.rasterizer_reference import finite_differences
+from tests.support.training.reference import decode_reference, step_loss_reference
 from tests.support.training.situations import (
     BACKGROUND,
     LAYOUT,

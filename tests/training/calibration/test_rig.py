@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.device import open_device
-from shapeshift.rasterizer.reference import finite_differences, render_reference
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.read_capture import read_capture
@@ -33,7 +32,8 @@ from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
-from shapeshift.training.synthetic.strangers import make_stranger
+from tests.support.renderer.rasterizer_reference import finite_differences, render_reference
+from tools.synthetic.strangers import make_stranger
 
 RNG = np.random.default_rng
 TWICE = f'{{"RGB": {(2 * np.eye(4)).ravel().tolist()}}}'

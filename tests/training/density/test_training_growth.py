@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.density.densify import (
     GRAD2D_THRESHOLD,
     LEAST_STEPS,
+    DensificationStats,
     NewAnchors,
     absent_as_nan,
+    anchor_cap,
     densify_and_prune,
     largest_gradient,
     least_contributing,
@@ -22,15 +22,15 @@ from shapeshift.training.density.densify import (
     resize_optimizer_state,
     transparent_anchors,
 )
-from shapeshift.training.density.density_budget import anchor_cap
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
+from tests.support.renderer.rasterizer_reference import render_reference
+from tests.support.training.reference import decode_reference
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 RNG = np.random.default_rng

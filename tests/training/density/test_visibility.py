@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import render_reference
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of, draw_splats
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.step import TrainingStep
-from shapeshift.training.visibility import LOOK, Visibility
+from shapeshift.training.step import LOOK, TrainingStep, Visibility
+from tests.support.renderer.rasterizer_reference import render_reference
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 RNG = np.random.default_rng

@@ -11,14 +11,14 @@ from shapeshift.training.first_anchors.hull import (
     FINEST,
     Silhouette,
     contradicting,
+    median_neighbour,
     uncovered,
     visual_hull,
     visual_hulls,
 )
-from shapeshift.training.first_anchors.spacing import median_neighbour
 from shapeshift.training.first_anchors.views import common_box, pixel_of, pixel_size
 from shapeshift.training.photos import LoadedPhoto
-from shapeshift.training.synthetic.strangers import KINDS
+from tools.synthetic.strangers import KINDS
 
 RNG = np.random.default_rng
 CENTRE, RADIUS = np.array([0, 0.22, 0]), 0.3

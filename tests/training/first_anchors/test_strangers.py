@@ -11,7 +11,8 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import Pose
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.photo_store.open_photos import open_photos
-from shapeshift.training.synthetic.strangers import (
+from shapeshift.training.synthetic.tracer import Place, photograph, pixel_rays, trace
+from tools.synthetic.strangers import (
     EXIF_ORIENTATION,
     KINDS,
     ON_ITS_SIDE,
@@ -20,7 +21,6 @@ from shapeshift.training.synthetic.strangers import (
     radiance,
     straightened,
 )
-from shapeshift.training.synthetic.tracer import Place, photograph, pixel_rays, trace
 
 SIZE, COUNT = (96, 72), 16
 

@@ -15,7 +15,7 @@ from shapeshift.training.first_anchors.initial import (
 )
 from shapeshift.training.first_anchors.views import common_box, distance_of, pixel_of, seen_first
 from shapeshift.training.photos import LoadedPhoto
-from shapeshift.training.synthetic.strangers import KINDS
+from tools.synthetic.strangers import KINDS
 
 SIZE = (64, 48)
 

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import Mlp
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.metrics import psnr
-from shapeshift.training.fit.view_metrics import largest_contribution, outline_ious, view_psnr
+from shapeshift.training.fit.fit import largest_contribution, outline_ious, view_psnr
 from shapeshift.training.photos import LoadedPhoto
 from tests.support.models import make_random_model, without_control
+from tests.support.renderer.rasterizer_reference import render_reference
 
 SIZE = (40, 30)
 SHAPE_HEADS = ("offset", "scale", "rotation", "opacity")

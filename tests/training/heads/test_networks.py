@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
 from shapeshift.runtime_models.package.read_package import read_files
@@ -21,13 +20,14 @@ from shapeshift.training.heads.networks import (
     initial_weights,
     padded,
 )
-from shapeshift.training.reference import (
+from tests.support.models import psi_of
+from tests.support.renderer.rasterizer_reference import finite_differences
+from tests.support.training.reference import (
     activate_reference,
     directions,
     head_inputs,
     heads_reference,
 )
-from tests.support.models import psi_of
 
 FORMS = ("cpu", "gpu")
 VOXEL = 0.05

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.reference import finite_differences
-from shapeshift.renderer.tiles.heads import uncovered
+from shapeshift.renderer.tiles.slot import uncovered
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import ControlEncoding, Stop
 from shapeshift.runtime_models.package.feature_codes import EXACT
@@ -20,8 +19,9 @@ from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import MOST_STOP_COLORS, HeadLayout, initial_weights
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
-from shapeshift.training.reference import decode_reference, step_loss_reference
 from shapeshift.training.step import TrainingStep
+from tests.support.renderer.rasterizer_reference import finite_differences
+from tests.support.training.reference import decode_reference, step_loss_reference
 from tests.support.training.situations import (
     BACKGROUND,
     LAYOUT,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shapeshift.training.heads.networks import HeadLayout
-from shapeshift.training.memory import step_memory
+from tools.app.step_memory import step_memory
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -27,8 +27,8 @@ from shapeshift.training.supervision.still_background import (
     still_background,
     still_share,
 )
-from shapeshift.training.synthetic.strangers import KINDS, make_stranger, mask_of
 from shapeshift.training.train import Trainer
+from tools.synthetic.strangers import KINDS, make_stranger, mask_of
 
 RNG = np.random.default_rng
 SIZE = (48, 40)

@@ -8,7 +8,7 @@ from PIL import Image
 
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.photos import LoadedPhoto, load_photos
-from shapeshift.training.supervision.still_picture import (
+from shapeshift.training.supervision.still_background import (
     FEWEST,
     LEAST_TOLERANCE,
     STILL,
@@ -17,7 +17,7 @@ from shapeshift.training.supervision.still_picture import (
     subject_mask,
     tolerance_of,
 )
-from shapeshift.training.synthetic.strangers import KINDS, make_stranger, mask_of
+from tools.synthetic.strangers import KINDS, make_stranger, mask_of
 
 RNG = np.random.default_rng
 SIZE = (24, 32)  # rows, columns

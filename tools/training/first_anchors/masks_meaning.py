@@ -3,7 +3,7 @@
     python3 tools/training/first_anchors/masks_meaning.py --out docs/bench/masks_meaning.csv \
         [--seconds 20] [--masks object valid] [--seeds 0]
 
-Two kinds of training/synthetic/strangers.py whose files do not say what their masks mean: cut_out,
+Two kinds of tools/synthetic/strangers.py whose files do not say what their masks mean: cut_out,
 an object before a wall, and passers, a room in which somebody stands in every photo; the column
 auto is what their shapes tell the reader.  psnr_db is against what the tracer shows from the places
 of the held-out photos without the wall and without the people, not against the photos; worst_db of
@@ -26,15 +26,15 @@ from strangers import begun_rows, draw  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
-from shapeshift.training.settings import TrainSettings  # noqa: E402
-from shapeshift.training.synthetic.strangers import (  # noqa: E402
+from shapeshift.training.settings import Masks, TrainSettings  # noqa: E402
+from shapeshift.training.synthetic.tracer import Place, photograph  # noqa: E402
+from shapeshift.training.train import Trainer  # noqa: E402
+from tools.synthetic.strangers import (  # noqa: E402
     BLACK,
     KINDS,
     make_stranger,
     radiance,
 )
-from shapeshift.training.synthetic.tracer import Place, photograph  # noqa: E402
-from shapeshift.training.train import Trainer  # noqa: E402
 
 COLUMNS = (
     "capture", "seed", "auto", "masks", "psnr_db", "worst_db", "seconds", "steps", "count", "said",
@@ -48,7 +48,7 @@ def truths(name: str, place: Place, views: list) -> list[np.ndarray]:
     return [photograph(view, along)[0] for view in views]
 
 
-def trained(device, folder: Path, masks: str, options, seed: int, made: tuple) -> dict:
+def trained(device, folder: Path, masks: Masks, options, seed: int, made: tuple) -> dict:
     capture = read_capture(folder)
     settings = TrainSettings(iterations=None, seconds=options.seconds, seed=seed, masks=masks)
     run = Trainer(device, capture, settings)

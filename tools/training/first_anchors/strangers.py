@@ -3,7 +3,7 @@
     python3 tools/training/first_anchors/strangers.py --out docs/bench/strangers.csv \
         [--seconds 20] [--kinds room aerial ...] [--seeds 0] [--models anchors splats]
 
-Kinds are those of training/synthetic/strangers.py, each another place for another seed, made on the
+Kinds are those of tools/synthetic/strangers.py, each another place for another seed, made on the
 spot and read as a stranger's files are.  Both models have the same processor seconds of one core
 and start from what the program itself finds.  psnr_db: of all held-out photos; worst_db: of the
 worst of them; fitted_db: of their right halves, with the colours fitted on the left ones, which is
@@ -44,9 +44,9 @@ from shapeshift.training.photos import BLACK  # noqa: E402
 from shapeshift.training.settings import TrainSettings, suited  # noqa: E402
 from shapeshift.training.supervision.exposure import fitted_psnr  # noqa: E402
 from shapeshift.training.supervision.still_background import key_of  # noqa: E402
-from shapeshift.training.synthetic.strangers import KINDS, make_stranger, mask_of  # noqa: E402
 from shapeshift.training.synthetic.tracer import Place  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
+from tools.synthetic.strangers import KINDS, make_stranger, mask_of  # noqa: E402
 
 COLUMNS = (
     "capture", "seed", "model", "psnr_db", "worst_db", "fitted_db", "whole_db", "subject_db",

@@ -90,11 +90,6 @@ def rows_by_label(model: Model) -> dict[str, np.ndarray]:
     return {names.get(n, f"object {n}"): labels == n for n in found}
 
 
-def anchor_count(model: Model) -> int:
-    """A: anchors, or of plain splats all of them."""
-    return len(model.means if isinstance(model, SplatLayers) else model.anchors)
-
-
 def check_pieces(model: Model) -> None:
     """Raises BadFile, one sentence, for a model that has no parts."""
     if isinstance(model, ScaffoldModel):

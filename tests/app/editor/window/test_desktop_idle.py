@@ -82,7 +82,7 @@ def test_an_event_draws_the_overlay_and_then_it_rests_again(viewer, monkeypatch)
     viewer.window.on_key(viewer.window.handle, glfw.KEY_F9, 0, glfw.PRESS, 0)  # a key of nothing
     frames, draws, presents = rounds.go()
     assert 0 < frames < WAITS / 2 and draws == 0
-    assert presents == (0 if viewer.window.presented.keeps else frames)  # kept: not even resolved
+    assert presents == (0 if viewer.window.presented.kept else frames)  # kept: not even resolved
 
 
 def hide(viewer, display) -> None:

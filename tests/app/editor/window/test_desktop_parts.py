@@ -14,12 +14,12 @@ from shapeshift.app.editor.state.parts.selecting import ALL
 from shapeshift.app.paths import DEMO
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.document.scene_file import BACKGROUND
-from shapeshift.training.synthetic.labels import LABELS, labels_of_places
 from tests.support.desktop.desktop_stand import PlainRenderer, run_frames
 from tests.support.desktop.objects_stand import names, place_of
 from tests.support.desktop.real_hands import RealHands
 from tests.support.desktop.scene_stand import hands_on, read, viewer_on
 from tests.support.desktop.widgets import Widgets
+from tools.synthetic.labels import LABELS, labels_of_places
 
 
 @pytest.fixture(scope="module")

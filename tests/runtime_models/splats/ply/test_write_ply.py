@@ -10,10 +10,16 @@ from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
 from shapeshift.runtime_models.splats.plain_splats import Reading
-from shapeshift.runtime_models.splats.ply.ply_file import read_header, read_table
+from shapeshift.runtime_models.splats.ply.ply_file import read_header
 from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.support.splats.ply_files import names_of, random_rows, some_splats, write_rows
+from tests.support.splats.ply_files import (
+    names_of,
+    random_rows,
+    read_table,
+    some_splats,
+    write_rows,
+)
 
 
 def ulps(a: np.ndarray, b: np.ndarray) -> np.ndarray:
