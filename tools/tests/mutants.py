@@ -6,15 +6,17 @@
 
 tools/tests/mutants.csv has them: the text of a line before and after, what that breaks in a word,
 and the test files that are to notice.  Each is put into a copy of the checkout, where these files
-run first, and where they notice nothing, the files that lie nearest by imports.  A row is written
-as soon as it is known, so that an interrupted run goes on where it was.  A text is looked for with
-any white space between its words, in its file or, where that is gone, in all of the same ending.
+run first; where they notice nothing, the files that lie nearest by imports; then what is slow in
+those that are named.  A row is written as soon as it is known, so that an interrupted run goes on
+where it was.  A text is looked for with any white space between its words, in its file or, where
+that is gone, in all of the same ending.
 """
 
 import argparse
 import csv
 import io
 import os
+import platform
 import re
 import resource
 import shutil
@@ -43,11 +45,11 @@ LIST = Path(__file__).with_name("mutants.csv")
 OUT = ROOT / "docs" / "bench" / "mutants.csv"
 COMMAND = "# python3 tools/tests/mutants.py --all"
 PATIENCE_S = 900.0  # of all tests of a mutant
-NAMED, FARTHER = "named", "farther"
+NAMED, FARTHER, SLOW = WAYS = "named", "farther", "slow"
 MOST_FARTHER = 8  # files, the nearest by imports, that run where the named ones notice nothing
 LONG = ("tests/slow/", "tests/xr/")
-CAUGHT, MISSED, BROKEN = "caught", "missed", "broken"
-FAILED = 1  # the exit code of pytest where a test failed
+CAUGHT, MISSED, BROKEN, GONE = "caught", "missed", "broken", "gone"
+FAILED, NOTHING_FAILED = 1, (0, 5)  # exit codes of pytest; 5: no test was chosen
 FAILURE = re.compile(r"^(?:FAILED|ERROR) (\S+?)(?:::| -|$)", re.M)
 OF_THE_COPY = """from pathlib import Path
 
@@ -91,9 +93,9 @@ class Row:
     name: str
     file: str
     breaks: str
-    result: str  # CAUGHT, MISSED or BROKEN
+    result: str  # CAUGHT; MISSED; BROKEN: the tests end otherwise; GONE: there is no such line
     by: str  # the first test that failed
-    way: str  # NAMED tests, or FARTHER ones: by imports
+    way: str  # NAMED tests, FARTHER ones by imports, or those that are named with --slow
     cpu_s: str
 
 
@@ -117,7 +119,8 @@ def write_rows(rows: dict[str, Row], mutants: list[Mutant], path: Path) -> None:
     writer = csv.DictWriter(held, names, lineterminator="\n")
     writer.writeheader()
     writer.writerows(asdict(rows[m.name]) for m in mutants if m.name in rows)
-    write_whole(path, f"{COMMAND}\n{held.getvalue()}".encode())
+    machine = f"# {platform.machine()}, {os.cpu_count()} cores"
+    write_whole(path, f"{COMMAND}\n{machine}\n{held.getvalue()}".encode())
 
 
 @contextmanager
@@ -184,8 +187,8 @@ def judge(mutant: Mutant, copy: Path, texts: dict[str, str], way: str, tests: li
     finally:
         (copy / file).write_text(texts[file], "utf-8")
     failed = FAILURE.search(said)
-    result = {0: MISSED, FAILED: CAUGHT}.get(code, BROKEN)
-    by = "" if not code else failed[1] if failed else said.strip()[-200:]
+    result = {FAILED: CAUGHT, **dict.fromkeys(NOTHING_FAILED, MISSED)}.get(code, BROKEN)
+    by = "" if result == MISSED else failed[1] if failed else said.strip()[-200:]
     return Row(mutant.name, file, mutant.breaks, result, by, way, f"{spent_s() - began:.0f}")
 
 
@@ -210,14 +213,21 @@ def run(
         texts = {
             path: (copy / path).read_text("utf-8")
             for path in checkout_files(ROOT)
-            if not path.startswith(("tests/", "tools/", "docs/")) and is_code(path)
+            if is_code(path) and (copy / path).is_file()
         }
-        for way, mutant in ((way, mutant) for way in (NAMED, FARTHER) for mutant in mutants):
-            row, named = rows.get(mutant.name), mutant.tests.split()
-            if row is not None and (way == NAMED or row.result != MISSED or row.way != NAMED):
+        for way, mutant in ((way, mutant) for way in WAYS for mutant in mutants):
+            row = rows.get(mutant.name)
+            if row and (row.result != MISSED or WAYS.index(row.way) >= WAYS.index(way)):
                 continue
-            tests = named if way == NAMED else farther_tests(used, mutant.applied(texts)[0], named)
-            row = rows[mutant.name] = judge(mutant, copy, texts, way, tests)
+            named = mutant.tests.split()
+            try:
+                file = mutant.applied(texts)[0]
+                tests = farther_tests(used, file, named) if way == FARTHER else named
+                slow = ["--slow", "-m", "slow"] if way == SLOW else []
+                row = judge(mutant, copy, texts, way, [*slow, *tests])
+            except ValueError as why:
+                row = Row(mutant.name, mutant.file, mutant.breaks, GONE, str(why), way, "")
+            rows[mutant.name] = row
             write_rows(rows, everything, out)
             print_text(f"{row.result:7} {row.cpu_s:>4} s  {row.name}  {row.by}")
 
@@ -229,6 +239,9 @@ def farther_tests(used: UsedFiles, file: str, named: list[str]) -> list[str]:
 
 
 def is_code(path: str) -> bool:
+    """Of the program."""
+    if path.startswith(("tests/", "tools/", "docs/", "findings/", "examples/")):
+        return False
     return path.endswith((".py", ".js", ".cl", ".glsl", ".comp", ".vert", ".frag"))
 
 
