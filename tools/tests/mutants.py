@@ -256,7 +256,8 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=OUT, help="default: docs/bench/mutants.csv")
     options = parser.parse_args()
     everything = read_mutants()
-    rows = {} if options.all else read_rows(options.out)
+    known = {} if options.all else read_rows(options.out)
+    rows = {m.name: known[m.name] for m in everything if m.name in known}
     chosen = [m for m in everything if m.holds(options.names)]
     if options.names and options.again:
         rows = {name: row for name, row in rows.items() if name not in {m.name for m in chosen}}
