@@ -145,8 +145,7 @@ def check_plain_options(options: Options) -> None:
     from shapeshift.app.errors import UsageError
 
     for name in options.splats:
-        option = f"--{name.replace('_', '-')}"
-        raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
+        raise UsageError(f"{name} is of plain splats; add --model splats, or leave it out.")
 
 
 def doubts(trainer: "Trainer") -> tuple[list[str], bool]:
