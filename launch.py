@@ -83,6 +83,7 @@ def start_in_another_python(testing, arguments):
     sentence says why none can.
     """
     spec = importlib.util.spec_from_file_location("which_python", WHICH_PYTHON)
+    assert spec is not None and spec.loader is not None, "as of every path that ends in .py"
     which_python = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(which_python)
     try:

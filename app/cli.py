@@ -204,7 +204,7 @@ def uninterrupted() -> Iterator[None]:
 
 def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.caches import settle_caches_for
-    from shapeshift.app.command_line import dicts_of, parse, wants_help
+    from shapeshift.app.command_line import parse, wants_help
     from shapeshift.app.paths import begin_at_start
     from shapeshift.app.program import program
     from shapeshift.app.progress import lines
@@ -219,10 +219,6 @@ def run_command(command: str, arguments: list[str]) -> int:
         print_text(help_text(module.Options, prog, defaults))
         return 0
     options = begin_at_start(parse(module.Options, arguments, prog))
-    if dicts_of(module.Options):
-        from shapeshift.app.training.train_options import with_settings
-
-        options = with_settings(options)
     settle_caches_for(command)
     if command in OPEN_ENDED:
         return module.run(options)

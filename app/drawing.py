@@ -19,8 +19,8 @@ from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.appearance import NEUTRAL, Appearance, Background, Color, Sky, check_color
 from shapeshift.scene.scene import Scene
-from shapeshift.scene.sections.read_section import read_section
 from shapeshift.scene.sections.section import SceneSection
+from shapeshift.scene.sections.section_texts import read_section
 
 LARGEST_SIDE = 16384  # pixels: the texture limit of common drivers
 MOST_PIXELS = LARGEST_SIDE * 8192  # float images of more do not fit one OpenCL buffer

@@ -8,23 +8,93 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.decomposition.completion.anchor_looks import looks_of
 from shapeshift.decomposition.completion.complete import (
     Completion,
     complete,
     only_background,
 )
-from shapeshift.decomposition.completion.plane import Plane, support_plane
+from shapeshift.decomposition.completion.plane import (
+    CELL,
+    ROOM,
+    AnchorLooks,
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.completion.verify import PhotoView
 from shapeshift.decomposition.partition import LabelledView
-from shapeshift.decomposition.proxies.choose import Proxy, candidates_of, choose_proxy
-from shapeshift.decomposition.proxies.ground import ground_mesh
-from shapeshift.decomposition.proxies.standing import standing_mesh
+from shapeshift.decomposition.proxies.silhouettes import SilhouetteScore, score_silhouettes
 from shapeshift.rasterizer.device import Device
+from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.parts import part_of
-from shapeshift.scene.colliders.collider import Making
+from shapeshift.scene.colliders.collider import Collider, Making, collider_of_mesh, mesh_of_splats
+from shapeshift.scene.colliders.collider_wrap import join_meshes
+from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume
+from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+
+# Candidates for an object's proxy, and which of them its silhouettes prefer (OWD, section 3.5).
+
+PIECES = "hulls"  # CoACD's: the name of that candidate
+LIMIT_S = 120.0  # for CoACD, on a machine that is busy with photos
+AS_GOOD = 0.02  # of IoU below the best, at which a candidate of fewer corners is taken
+LEAST_RECALL = 0.85  # below, a proxy does not cover its object
+
+
+@dataclass(frozen=True)
+class Proxy:
+    name: str
+    collider: Collider
+    score: SilhouetteScore
+
+    @property
+    def corners(self) -> int:
+        """Of all pieces: what the physics pays for."""
+        return sum(len(part) for part in self.collider.parts)
+
+
+def candidates_of(
+    mesh: TriangleMesh, plane: Plane | None, making: Making, given: Path | None = None
+) -> dict[str, Collider]:
+    """Colliders by name: CoACD's pieces, one hull, the primitives, and a mesh file of the user's.
+
+    mesh: the object's, as standing_mesh() makes it; plane: on which it stands, in the same frame.
+    Raises BadFile for a mesh file that cannot be used.
+    """
+    parts, _ = cut_into_parts(mesh, making.most_parts, making.report, LIMIT_S)
+    if plane is not None:
+        parts = tuple(part for part in pressed(parts, plane) if hull_volume(part) > 0)
+    found = {PIECES: Collider(parts, mesh)}
+    up = (0.0, 1.0, 0.0) if plane is None else plane.normal
+    found |= {shape: collider_of_shape(mesh, shape, up) for shape in SHAPES}
+    if given is not None:
+        found[given.name] = collider_of_mesh(given, making)
+    return found
+
+
+def choose_proxy(
+    candidates: dict[str, Collider],
+    world_from_part: np.ndarray,
+    label: int,
+    views: Sequence[LabelledView],
+) -> tuple[Proxy, list[Proxy]]:
+    """The candidate with the fewest corners of those as good as the best; all, best first.
+
+    A proxy has to cover the object, LEAST_RECALL of it.  The first one where no view shows it.
+    """
+    scored = [
+        Proxy(name, collider, score_silhouettes(collider, world_from_part, label, views))
+        for name, collider in candidates.items()
+    ]
+    if not any(proxy.score.views for proxy in scored):
+        return scored[0], scored
+    covering = [p for p in scored if p.score.recall >= LEAST_RECALL] or scored
+    iou = max(proxy.score.iou for proxy in covering)
+    as_good = [p for p in covering if p.score.iou >= iou - AS_GOOD]
+    best = min(as_good, key=lambda proxy: proxy.corners)
+    return best, sorted(scored, key=lambda proxy: -proxy.score.iou)
+
 
 BACKGROUND_FACES = 10_000  # of the skin around it
 FINEST_PICTURES = 16  # that verify and score: the ones with most of the object
@@ -134,3 +204,192 @@ def corners_of(proxy: Proxy, model: AnchorModel, label: int) -> np.ndarray:
     """(V, 3) metres, the model's frame: of all pieces of what is touched of an object."""
     _, at = part_of(model, label)
     return np.concatenate([np.asarray(each, np.float64) for each in proxy.collider.parts]) + at
+
+
+# What the physics touches of the background: flat where things stood, a skin around the rest.
+#
+# The skin around splats is bumpy by some millimetres, and open where a thing was taken out: what
+# stands on it would rock, or fall through.
+
+THICK = 4.0  # sides of a cell: of the slab below a plane
+SUNK = 2.0  # sides of a cell that the skin near a plane is kept below it: out of all contacts
+NEAR = 1.5  # sides of a cell above and below, in which the skin counts as the plane's
+SAME_ANGLE, SAME_OFFSET = 0.999, 1.0  # cosine, sides of a cell: planes that are one
+
+
+def ground_mesh(
+    background: AnchorModel,
+    looks: AnchorLooks,
+    labels: np.ndarray,
+    planes: Sequence[Plane],
+    x: float,
+    making: Making,
+    standing: Sequence[tuple[Plane, np.ndarray]] = (),
+) -> TriangleMesh:
+    """The background's mesh, in the model's frame: slabs under the planes, and the skin.
+
+    background: without the objects.  looks, labels (A,): of the whole model, so that a slab lies
+    under the things, too.  standing: the plane that each object stands on, and the corners (V, 3)
+    of what is touched of it; no skin is left within them, or the object would jump out of it.
+    Raises BadFile where nothing can be touched.
+    """
+    skin = mesh_of_splats(*Evaluator(background).geometry(x), making)
+    side = CELL * looks.spacing_m
+    vertices, slabs = skin.vertices.astype(np.float64), []
+    for plane in distinct(planes, side):
+        low, covered = covered_cells(looks, labels, plane, side)
+        slabs.append(slab(plane, low, covered, side))
+        cells = ((vertices @ plane.axes().T - low) / side).astype(int)
+        inside = np.asarray(((cells >= 0) & (cells < covered.shape)).all(1))
+        inside[inside] = covered[tuple(cells[inside].T)]
+        height = plane.height(vertices)
+        low_skin = inside & (np.abs(height) < NEAR * side)
+        vertices[low_skin] -= (height[low_skin, None] + SUNK * side) * plane.normal
+    for plane, corners in standing:
+        within = is_within(vertices, corners, side)
+        height = plane.height(vertices[within])
+        vertices[within] -= np.maximum(height + SUNK * side, 0)[:, None] * plane.normal
+    return join_meshes([TriangleMesh(vertices.astype(np.float32), skin.faces), *slabs])
+
+
+def is_within(places: np.ndarray, corners: np.ndarray, margin: float) -> np.ndarray:
+    """(N,) bool: the places (N, 3) in the convex hull of corners (V, 3), or so many metres off it.
+
+    Fur and carpets make a skin that stands above the plane around a thing and reaches into it.
+    """
+    from scipy.spatial import ConvexHull
+
+    low, high = corners.min(0) - margin, corners.max(0) + margin
+    near = np.flatnonzero(((places > low) & (places < high)).all(1))
+    equations = ConvexHull(corners).equations  # (F, 4) outward normals
+    inside = (places[near] @ equations[:, :3].T + equations[:, 3] < margin).all(1)
+    found = np.zeros(len(places), bool)
+    found[near[inside]] = True
+    return found
+
+
+def distinct(planes: Sequence[Plane], side: float) -> list[Plane]:
+    """One of several that are nearly the same."""
+    found: list[Plane] = []
+    for plane in planes:
+        same = (
+            plane.normal @ other.normal > SAME_ANGLE
+            and abs(plane.offset - other.offset) < SAME_OFFSET * side
+            for other in found
+        )
+        if not any(same):
+            found.append(plane)
+    return found
+
+
+def covered_cells(
+    looks: AnchorLooks, labels: np.ndarray, plane: Plane, side: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(2,) metres along the plane's axes, and the cells (X, Y) bool from there that carry."""
+    from scipy import ndimage
+
+    height = plane.height(looks.places)
+    on = looks.there & (np.abs(height) < side) & ((labels == 0) | (height < side))
+    flat = looks.places[on] @ plane.axes().T
+    low = flat.min(0) - ROOM * side
+    shape = np.ceil((flat.max(0) - low) / side).astype(int) + ROOM
+    cells = np.zeros(shape, bool)
+    cells[tuple(((flat - low) / side).astype(int).T)] = True
+    cells = ndimage.binary_fill_holes(ndimage.binary_closing(cells, iterations=2))
+    pieces, count = ndimage.label(cells)
+    sizes = np.bincount(pieces.ravel(), minlength=count + 1)
+    sizes[0] = 0
+    return low, without_diagonals(sizes[pieces] >= 0.05 * sizes.max())
+
+
+def without_diagonals(cells: np.ndarray) -> np.ndarray:
+    """The cells with more taken where two touch at a corner alone: else no solid has that edge."""
+    cells = cells.copy()
+    while True:
+        a, b, c, d = cells[:-1, :-1], cells[1:, :-1], cells[:-1, 1:], cells[1:, 1:]
+        rising, falling = a & d & ~b & ~c, b & c & ~a & ~d
+        if not (rising.any() or falling.any()):
+            return cells
+        cells[1:, :-1] |= rising
+        cells[:-1, :-1] |= falling
+
+
+def slab(plane: Plane, low: np.ndarray, cells: np.ndarray, side: float) -> TriangleMesh:
+    """A closed plate under the cells (X, Y) bool, its upper face on the plane."""
+    wide = np.pad(cells, 1)
+    width = cells.shape[1] + 1
+    x, y = np.nonzero(cells)
+    corner = np.stack([x * width + y, (x + 1) * width + y, (x + 1) * width + y + 1,
+                       x * width + y + 1], 1)  # fmt: skip
+    below = (cells.shape[0] + 1) * width
+    faces = [corner[:, [0, 1, 2]], corner[:, [0, 2, 3]]]
+    faces += [corner[:, [0, 2, 1]] + below, corner[:, [0, 3, 2]] + below]
+    for k, (i, j) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):  # the side from corner k on
+        rim = ~wide[x + 1 + i, y + 1 + j]
+        a, b = corner[rim, k], corner[rim, (k + 1) % 4]
+        faces += [np.stack([a, a + below, b + below], 1), np.stack([a, b + below, b], 1)]
+    grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in cells.shape), indexing="ij"), -1)
+    flat = (low + grid.reshape(-1, 2) * side) @ plane.axes() + plane.offset * plane.normal
+    vertices = np.concatenate([flat, flat - THICK * side * plane.normal])
+    used, rows = np.unique(np.concatenate(faces), return_inverse=True)
+    return TriangleMesh(vertices[used].astype(np.float32), rows.reshape(-1, 3).astype(np.int32))
+
+
+# The mesh around what photos show of an object, cut where it stood.
+#
+# Splats reach 5 to 25 mm below the plane that carried the object: needles, and what no photo
+# shows. A body made of them begins inside the table and is thrown out of it.
+
+LEAST_EVIDENCE = 0.5  # pixels of an anchor's own object, summed over the views, to be touched
+LEAST_OPACITY = 0.05
+# Of the longest side: corners so little above the lowest lie on the plane.  A spanner of 15 pieces
+# whose bases differ by .9 mm creeps 4 mm a second; on one plane it sleeps.
+SNAP = 0.0125
+FEWEST = 30  # splats: with fewer the rules above leave too little
+
+
+def standing_mesh(
+    part: AnchorModel,
+    x: float,
+    evidence: np.ndarray | None = None,
+    plane: Plane | None = None,
+    making: Making | None = None,
+) -> TriangleMesh:
+    """The watertight mesh of an object, in the part's own frame.  Raises BadFile.
+
+    evidence (A,): pixels that show each of its anchors as this object, None: not known.  plane: on
+    which it stood, in the same frame; nothing lies below, and what is near above lies on it.
+    """
+    columns = [np.asarray(each) for each in Evaluator(part).geometry(x)]
+    use = columns[3] > LEAST_OPACITY
+    if evidence is not None:
+        use &= np.repeat(evidence > LEAST_EVIDENCE, part.splats_per_anchor)
+    if plane is not None:
+        use &= plane.height(columns[0].astype(np.float64)) > 0
+    if use.sum() < FEWEST:
+        raise BadFile(
+            f"photos show {int(use.sum())} splats of it above the plane that it stood on, of "
+            f"{len(use)}; {FEWEST} are wanted: mark it in more photos, or name a mesh file."
+        )
+    means, scales, wxyz, opacity = (column[use] for column in columns)
+    mesh = mesh_of_splats(means, scales, wxyz, opacity, making or Making(kept=False))
+    if plane is None:
+        return mesh
+    return TriangleMesh(pressed([mesh.vertices], plane)[0], mesh.faces)
+
+
+def pressed(pieces: Sequence[np.ndarray], plane: Plane) -> list[np.ndarray]:
+    """Corners (V, 3) float32 of pieces of one object that stands on the plane.
+
+    What lies below, and what hardly lies above the lowest, is moved onto the plane: the object
+    touches it with all of its base, and does not fall the last millimetres.
+    """
+    corners = np.concatenate(pieces)
+    longest = float(np.ptp(corners, axis=0).max())
+    heights = [plane.height(piece.astype(np.float64)) for piece in pieces]
+    base = max(float(np.concatenate(heights).min()), 0.0) + SNAP * longest
+    out = []
+    for piece, height in zip(pieces, heights, strict=True):
+        down = np.where(height < base, height, 0.0)[:, None] * plane.normal
+        out.append((piece - down).astype(np.float32))
+    return out

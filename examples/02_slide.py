@@ -14,5 +14,6 @@ for x in ("RGB", "RGB..Thermal:0.5", "Thermal", 0.75, "Opened"):
 blend = ss.StopWeights((("RGB", 0.2), ("Thermal", 0.3), ("Opened", 0.5)))
 rows.append(scene.render(x=blend, size=(320, 180)))
 
-sheet = np.concatenate(rows, axis=1)  # still a picture
+sheet = np.concatenate(rows, axis=1)
+assert isinstance(sheet, ss.Picture)  # still a picture
 print(sheet.save("out/02_slide.png"))

@@ -19,8 +19,9 @@ print(faded, faded.render(size=(480, 270)).save("out/09_faded.png"))
 
 # The trained model itself: anchors (A, 3) metres, features, five networks; it keeps its slider.
 model = scene.model
+assert isinstance(model, ss.AnchorModel)
 turn = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], np.float32)  # a quarter about +Y
-wide = replace(model, anchors=model.anchors * np.float32([1.3, 1.0, 1.0]))
+wide = replace(model, anchors=model.anchors * np.array([1.3, 1.0, 1.0], np.float32))
 print(scene.with_model(wide).render("Thermal", size=(480, 270)).save("out/09_wide.png"))
 
 # Two sets of splats become two stops of one slider.

@@ -9,6 +9,7 @@ import shapeshift as ss
 # A second capture would be a scene of its own; here the demo's mug is pushed by 12 cm.
 before = ss.load(ss.DEMO)
 model = before.model
+assert isinstance(model, ss.AnchorModel)
 mug = np.linalg.norm(model.anchors - (-0.13, 0.045, 0.22), axis=1) < 0.07
 pushed = np.where(mug[:, None] & (model.anchors[:, 1:2] > 0.01), (-0.12, 0.0, 0.03), 0.0)
 anchors = (model.anchors + pushed).astype(np.float32)

@@ -8,12 +8,50 @@ import numpy as np
 
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import LOW_BITS, Projected, TileScratch, chunks_of, grid_of
-from shapeshift.rasterizer.sort import prefix_sums, sort_pairs
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
+
+# sort: the stable radix sort and the prefix sums of the GPU form, for arrays of any length.
+
 KERNELS = Path(__file__).parent / "kernels"
+GROUP = 256  # work-items, as in sort_gpu.cl
+SPAN = 2048  # keys a work-group
+DIGIT_BITS = 4
+
+
+def prefix_sums(device: Device, data: "Array") -> None:
+    """Replaces int32 `data` by its exclusive sums, in place."""
+    kernels = device.program(KERNELS / "sort_gpu.cl")
+    count = data.size
+    groups = -(-count // SPAN)
+    sums = device.empty(groups, np.int32)
+    device.launch(kernels["scan_spans"], groups * GROUP, GROUP, count, data, sums)
+    if groups > 1:
+        prefix_sums(device, sums)
+        device.launch(kernels["add_sums"], count, GROUP, count, data, sums)
+
+
+def sort_pairs(device: Device, keys: "Array", values: "Array", bits: int) -> tuple:
+    """(keys, values) by the lowest `bits` of uint32 keys, stable; the inputs may be overwritten."""
+    kernels = device.program(KERNELS / "sort_gpu.cl")
+    count = keys.size
+    groups = -(-count // SPAN)
+    spare_keys, spare_values = device.empty(count, np.uint32), device.empty(count, np.int32)
+    table = device.empty((1 << DIGIT_BITS, groups), np.int32)
+    for shift in range(0, bits if count else 0, DIGIT_BITS):
+        shared = (count, groups, shift, keys)
+        device.launch(kernels["count_digits"], groups * GROUP, GROUP, *shared, table)
+        prefix_sums(device, table)
+        device.launch(
+            kernels["scatter_digits"], groups * GROUP, GROUP,
+            *shared, values, table, spare_keys, spare_values,
+        )  # fmt: skip
+        keys, values, spare_keys, spare_values = spare_keys, spare_values, keys, values
+    return keys, values
+
+
 SPARE = 16  # as in bin.cl
 MOST_BINS = 1 << 14  # of one pass: its table must stay in the second cache
 
@@ -270,3 +308,26 @@ def _scatter_tiles(
         *shared, total, order, record, near_to_far, table, intersections, *shown,
     )  # fmt: skip
     return starts, intersections
+
+
+# quantize_keys: exact sort keys -> 65535 steps of the range that a frame uses.
+
+KERNEL = Path(__file__).parent / "kernels" / "quantize_keys.cl"
+
+
+def quantize_keys(device: Device, scratch: TileScratch) -> None:
+    """Replaces the keys that project_arena entered; sort_order then puts a step in order of index.
+
+    Saves nothing here: two passes sort the exact keys of most frames, and this is one more.  It is
+    for pictures that equal those of a GPU with 16-bit keys.
+    """
+    status = device.download(scratch.status)
+    if not status[:, 0].any():
+        return
+    least, most = status[:, 2].min(), status[:, 3].max()
+    device.launch(
+        device.program(KERNEL)["quantize_keys"], len(status), 1,
+        scratch.chunk, int(least), int(most), scratch.pairs, scratch.table,
+        scratch.status,
+    )  # fmt: skip
+    device.queue.finish()

@@ -116,7 +116,8 @@ def build(context, path: Path, options: list[str]) -> dict:
     kernels = {kernel.function_name: kernel for kernel in program.all_kernels()}
     for kernel in kernels.values():
         names = (
-            kernel.get_arg_info(i, cl.kernel_arg_info.TYPE_NAME) for i in range(kernel.num_args)
+            str(kernel.get_arg_info(i, cl.kernel_arg_info.TYPE_NAME))
+            for i in range(kernel.num_args)
         )
         kernel.set_arg_types(None if name.endswith("*") else SCALARS[name] for name in names)
     return kernels

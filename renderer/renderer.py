@@ -10,7 +10,16 @@ import numpy as np
 
 from shapeshift.renderer.backends import choose_backends, open_drawing
 from shapeshift.renderer.colors.color_cache import ColorCache, forget_colors
-from shapeshift.renderer.colors.decode_colors import decode_colors
+from shapeshift.renderer.colors.decode_colors import (
+    Look,
+    decode_colors,
+    looks_of,
+    own_colors,
+    prepare_two,
+    same_shape,
+    take_looks,
+    two_false_colors,
+)
 from shapeshift.renderer.colors.eye_colors import by_eye, drawn_together, eyes_among
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
@@ -26,18 +35,13 @@ from shapeshift.renderer.colors.palette import (
     overlay_heat,
     palette_between,
 )
-from shapeshift.renderer.colors.two_looks import (
-    Look,
-    looks_of,
-    prepare_two,
-    same_shape,
-    take_looks,
-    two_false_colors,
-)
-from shapeshift.renderer.colors.wanted import own_colors
-from shapeshift.renderer.cut import place_splats, restore_shapes
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
-from shapeshift.renderer.decoded_object import BESIDE_SET, DecodedObject
+from shapeshift.renderer.decoded_object import (
+    BESIDE_SET,
+    DecodedObject,
+    place_splats,
+    restore_shapes,
+)
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve, WindowTaker
 from shapeshift.renderer.levels import LevelChoice, decoded_objects, exchange_levels

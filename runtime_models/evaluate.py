@@ -16,10 +16,9 @@ from shapeshift.runtime_models.model import (
     SplatLayers,
     Splats,
 )
-from shapeshift.runtime_models.network_sessions import FoldedNetwork, WholeNetwork
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.runtime_models.scaffold.evaluate_scaffold import ScaffoldEvaluator
-from shapeshift.runtime_models.session import BATCH
+from shapeshift.runtime_models.session import BATCH, FoldedNetwork, WholeNetwork
 from shapeshift.runtime_models.stop_weights import Controls, is_each
 
 MOST_CHANGED = 0.5  # of the anchors: from there on all of them are run

@@ -38,7 +38,7 @@ from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold, read_s
 from shapeshift.runtime_models.splats.foreign_files import is_address, refusal
 from shapeshift.runtime_models.splats.formats import format_of, head_of
 from shapeshift.runtime_models.splats.layers.frames import frame_files, frame_stops
-from shapeshift.runtime_models.splats.layers.read_layer_list import (
+from shapeshift.runtime_models.splats.layers.layer_list import (
     LIST,
     has_layer_list,
     read_layer_list,
@@ -50,8 +50,7 @@ from shapeshift.runtime_models.splats.layers.read_layers import (
 )
 from shapeshift.runtime_models.splats.lcc.read_lcc import is_lcc, read_lcc
 from shapeshift.runtime_models.splats.lcc.read_lcc2 import is_lcc2, read_lcc2
-from shapeshift.runtime_models.splats.operations.decimate import within_most_splats
-from shapeshift.runtime_models.splats.operations.prune_by_importance import left_whole
+from shapeshift.runtime_models.splats.operations.decimate import left_whole, within_most_splats
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.read_output_folder import (
     CLOUD,

@@ -169,7 +169,8 @@ def why_none(described, fits):
 def named(place):
     """linux-x86_64 as people write it."""
     system, _, machine = place.partition("-")
-    return (SYSTEMS.get(system, system) + " " + machine.replace("amd64", "x86-64")).strip()
+    system = SYSTEMS[system] if system in SYSTEMS else system
+    return (system + " " + machine.replace("amd64", "x86-64")).strip()
 
 
 def choose_python(testing):

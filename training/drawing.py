@@ -17,7 +17,7 @@ from shapeshift.rasterizer.surface import (
 )
 from shapeshift.scene.pose import View
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.normal_loss import ShapeTerm
+from shapeshift.training.losses.surface_losses import ShapeTerm
 
 Color = tuple[float, float, float]
 Timed = Callable[[str], AbstractContextManager]  # of a pass, by its name

@@ -6,17 +6,17 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from shapeshift.rasterizer.project import LEAST_ALPHA, LOW_PASS, Camera
 from shapeshift.scene.pose import View
 from shapeshift.training.calibration.pose_refinement import PoseGradient
-from shapeshift.training.density.densification_stats import DensificationStats
+from shapeshift.training.density.densify import DensificationStats
 from shapeshift.training.drawing import Color, DrawnView, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Activation, Gaussians
-from shapeshift.training.heads.networks import HeadLayout, Heads
+from shapeshift.training.heads.networks import KERNELS, HeadLayout, Heads
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss, Target
-from shapeshift.training.losses.min_opacity import SHARE, add_min_opacity_gradient
-from shapeshift.training.losses.min_scale import MinScale
-from shapeshift.training.losses.normal_loss import ShapeTerm
+from shapeshift.training.losses.splat_losses import SHARE, MinScale, add_min_opacity_gradient
+from shapeshift.training.losses.surface_losses import ShapeTerm
 
 SAME_STOP = 1e-6  # of Psi: between its own and a blend's rounding
 
@@ -135,3 +135,140 @@ class TrainingStep:
         """Groups without a gradient, base colours of other stops, rest."""
         with self.timed("adam"):
             self.adam.step(grads, rate_scale, dict.fromkeys(self.layout.per_anchor, self.rows))
+
+
+# Turns a run back when it dies: loss not finite, or nothing left to see.
+
+LEAST_VISIBLE = 0.01  # of the largest share of splats that this modality has had on screen
+LEAST_CONTRAST = 0.3  # of the contrast to the background of the photo, or of the first picture
+IN_A_ROW = 3  # checks that show nothing: one alone may be a camera inside of something
+PROBATION = 8  # checks after a rollback, over which the mean loss has to come down to ...
+GAINED = 0.6  # ... this share of an untrained model's
+EVERY = 5  # rounds between checks; a round is one step of every modality
+SNAPSHOT_EVERY = 100  # steps
+KEPT = 3  # snapshots
+
+
+class DivergenceGuard:
+    """Keeps the last healthy states.  When `is_healthy` is False, `rollback` gives one of them.
+
+    A collapse can begin before it shows, so a second rollback soon after goes one snapshot further.
+    """
+
+    def __init__(self, state: dict[str, np.ndarray]) -> None:
+        self.snapshots = [state]
+        self.first_loss: dict[str, float] = {}  # of each modality
+        self.most: dict[str, tuple[float, float]] = {}  # visible and contrast of each modality
+        self.rollbacks = 0
+        self.empty = 0  # checks in a row
+        self.gains: list[float] | None = None  # losses over first losses since the rollback
+        self.grace = 0  # checks before these count
+
+    def observe(self, modality: str, loss: float, visible: float, contrast: float) -> None:
+        """What a picture of a modality has; the first time, of the untrained or resumed model.
+
+        visible: the share of all splats that are on screen, 0..1.  contrast: the picture's mean
+        contrast to the background over its photo's; splats that have shrunk to black dots are on
+        screen, but show nothing.
+        """
+        before = self.most.get(modality, (0.0, 0.0))
+        self.most[modality] = (max(before[0], visible), max(before[1], min(contrast, 1.0)))
+        self.first_loss.setdefault(modality, loss)
+
+    def is_healthy(self, modality: str, loss: float, visible: float, contrast: float) -> bool:
+        """Whether the run may go on.  After a rollback, that takes a falling loss as well."""
+        self.observe(modality, loss, visible, contrast)
+        most_visible, most_contrast = self.most[modality]
+        enough = visible > LEAST_VISIBLE * most_visible
+        enough = enough and contrast > LEAST_CONTRAST * most_contrast
+        self.empty = 0 if enough else self.empty + 1
+        improves = True
+        if self.grace:
+            self.grace -= 1
+        elif self.gains is not None:
+            self.gains.append(loss / self.first_loss[modality])
+            if len(self.gains) == PROBATION:
+                improves = bool(np.mean(self.gains) < GAINED)
+                self.gains = None
+        return bool(np.isfinite(loss)) and self.empty < IN_A_ROW and improves
+
+    @property
+    def stable(self) -> bool:
+        """Whether the last checks were good, so that a state is worth keeping."""
+        return self.empty == 0 and self.gains is None
+
+    def save_snapshot(self, state: dict[str, np.ndarray]) -> None:
+        self.snapshots = [*self.snapshots, state][-KEPT:]
+
+    def rollback(self, grace: int = 0) -> dict[str, np.ndarray]:
+        """The newest snapshot, which is given up unless it is the last one left.
+
+        grace: checks that a warm-up takes before the loss has to come down.
+        """
+        self.rollbacks += 1
+        self.empty, self.gains, self.grace = 0, [], grace
+        return self.snapshots.pop() if len(self.snapshots) > 1 else self.snapshots[0]
+
+
+# Which anchors a training step runs: those that its view can show at its stop.
+#
+# What lies out of view, or is absent at the stop, has no gradient. It is found by a sphere about
+# each anchor that holds what its splats showed when it last ran at that stop; every LOOK-th step
+# of a stop runs all anchors, so that what has changed since comes back.
+
+LOOK = 10  # steps of a stop: one of them runs all anchors
+# A pixel more on each side than the screen filter widens the most opaque splat.
+MARGIN_PX = np.float32(np.sqrt(2 * np.log(1 / LEAST_ALPHA) * LOW_PASS) + 1)
+
+
+class Visibility:
+    """The spheres of A anchors at every stop, and whose turn it is to be looked at."""
+
+    def __init__(self, device, anchors_count: int, stops: int, splats: int) -> None:
+        self.device, self.count, self.splats = device, anchors_count, splats
+        self.kernels = device.program(KERNELS / "visibility.cl")
+        # metres; infinite: nothing is known, below zero: absent
+        self.reach = [device.upload(np.full(anchors_count, np.inf, np.float32))] * stops
+        self.reach = [array.copy() for array in self.reach]
+        self.visits = [0] * stops
+        self.everything = device.upload(np.arange(anchors_count, dtype=np.int32))
+
+    def visible_rows(self, stop: int, camera: Camera, anchors):
+        """(R,) int32 on the device: which anchors (A, 3) a step at a stop has to run; None: all.
+
+        At least one, so that there is something to launch.
+        """
+        self.visits[stop] += 1
+        if self.visits[stop] % LOOK == 1:
+            return None
+        device = self.device
+        seen = device.empty(self.count, np.uint8)
+        device.launch(
+            self.kernels["find_visible"], self.count, 64,
+            self.count, *camera.size, float(camera.near), MARGIN_PX,
+            device.constants(camera.packed()), anchors, self.reach[stop], seen,
+        )  # fmt: skip
+        rows = np.flatnonzero(device.view(seen)).astype(np.int32)
+        if len(rows) == self.count:
+            return None
+        return device.upload(rows if len(rows) else np.zeros(1, np.int32))
+
+    def update_reach(self, stop: int, rows, anchors, splats: Gaussians) -> None:
+        """What anchors (R, 3), the `rows` of a step at a stop, reach with their splats (R * k)."""
+        rows = self.everything if rows is None else rows
+        self.device.launch(
+            self.kernels["measure_reach"], len(rows), 64,
+            len(rows), self.splats, LEAST_ALPHA, rows, anchors, splats.means, splats.scales,
+            splats.opacity, self.reach[stop],
+        )  # fmt: skip
+
+    def state(self) -> dict[str, np.ndarray]:
+        """reach (stops, A) metres and visits (stops,): with it a run goes on to the same bits."""
+        return {
+            "visibility.reach": np.stack([self.device.download(r) for r in self.reach]),
+            "visibility.visits": np.array(self.visits),
+        }
+
+    def load(self, state: dict[str, np.ndarray]) -> None:
+        self.reach = [self.device.upload(reach) for reach in state["visibility.reach"]]
+        self.visits = state["visibility.visits"].tolist()

@@ -9,32 +9,36 @@ from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.scene.cameras.framing import frame_points
 from shapeshift.scene.cameras.photo_view import photo_view
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
 from shapeshift.training.calibration.pose_refinement import PoseGradient, PoseRefinement
-from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.density.densify import (
+    DensificationStats,
     NewAnchors,
     absent_as_nan,
+    anchor_cap,
     densify_and_prune,
     resize_optimizer_state,
 )
-from shapeshift.training.density.density_budget import anchor_cap
-from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
-from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.export import model_of, notes_of
 from shapeshift.training.first_anchors.first_anchors import base_colors, first_anchors
 from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.min_opacity import min_opacity_share
-from shapeshift.training.losses.min_scale import MinScale
+from shapeshift.training.losses.splat_losses import MinScale, min_opacity_share
 from shapeshift.training.photo_store.open_photos import PhotoRoom, TrainingPhotos, open_photos
-from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, validate_views
 from shapeshift.training.run import SETTLE, Run
-from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
+from shapeshift.training.schedule import (
+    WARM_UP_STEPS,
+    BlendedShapes,
+    Budget,
+    LrWarmup,
+    Schedule,
+    ShapeBlending,
+)
 from shapeshift.training.settings import Rates, TrainSettings, parameter_rates
-from shapeshift.training.step import TrainingStep
+from shapeshift.training.step import EVERY as GUARD_EVERY
+from shapeshift.training.step import SNAPSHOT_EVERY, DivergenceGuard, TrainingStep, Visibility
 from shapeshift.training.supervision.backgrounds import (
     background_warning,
     choose_background,
@@ -42,8 +46,6 @@ from shapeshift.training.supervision.backgrounds import (
 )
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
-from shapeshift.training.view_checks import validate_views
-from shapeshift.training.visibility import Visibility
 
 GROW_FROM, GROW_UNTIL = 0.05, 0.8  # of the run
 EMPTY_PHOTO = 0.002  # mean contrast below which a photo shows nothing but background

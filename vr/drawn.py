@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.card import Card
+from shapeshift.vr.cards import Card
 from shapeshift.vr.frame import SIDES, Hand
 from shapeshift.vr.glove import Capsule, glove
 from shapeshift.vr.locomotion.locomotion import Comfort
@@ -107,13 +107,13 @@ def ray(side: str, hand: Hand, carried: Carried, beam: Beam | None) -> list[Caps
 def arc(points: np.ndarray, landing: np.ndarray | None, fine: bool) -> list[Capsule]:
     """The arc of a jump through points (n, 3), with a ring on the floor where it lands."""
     color = (*(FINE if fine else WRONG), 1.0)
-    lines = [Capsule(a, b, (ARC_THICK,) * 2, color) for a, b in pairwise(points)]
+    lines = [Capsule(a, b, (ARC_THICK, ARC_THICK), color) for a, b in pairwise(points)]
     if landing is not None:
         turns = np.linspace(0, 2 * np.pi, RING_PARTS + 1)
         flat = np.stack([np.cos(turns), np.zeros_like(turns), np.sin(turns)], axis=1)
         for radius in (RING_M, 0.25 * RING_M) if fine else (RING_M,):
             ring = landing + np.array([0.0, RING_THICK, 0.0]) + flat * radius
-            lines += [Capsule(a, b, (RING_THICK,) * 2, color) for a, b in pairwise(ring)]
+            lines += [Capsule(a, b, (RING_THICK, RING_THICK), color) for a, b in pairwise(ring)]
     return lines
 
 

@@ -84,7 +84,7 @@ def bare_glove(joints: np.ndarray, holds: bool) -> list[Capsule]:
     back = _unit(ends[WRIST_JOINT] - ends[PALM_JOINT]) * wide
     return [
         *parts,
-        Capsule(ends[WRIST_JOINT] + back * 0.3, ends[WRIST_JOINT] + back, (wide,) * 2, cuff),
+        Capsule(ends[WRIST_JOINT] + back * 0.3, ends[WRIST_JOINT] + back, (wide, wide), cuff),
     ]
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.card import Card
+from shapeshift.vr.cards import Card
 from shapeshift.vr.frame import SIDES, Frame
 from shapeshift.vr.locomotion.locomotion import Rules
 from shapeshift.vr.panel.plane import facing

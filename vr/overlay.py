@@ -8,8 +8,8 @@ import numpy as np
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.shader import compile_program
 from shapeshift.scene.pose import View
+from shapeshift.vr.cards import Flats
 from shapeshift.vr.drawn import Drawn, PanelQuad
-from shapeshift.vr.flat import Flats
 from shapeshift.vr.glove import Capsule
 from shapeshift.vr.scene_depth import LINE_SLACK, SOLID_SLACK, EyeDepth, bind_depth
 from shapeshift.vr.shown import SHADERS

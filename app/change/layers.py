@@ -14,13 +14,12 @@ from shapeshift.runtime_models.bake import bake
 from shapeshift.runtime_models.colors.spherical_harmonics import basis
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.shapes import three
-from shapeshift.runtime_models.splats.layers.write_layer_list import write_layer_list
+from shapeshift.runtime_models.splats.layers.layer_list import write_layer_list
 from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.write_plain import merged
 from shapeshift.scene.cameras.framing import default_view
-from shapeshift.scene.change.cells import SurfaceCells
-from shapeshift.scene.change.places import color_distance
+from shapeshift.scene.change.places import SurfaceCells, color_distance
 from shapeshift.scene.change.similarity import Similarity
 
 NEAR = 2.0  # cells from a splat to the cell that says what changed there

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.app.charts.chart_measure import ChartRow
-from shapeshift.app.charts.pareto import pareto_front
 from shapeshift.runtime_models.files.plain_text import one_line, several_lines
 from shapeshift.runtime_models.files.whole_file import whole_file
 
@@ -216,3 +215,22 @@ def save_figure(figure, path: Path) -> None:
         fixed = matplotlib.rc_context({"svg.hashsalt": "shapeshift", "svg.fonttype": "path"})
         with whole as file, fixed:
             figure.savefig(file, format=ending, dpi=DPI, metadata=metadata)
+
+
+# The Pareto front: what nothing else beats in both figures at once.
+
+
+def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
+    """Indices of the points that no other one equals or beats in both numbers, larger is better.
+
+    By falling first number.  Of equal points the first counts; a point with NaN never does.
+    """
+    whole = [i for i, (a, b) in enumerate(points) if a == a and b == b]
+    order = sorted(whole, key=lambda i: (-points[i][0], -points[i][1], i))
+    front: list[int] = []
+    best = float("-inf")
+    for i in order:
+        if points[i][1] > best or (not front):
+            front.append(i)
+            best = points[i][1]
+    return front

@@ -36,7 +36,7 @@ class Options:
 
 def run(options: Options) -> int:
     from shapeshift.app.cluster.certificates import require_dask
-    from shapeshift.app.cluster.place import read_address
+    from shapeshift.app.cluster.open_cluster import read_address
     from shapeshift.app.errors import UsageError
 
     if options.action == "certificates":

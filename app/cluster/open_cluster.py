@@ -1,5 +1,7 @@
 """Where tasks run: what --cluster says."""
 
+import ipaddress
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,7 +13,7 @@ from shapeshift.app.command_line import EXPERT, Opt
 from shapeshift.app.errors import UsageError
 
 if TYPE_CHECKING:
-    from shapeshift.app.cluster.board import Shown
+    from shapeshift.app.cluster.run_task import Shown
 
 NONE = "none"
 
@@ -46,7 +48,6 @@ def check_cluster(options: ClusterOptions) -> None:
 
     Raises UsageError.
     """
-    from shapeshift.app.cluster.place import read_place
 
     place = read_place(options.cluster)
     check_gpus(place.kind, options.gpus)
@@ -71,9 +72,7 @@ def open_cluster(
     shown: "Shown | None" = None,
 ) -> Iterator[Cluster]:  # fmt: skip
     """What runs tasks where --cluster says; shown: instead of a bar.  Raises UsageError."""
-    from shapeshift.app.cluster.board import board
-    from shapeshift.app.cluster.here import Here
-    from shapeshift.app.cluster.place import read_place
+    from shapeshift.app.cluster.run_task import Here, board
 
     place = read_place(where)
     check_gpus(place.kind, gpus)
@@ -90,9 +89,85 @@ def open_cluster(
     elif place.kind == "scheduler":
         opened = dask_cluster.scheduler_at(place.address, certificates)
     else:
-        from shapeshift.app.cluster.slurm import slurm_cluster
+        from shapeshift.app.cluster.dask_cluster import slurm_cluster
 
         opened = slurm_cluster(place.file, certificates)
     with opened as cluster:
         cluster.shown = shown or board
         yield cluster
+
+
+# What --cluster says, and who may listen where.
+
+FORMS = "none, local, local:N, tcp://127.0.0.1:PORT, tls://HOST:PORT or slurm:FILE"
+MOST_LOCAL = 256  # workers of one machine
+USUAL_LOCAL = 2
+ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):(\d{1,5})")
+
+
+@dataclass(frozen=True)
+class ClusterPlace:
+    """Where tasks run."""
+
+    kind: str  # none | local | scheduler | slurm
+    workers: int = 0  # of local
+    address: str = ""  # of a scheduler
+    file: Path = Path()  # of slurm
+
+
+@dataclass(frozen=True)
+class Address:
+    """Of a scheduler, checked."""
+
+    text: str
+    protocol: str  # tcp | tls
+    host: str
+    port: int
+
+
+def read_place(text: str) -> ClusterPlace:
+    """What --cluster says.  Raises UsageError."""
+    kind, colon, rest = text.partition(":")
+    if text == "none":
+        return ClusterPlace("none")
+    if kind == "local":
+        if colon and not (rest.isascii() and rest.isdigit() and 1 <= int(rest) <= MOST_LOCAL):
+            raise UsageError(f"--cluster is '{text}', expected local:1 to local:{MOST_LOCAL}.")
+        return ClusterPlace("local", int(rest) if colon else USUAL_LOCAL)
+    if kind == "slurm" and rest:
+        from shapeshift.app.paths import plain
+
+        return ClusterPlace("slurm", file=plain(rest))
+    if kind in ("tcp", "tls"):
+        return ClusterPlace("scheduler", address=read_address(text, "--cluster").text)
+    raise UsageError(f"--cluster is '{text}', expected {FORMS}.")
+
+
+def read_address(text: str, option: str) -> Address:
+    """tcp://127.0.0.1:PORT or tls://HOST:PORT.  Raises UsageError."""
+    found = ADDRESS.fullmatch(text)
+    if not found or not 1 <= int(found[3]) <= 65535:
+        raise UsageError(
+            f"{option} is '{text}', expected tls://HOST:PORT, or tcp://127.0.0.1:PORT on this "
+            "machine alone."
+        )
+    address = Address(text, found[1], found[2].strip("[]"), int(found[3]))
+    if address.protocol == "tcp" and not is_loopback(address.host):
+        from shapeshift.app.program import program
+
+        raise UsageError(
+            f"{option} is '{text}': whoever reaches such a port runs what he likes, so tcp:// is "
+            f"for 127.0.0.1 alone; use tls://{found[2]}:{found[3]} with --certificates, which "
+            f"`{program()} cluster certificates --out DIR` makes."
+        )
+    return address
+
+
+def is_loopback(host: str) -> bool:
+    """Whether nobody but this machine reaches it; names other than localhost may mean anything."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

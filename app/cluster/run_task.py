@@ -1,4 +1,4 @@
-"""Runs one task in a process of its own, on the machine where this is called."""
+"""--cluster none: tasks one after the other on this machine, each in a process of its own."""
 
 import contextlib
 import json
@@ -10,20 +10,21 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import IO
 
-from shapeshift.app.cluster.child import GRACE_S
 from shapeshift.app.cluster.task import Task, is_of_code_here
 from shapeshift.app.errors import UsageError
 from shapeshift.app.program import ROOT, is_installed
-from shapeshift.app.progress import PERIOD
+from shapeshift.app.progress import PERIOD, progress_bar
 from shapeshift.runtime_models.files.whole_file import LOCKS, open_locked
+
+# Runs one task in a process of its own, on the machine where this is called.
 
 START = (
     "import sys; sys.path[:0] = {paths!r}; "
-    "from shapeshift.app.cluster.child import main; sys.exit(main())"
+    "from shapeshift.app.cluster.run_task import main; sys.exit(main())"
 )  # -P leaves the current folder out
 LINES_EVERY_S = 2.0  # of a task's progress
 LOOK_S = 0.5  # between looks at what else may end a task
@@ -219,3 +220,167 @@ def end(child: subprocess.Popen[bytes]) -> None:
         elif child.poll() is None:
             child.kill()
         child.wait()
+
+
+# What the tasks of a run are at: one bar over all of them, and their own sentences below it.
+
+MOST_SHOWN = 3  # tasks whose words stand beside the bar
+
+
+class Board:
+    """Hears lines of tasks by name; made by `board`."""
+
+    def __init__(self, show: Callable[..., None], say: Callable[[str], None]) -> None:
+        self._show, self._say, self._lock = show, say, threading.Lock()
+        self._now: dict[str, str] = {}  # what those under way said last
+
+    def hear(self, name: str, command: str, line: str) -> None:
+        """A line of a task's standard error, or of who runs it."""
+        words = progress_words(line, command)
+        if words is None:
+            self._say(f"{name}: {line}")
+        with self._lock:
+            self._now[name] = self._now.get(name, "") if words is None else words
+            self._update()
+
+    def end(self, name: str) -> None:
+        """The task is done, or has failed."""
+        with self._lock:
+            self._now.pop(name, None)
+            self._update(advance=1)
+
+    def _update(self, advance: int = 0) -> None:
+        shown = [f"{name}: {words}" if words else name for name, words in self._now.items()]
+        more = f"; {len(shown) - MOST_SHOWN} more" if len(shown) > MOST_SHOWN else ""
+        self._show(description="; ".join(shown[:MOST_SHOWN]) + more, advance=advance)
+
+
+Shown = Callable[[int, int], AbstractContextManager[Board]]  # of so many tasks, some done already
+
+
+def board_of_words(hear: Callable[[str], None]) -> Shown:
+    """Instead of a bar: words for a function, as they come."""
+
+    def show(description: str, advance: int = 0) -> None:
+        if description:
+            hear(description)
+
+    return lambda count, done: nullcontext(Board(show, hear))
+
+
+@contextmanager
+def board(count: int, done: int) -> Iterator[Board]:
+    """A bar over so many tasks, of which some are done already."""
+    with progress_bar() as bar:
+        task = bar.add_task("starting", total=count, completed=done)
+
+        def show(**facts) -> None:
+            bar.update(task, **facts)
+
+        def say(text: str) -> None:
+            bar.console.print(text, soft_wrap=True)
+
+        yield Board(show, say)
+
+
+class Here:
+    """Runs tasks without a cluster."""
+
+    def __init__(self, shown: Shown = board) -> None:
+        self.shown = shown
+
+    def run(self, tasks: Sequence[Task]) -> None:
+        """Returns when all are done.  A task that fails is said at once, and the others go on.
+
+        Raises TaskFailed after the last one where any failed.
+        """
+        keys = check_tasks(tasks)
+        failed: list[TaskFailed] = []
+        open_tasks = [task for task in tasks if not task.is_done(keys[task.name])]
+        with self.shown(len(tasks), len(tasks) - len(open_tasks)) as shown:
+            for task in open_tasks:
+                self._run_one(task, keys[task.name], shown, failed)
+        raise_failed(failed, len(tasks))
+
+    def _run_one(self, task: Task, key: str, shown: Board, failed: list[TaskFailed]) -> None:
+        try:
+            run_task(task, key, lambda line: shown.hear(task.name, task.argv[0], line))
+        except TaskFailed as error:
+            failed.append(error)
+        shown.end(task.name)
+
+
+def check_tasks(tasks: Sequence[Task]) -> dict[str, str]:
+    """The key of each by name.  Raises ValueError where two share a name or a file."""
+    names = [task.name for task in tasks]
+    files = [path for task in tasks for path in task.writes]
+    for words, what in ((names, "name"), (files, "file to write")):
+        twice = {word for word in words if words.count(word) > 1}
+        if twice:
+            raise ValueError(f"two tasks have one {what}: {min(twice)}")
+    return {task.name: task.key() for task in tasks}
+
+
+def raise_failed(failed: Sequence[TaskFailed], count: int) -> None:
+    """The first failure, and how many there were, where any was.  Raises TaskFailed."""
+    if not failed:
+        return
+    more = f"  ({len(failed)} of {count} tasks failed.)" if len(failed) > 1 else ""
+    raise TaskFailed(f"{failed[0]}{more}")
+
+
+# The program as a task: it ends with whoever started it, and keeps what it has by then.
+#
+# It reads standard input, whose other end its parent holds.  Where that closes, because the parent
+# wants so or was killed, this process is interrupted as by Ctrl-C, and after a while for good.
+
+GRACE_S = 20.0  # to save what there is
+
+
+def main() -> int:
+    watch_parent()
+    if len(sys.argv) > 1 and sys.argv[1].endswith(".py"):
+        return run_script(sys.argv[1:])
+    from shapeshift.app.cli import main as run_program
+
+    return run_program()
+
+
+def run_script(argv: list[str]) -> int:
+    """A program of tools/ instead of a command of this one, as Python itself starts it."""
+    import runpy
+
+    sys.argv[:] = argv
+    sys.path.insert(0, os.path.dirname(argv[0]))
+    runpy.run_path(argv[0], run_name="__main__")
+    return 0
+
+
+def watch_parent() -> None:
+    """From the main thread, before anything else."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # workers ignore it, and hand that on
+    threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
+
+
+def end_with_parent() -> None:
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
+    interrupt()
+    time.sleep(GRACE_S)
+    end_group()
+
+
+def interrupt() -> None:
+    if os.name == "nt":
+        import _thread
+
+        _thread.interrupt_main()
+    else:  # the main thread may be asleep
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+
+def end_group() -> None:
+    """This process with all that it has started."""
+    if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
+        os.killpg(os.getpgrp(), signal.SIGKILL)
+    os._exit(1)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from shapeshift.app.cluster.certificates import read_certificates
 from shapeshift.app.cluster.dask_cluster import node_options, quiet_dask, reason, worker_options
-from shapeshift.app.cluster.place import Address
+from shapeshift.app.cluster.open_cluster import Address
 from shapeshift.app.errors import UsageError
 from shapeshift.app.terminal import say
 

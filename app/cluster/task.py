@@ -7,12 +7,15 @@ written, so a second start does nothing twice, whoever did it first.
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from typing import Any
 
-from shapeshift.app.cluster.digests import code_digest, digest_of, own_code
-from shapeshift.app.paths import file_name
+from shapeshift.app.command_line import Argument, arguments_of, dicts_of
+from shapeshift.app.paths import file_name, full
+from shapeshift.app.program import ROOT, version
 from shapeshift.runtime_models.files.json_fields import saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 
@@ -100,3 +103,104 @@ def forget(tasks: Iterable[Task]) -> None:
 def is_task() -> bool:
     """Whether this process does a task: who reads its words cannot type what comes next."""
     return "SHAPESHIFT_TASK" in os.environ
+
+
+# Hashes of what a task is made of: files, folders, and the code that does it.
+
+CODE = (".py", ".cl", ".comp", ".vert", ".frag", ".glsl")
+_digests: dict[tuple[str, int, int], str] = {}  # by path, bytes and time
+
+
+@cache
+def own_code() -> str:
+    """code_digest of when this process first asked: results of other code are not its own."""
+    return code_digest()
+
+
+def code_digest() -> str:
+    """A hash of the program's version and of all code in its packages; where it lies is not in it.
+
+    A file is read again where it has changed.
+    """
+    root = str(ROOT)
+    packages = [folder.path for folder in os.scandir(root)
+                if os.path.isfile(os.path.join(folder.path, "__init__.py"))]  # fmt: skip
+    paths = sorted(path for package in packages for path in code_files(package))
+    rows = [[path[len(root) :], digest_of_file(path)] for path in paths]
+    return hashlib.sha256(json.dumps([version(), rows]).encode()).hexdigest()
+
+
+def code_files(folder: str) -> Iterator[str]:
+    for entry in os.scandir(folder):
+        if entry.name.endswith(CODE):
+            yield entry.path
+        elif entry.is_dir() and entry.name != "__pycache__":
+            yield from code_files(entry.path)
+
+
+def digest_of(path: Path) -> str:
+    """A hash of a file's bytes, or of all files of a folder with their names."""
+    if path.is_dir():
+        found = sorted(file for file in path.rglob("*") if file.is_file())
+        rows = [[file.relative_to(path).as_posix(), digest_of(file)] for file in found]
+        return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+    return digest_of_file(str(path))
+
+
+def digest_of_file(path: str) -> str:
+    stat = os.stat(path)
+    known = (path, stat.st_size, stat.st_mtime_ns)
+    if known not in _digests:
+        with open(path, "rb") as file:
+            _digests[known] = hashlib.file_digest(file, "sha256").hexdigest()
+    return _digests[known]
+
+
+# Options of a command as the words that stand for them: app/command_line.py the other way.
+
+
+def words_for(command: str, options: Any) -> tuple[str, ...]:
+    """A command with its options, so that `parse` of them gives the same; paths are absolute.
+
+    What is no option is in the file of --settings.  ValueError where there is none.
+    """
+    places, rest = [], []
+    kind: type = type(options)
+    asked = {name for group in dicts_of(kind) for name in getattr(options, group)}
+    lines = asked - {each.field.name for each in arguments_of(kind) if each.into}
+    if lines and options.settings is None:
+        raise ValueError(f"{', '.join(sorted(lines))}: lines of a settings file, and none is given")
+    for each in arguments_of(kind):
+        given, value = _value_of(options, each)
+        if not given:
+            continue
+        values = [_word(part) for part in (value if each.is_tuple else (value,))]
+        if each.opt.positional:
+            places += values
+        elif each.kind is bool:
+            rest.append(each.name if value else f"--no-{each.name[2:]}")
+        elif each.count == 1 and values[0].startswith("-"):
+            rest.append(f"{each.name}={values[0]}")
+        else:
+            rest += [each.name, *values]
+    return (command, *places, *rest)
+
+
+def _value_of(options: Any, each: Argument) -> tuple[bool, Any]:
+    """(whether it is not what holds without a word, its value)."""
+    if each.into:
+        asked = getattr(options, each.into)
+        return each.field.name in asked, asked.get(each.field.name)
+    value = getattr(options, each.field.name)
+    return each.required or value not in (each.field.default, None), value
+
+
+def _word(value: Any) -> str:
+    if isinstance(value, Path):
+        return full(value) if str(value) != "-" else "-"
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def absolute(text: str) -> str:
+    """A path in a text option, for a process that is started elsewhere."""
+    return full(text) if os.path.exists(full(text)) else text

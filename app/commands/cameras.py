@@ -106,7 +106,7 @@ def is_part(path: Path, source: Path) -> bool:
 
 def facts_of(cameras) -> dict:
     """What --json prints: our own list, and what is known about the file."""
-    from shapeshift.scene.cameras.write_own_cameras import own_rows
+    from shapeshift.scene.cameras.own_cameras import own_rows
 
     return {
         "format": cameras.format,

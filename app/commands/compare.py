@@ -14,7 +14,7 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, print_json, say
 
 if TYPE_CHECKING:
-    from shapeshift.app.commands.compare_sides import SceneSide
+    from shapeshift.app.commands.compared import SceneSide
     from shapeshift.scene.pose import View
 
 VIEWS = 8  # of the orbit where no cameras are given
@@ -73,7 +73,7 @@ class Compared:
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.commands.compare_sides import PictureSide, SceneSide, open_side
+    from shapeshift.app.commands.compared import PictureSide, SceneSide, open_side
     from shapeshift.app.errors import UsageError
     from shapeshift.app.progress import working
 
@@ -105,7 +105,7 @@ def run(options: Options) -> int:
 
 def run_viewer(options: Options) -> int:
     """The same two in a window."""
-    from shapeshift.app.commands.compare_sides import split_stop
+    from shapeshift.app.commands.compared import split_stop
     from shapeshift.app.editor import desktop
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.document.scene_file import is_scene_file
@@ -119,7 +119,7 @@ def run_viewer(options: Options) -> int:
 
 def picture_pairs(a, b) -> Iterator[Compared]:
     """Pictures of two folders; BadFile where two have not one size."""
-    from shapeshift.app.commands.compare_sides import match_pictures, read_picture
+    from shapeshift.app.commands.compared import match_pictures, read_picture
     from shapeshift.runtime_models.model import BadFile
 
     pairs, how = match_pictures(a, b)
@@ -151,7 +151,7 @@ def choose_views(options: Options, a: "SceneSide") -> list["View"]:
 
 def drawn_views(options: Options, views: list, a, b) -> Iterator[Compared]:
     """Both from every view of A's; B may be pictures, which are in the order of the views."""
-    from shapeshift.app.commands.compare_sides import PictureSide, read_picture
+    from shapeshift.app.commands.compared import PictureSide, read_picture
     from shapeshift.app.drawing import open_renderer
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.runtime_models.model import BadFile
@@ -221,7 +221,7 @@ def score(
 
 def write_sheets(pairs: list[Compared], names: tuple[str, str], out: Path, overwrite: bool) -> int:
     """A sheet and a difference picture a view; returns by how much differences are amplified."""
-    from shapeshift.app.commands.compare_sheet import (
+    from shapeshift.app.commands.compared import (
         amplification,
         difference_picture,
         scale_text,

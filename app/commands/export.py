@@ -241,7 +241,7 @@ def make_part(path: Path, model, position, options: Options, known=None):
     from shapeshift.scene.cameras.framing import default_view
     from shapeshift.scene.pose import Pose
     from shapeshift.scene.scene import IDENTITY, SceneObject
-    from shapeshift.scene.selectors.read_selector import read_selector
+    from shapeshift.scene.selectors.selector_texts import read_selector
 
     x = known.x if known else choose_x(options.x, model)
     eye = default_view(model, (640, 360)).world_from_eye
@@ -269,7 +269,7 @@ def choose_x(text: str, model):
 
 def with_x(text: str) -> str:
     """A selector of --only in the form that has a control value, which means nothing here."""
-    from shapeshift.scene.selectors.read_selector import FORMS
+    from shapeshift.scene.selectors.selector_texts import FORMS
 
     kind, *parts = text.split(":")
     if kind not in FORMS:
@@ -339,7 +339,7 @@ def export_as_page(options: Options, scenes: tuple[Path, ...]) -> int:
 
     from shapeshift.app.errors import UsageError
     from shapeshift.app.pace import with_pace
-    from shapeshift.app.page.export_page import export_page
+    from shapeshift.app.page.page_file import export_page
     from shapeshift.app.page.page_scene import PageSettings
     from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.scene.scene import Scene

@@ -3,16 +3,50 @@
 import io
 import json
 import math
+import struct
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.app.commands.png16 import MOST, write_png16, write_whole
+from shapeshift.app.drawing import SOFTWARE
+from shapeshift.runtime_models.files.plain_text import name_line
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.renderer.surface import Surface
+
+
+# PNG files of 16 bits a number: depth, normals, coverage.  Pillow writes no such colours.
+
+MARK = b"\x89PNG\r\n\x1a\n"
+MOST = 65535
+GREY, COLOR = 0, 2  # colour types
+UP = 2  # filter: each row is the difference to the one above, which packs better
+
+
+def write_png16(pixels: np.ndarray, path: Path, texts: dict[str, str] | None = None) -> None:
+    """(H, W) or (H, W, 3) uint16 to a grey or colour PNG, whole or not at all.
+
+    texts: Latin-1, one tEXt entry each, after the name of this program.
+    """
+    height, width = pixels.shape[:2]
+    bytes_ = np.ascontiguousarray(pixels, ">u2").reshape(height, -1).view(np.uint8)
+    rows = np.full((height, 1 + bytes_.shape[1]), UP, np.uint8)
+    rows[:, 1:] = np.diff(bytes_, axis=0, prepend=np.zeros_like(bytes_[:1]))  # modulo 256
+    kind = COLOR if pixels.ndim == 3 else GREY
+    data = MARK + _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, kind, 0, 0, 0))
+    for key, text in ({"Software": SOFTWARE} | (texts or {})).items():
+        data += _chunk(b"tEXt", key.encode("latin-1") + b"\0" + text.encode("latin-1"))
+    data += _chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + _chunk(b"IEND", b"")
+    write_whole(path, data)
+
+
+def _chunk(name: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
 
 LEGEND = "legend.json"  # what the numbers of all pictures mean
 FARTHER = MOST  # what a depth picture says of all that is too far for it
@@ -86,3 +120,34 @@ def choose_unit(centre: np.ndarray, radius: float, views: list) -> float:
     if not 0 < farthest < math.inf:
         return 0.001
     return 10.0 ** math.ceil(math.log10(farthest / (MOST - 1)))
+
+
+# A legend in the corner of a debug picture.
+
+Rows = list[tuple[str, tuple[float, float, float]]]
+TEXT = (235, 235, 235)
+BEHIND = (16, 16, 16)
+
+
+def with_legend(picture: np.ndarray, rows: Rows) -> np.ndarray:
+    """(H, W, 3) display sRGB with the rows (text, colour) written into its upper left corner."""
+    if not rows:
+        return picture
+    from PIL import Image, ImageDraw
+
+    from shapeshift.renderer.debug.letters import drawable, letters
+
+    image = Image.fromarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
+    draw = ImageDraw.Draw(image)
+    height = max(11, image.height // 45)  # pixels of a line's letters
+    font = letters(height)
+    rows = [(drawable(name_line(text), height), color) for text, color in rows]
+    line, margin = round(height * 1.4), round(height * 0.6)
+    width = max(draw.textlength(text, font) for text, _ in rows) + height + 3 * margin
+    draw.rectangle((0, 0, width, line * len(rows) + margin), fill=BEHIND)
+    for i, (text, color) in enumerate(rows):
+        top = margin + i * line
+        fill = tuple(round(255 * c) for c in color)
+        draw.rectangle((margin, top, margin + height, top + height), fill=fill)
+        draw.text((height + 2 * margin, top), text, fill=TEXT, font=font)
+    return np.asarray(image, np.float32) / 255

@@ -16,7 +16,7 @@ from shapeshift.app.terminal import print_json, print_text, say
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.poses.find_poses import Length, PoseSettings
-    from shapeshift.decomposition.poses.pose_report import PoseReport
+    from shapeshift.decomposition.poses.write_posed import PoseReport
 
 FRAMES = "frames"  # of a video, below --out, as long as the search is not done
 OURS = {"images", "masks", "sparse", "poses.json", "capture.json", "poses.work", FRAMES}

@@ -346,7 +346,7 @@ def own_views(options: Options, document: "Document", size: tuple[int, int] | No
 def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
     """The selectors that the texts of --select stand for; a lens looks along the view."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.scene.selectors.read_selector import read_selector
+    from shapeshift.scene.selectors.selector_texts import read_selector
 
     try:
         return tuple(read_selector(text, model.stops, view.world_from_eye) for text in texts)
@@ -377,7 +377,7 @@ def draw_all(
     """
     import numpy as np
 
-    from shapeshift.app.commands.picture_legend import with_legend
+    from shapeshift.app.commands.outputs import with_legend
     from shapeshift.app.drawing import save_png
     from shapeshift.app.progress import tracked
     from shapeshift.renderer.debug.debug import debug_legend

@@ -94,7 +94,7 @@ def run(options: Options) -> int:
         print_tables(found, scores)
     tell_gaps(found)
     if options.report is not None:
-        from shapeshift.app.decomposition.segment_report import write_report
+        from shapeshift.app.decomposition.segment_steps import write_report
 
         write_report(device, found, options.report, options.overwrite)
         say(f"pictures in {full(options.report)}")
@@ -117,7 +117,7 @@ def cut(
     """Writes the labelled model and the scene file; what was found, and what became of each label
     in the photos where a segmenter was asked.  Raises BadFile, UsageError.
     """
-    from shapeshift.app.decomposition.assembling import CompletionSettings, completed
+    from shapeshift.app.decomposition.segment_steps import CompletionSettings, completed
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
     from shapeshift.scene.document.write_scene_file import write_scene_file
@@ -131,7 +131,7 @@ def cut(
             lambda done, count: progress("evidence of photos", done, count),
         )  # fmt: skip
     else:
-        from shapeshift.app.decomposition.segment_prompts import PromptSettings, find_by_prompts
+        from shapeshift.app.decomposition.segment_steps import PromptSettings, find_by_prompts
 
         assert specs is not None, "refused before"
         settings = PromptSettings(options.out, options.segmenter, options.photos, progress, notice)

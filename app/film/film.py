@@ -12,9 +12,8 @@ from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
     from shapeshift.app.document import Document
-    from shapeshift.app.film.draw_film import FrameForm
+    from shapeshift.app.film.draw_film import FrameFolder, FrameForm
     from shapeshift.app.film.film_plan import Clock, FilmPlan
-    from shapeshift.app.film.frame_folder import FrameFolder
     from shapeshift.scene.appearance import Background
     from shapeshift.scene.cameras.camera_list import CameraList
     from shapeshift.scene.film.film_path import FilmPath
@@ -97,8 +96,8 @@ def run(options: Options) -> int:
     from shapeshift.app.camera_files import refuse_fov
     from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.document import open_document
+    from shapeshift.app.film.draw_film import FrameFolder
     from shapeshift.app.film.film_plan import read_style
-    from shapeshift.app.film.frame_folder import FrameFolder
 
     check_cluster(options)
     refuse_fov(options.fov_y)
@@ -305,7 +304,7 @@ def numbers_of(options: Options, count: int) -> list[int]:
 def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameFolder") -> None:
     """Makes the folder of frames ready.  Raises UsageError."""
     from shapeshift.app.drawing import make_folder
-    from shapeshift.app.film.frame_folder import film_key, frame_facts
+    from shapeshift.app.film.draw_film import film_key, frame_facts
     from shapeshift.scene.document.appearance_rows import background_row
     from shapeshift.scene.film.film_file import write_film_file
 

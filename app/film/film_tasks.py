@@ -8,13 +8,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.cluster.open_cluster import NONE, open_cluster
-from shapeshift.app.cluster.task import Task, forget
-from shapeshift.app.cluster.words import absolute, words_for
+from shapeshift.app.cluster.task import Task, absolute, forget, words_for
 from shapeshift.app.paths import full
 
 if TYPE_CHECKING:
+    from shapeshift.app.film.draw_film import FrameFolder
     from shapeshift.app.film.film_plan import FilmPlan
-    from shapeshift.app.film.frame_folder import FrameFolder
 
 RUN = 50  # frames of a task: opening the scene and compiling kernels then cost little beside them
 
@@ -33,8 +32,8 @@ def frame_tasks(
     options: Any, plan: "FilmPlan", folder: "FrameFolder", numbers: Sequence[int]
 ) -> list[Task]:
     """A task for each run of frames, of those that lack any."""
+    from shapeshift.app.film.draw_film import scene_files
     from shapeshift.app.film.film_plan import is_named
-    from shapeshift.app.film.frame_folder import scene_files
 
     reads = [full(path) for path in scene_files(plan.document, options.scene)]
     cameras = absolute(options.cameras) if is_named(options.cameras) else options.cameras

@@ -13,7 +13,7 @@ from shapeshift.scene.pose import View
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
 from shapeshift.vr.frame import SIDES
-from shapeshift.vr.locomotion.height import raised
+from shapeshift.vr.locomotion.play_space import raised
 from shapeshift.vr.openxr.layers import QuadPicture
 from shapeshift.vr.overlay import Overlay
 from shapeshift.vr.scene_depth import EyeDepth, SceneDepth

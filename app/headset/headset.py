@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from shapeshift.app.editor.state.editor_state import EditorState
     from shapeshift.app.headset.scene_shelf import SceneShelf
     from shapeshift.app.headset.session.headset_link import HeadsetLink
-    from shapeshift.app.headset.shutter import Shutter
-    from shapeshift.app.headset.wearing import Wearing
-    from shapeshift.app.headset.worn_settings import KeptSettings
+    from shapeshift.app.headset.session.recorder import Shutter
+    from shapeshift.app.headset.worn_settings import KeptSettings, Wearing
 
 NO_HEADSET = 4  # exit code
 MOST_WAIT_S = 3600.0  # for a runtime that went away
@@ -183,8 +182,8 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.eyes import Eyes
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
-    from shapeshift.app.headset.open_xr import open_xr
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
+    from shapeshift.app.headset.scene_shelf import open_xr
     from shapeshift.app.headset.session.headset_link import HeadsetLink
     from shapeshift.app.headset.xr_app import XrApp
     from shapeshift.app.paths import config_folder
@@ -246,7 +245,7 @@ def say_missing(link: "HeadsetLink", options: Options, worn: "KeptSettings") -> 
 def wearing_of(options: Options, editor: "EditorState") -> "Wearing":
     """What was chosen at the door.  Raises UsageError for a stop that nothing has."""
     from shapeshift.app.headset.over.glass_state import stop_named
-    from shapeshift.app.headset.wearing import Wearing
+    from shapeshift.app.headset.worn_settings import Wearing
 
     return Wearing(
         options.floor, options.hints, options.depth, options.panel_layer, options.edges,
@@ -265,8 +264,7 @@ def worn_settings(options: Options) -> "KeptSettings":
 
 def shutter_of(options: Options) -> "Shutter":
     """What takes pictures, and records from the first frame on where that was asked for."""
-    from shapeshift.app.headset.session.recorder import Recorder
-    from shapeshift.app.headset.shutter import Shutter
+    from shapeshift.app.headset.session.recorder import Recorder, Shutter
     from shapeshift.app.paths import WorkFolders
 
     folder = WorkFolders.of().pictures

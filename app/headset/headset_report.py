@@ -19,8 +19,8 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.record import Record
 from shapeshift.vr.frame import SIDES, Area, Frame, Hand, view_names
 from shapeshift.vr.glove import fingertip
-from shapeshift.vr.openxr.life import Life
-from shapeshift.vr.openxr.swapchain import read
+from shapeshift.vr.openxr.events import Life
+from shapeshift.vr.openxr.graphics import read
 from shapeshift.vr.pace import FramePace
 
 DECIMALS = 6

@@ -8,8 +8,7 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import Box, clean_texts, listing_items
-from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer
-from shapeshift.app.editor.panels.widgets.textures import Textures
+from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer, Textures
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.vr.panel.plane import PanelPlane, Pointing
 

@@ -9,8 +9,8 @@ from shapeshift.renderer.settings import FOVEATIONS
 from shapeshift.runtime_models.files.json_fields import is_number, saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.vr.frame import SIDES
-from shapeshift.vr.locomotion.height import POSTURES
 from shapeshift.vr.locomotion.locomotion import TURNINGS, Rules
+from shapeshift.vr.locomotion.play_space import POSTURES
 
 FILE = "headset.json"
 LARGEST = 1 << 16  # bytes
@@ -108,3 +108,22 @@ def read_settings(folder: Path) -> WornSettings:
     if isinstance(found.get("passthrough"), bool):
         good["passthrough"] = found["passthrough"]
     return WornSettings(**good)
+
+
+# What who wears the headset chose at the door, beside the rules of moving.
+
+
+@dataclass(frozen=True)
+class Wearing:
+    """How a session looks; the panel changes some of it."""
+
+    floor: bool = True  # a grid on it
+    hints: bool = True  # names of buttons, notices
+    depth: bool = True  # of the splats: hides hands behind them, and goes to the compositor
+    panel_layer: bool = True  # the panel is a layer of the compositor's
+    edges: bool = True  # of the room that is free to walk in
+    visibility: bool = True  # nothing is drawn where lenses show nothing
+    glass: str = ""  # the stop that a glass in the hand shows; "": there is none
+
+
+WEARING = Wearing()

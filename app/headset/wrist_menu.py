@@ -11,21 +11,23 @@ from imgui_bundle import imgui
 from shapeshift.app.editor.panels.messages_panel import draw_note
 from shapeshift.app.editor.panels.panel import Section, draw_sections
 from shapeshift.app.editor.panels.scale_bar import has_scale
-from shapeshift.app.editor.panels.sections.gallery_panel import draw_gallery
-from shapeshift.app.editor.panels.sections.look_panel import draw_look
 from shapeshift.app.editor.panels.sections.objects_panel import draw_object_list
 from shapeshift.app.editor.panels.sections.parts_panel import draw_parts
+from shapeshift.app.editor.panels.sections.plain_sections import draw_look
 from shapeshift.app.editor.panels.sections.stops_panel import draw_stops
 from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.panels.slider import track_ends
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.panel_rows import item_label, subsection
 from shapeshift.app.editor.state.arrange import steer_by_hand
 from shapeshift.app.editor.state.files.saving import unsaved
-from shapeshift.app.editor.state.film.gallery import Gallery
-from shapeshift.app.editor.state.film.style_work import StyleWork
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.track import ON_STOP, shown_words
 from shapeshift.app.editor.texts.table import said
+from shapeshift.app.film.window.gallery import Gallery
+from shapeshift.app.film.window.gallery_panel import draw_gallery
+from shapeshift.app.film.window.style_work import StyleWork
+from shapeshift.app.headset.over.glass_state import stop_names
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
 from shapeshift.app.headset.save_start import save_scene
 from shapeshift.app.headset.scene_shelf import SceneShelf
@@ -33,27 +35,27 @@ from shapeshift.app.headset.sections.comfort_section import (
     draw_comfort,
     draw_foveation,
     draw_see_through,
+    lit_button,
 )
-from shapeshift.app.headset.sections.glass_section import draw_glass
 from shapeshift.app.headset.sections.performance_section import draw_figures
 from shapeshift.app.headset.sections.room_section import (
     Foot,
     RoomActions,
+    SceneActions,
     draw_head,
     draw_help,
     draw_room,
     draw_scale,
+    draw_scenes,
 )
-from shapeshift.app.headset.sections.scenes_section import SceneActions, draw_scenes
 from shapeshift.app.headset.sections.tool_sections import tool_sections
 from shapeshift.app.headset.session.recorder import Recorder
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
 from shapeshift.vr.frame import Frame
-from shapeshift.vr.locomotion.stance import resized
-from shapeshift.vr.panel.carried import Carried, Palm, carry, left_over
+from shapeshift.vr.locomotion.play_space import resized
+from shapeshift.vr.panel.carried import MIDDLE, Carried, Palm, carry, left_over, scroll, slide
 from shapeshift.vr.panel.plane import NOBODY, Place
-from shapeshift.vr.panel.stick import MIDDLE, scroll, slide
 
 TICK = (0.25, 0.012)  # strength and seconds of the buzz when something is pointed at
 CLICK = (0.6, 0.025)  # when it is pressed, and when the knob comes to a stop
@@ -342,3 +344,31 @@ class WristMenu:
             for name, (left, top, right, bottom) in boxes.items()
         }
         return row
+
+
+# Of the panel's section "Look": which stop is seen through a round glass in the hand.
+
+COLUMNS = 3
+NONE, HELP = "no glass", "It is in the hand of the panel once the panel is closed."
+
+
+def draw_glass(state: XrState) -> None:
+    """A button for no glass and one for each stop, lit where it is chosen."""
+    names = stop_names(state.editor)
+    if not names or not subsection("Glass", bool(state.glass.stop)):
+        return
+    glass, gap = state.glass, imgui.get_style().item_spacing.x
+    width = (imgui.get_content_region_avail().x - gap * (COLUMNS - 1)) / COLUMNS
+    imgui.push_id("glass")
+    if lit_button(item_label(NONE), not glass.stop, width):
+        glass.stop = ""
+    for number, name in enumerate(names, 1):
+        if number % COLUMNS:
+            imgui.same_line()
+        if lit_button(f"{name}###glass {number}", glass.stop == name, width):
+            glass.stop = name
+    imgui.pop_id()
+    if glass.stop:
+        imgui.push_text_wrap_pos(0)
+        imgui.text_disabled(said(HELP))
+        imgui.pop_text_wrap_pos()

@@ -14,23 +14,21 @@ from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
-from shapeshift.app.headset.in_hand.probe import Probe
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.over.glass_state import GlassState, stop_now
 from shapeshift.app.headset.over.hand_glass import HandGlass
-from shapeshift.app.headset.over.over_splats import OverSplats
-from shapeshift.app.headset.over.table_shadows import TableShadows
+from shapeshift.app.headset.over.over_splats import OverSplats, TableShadows
 from shapeshift.app.headset.pacing import Pacing, choose_quality
 from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.app.headset.sections.performance_section import Figures
-from shapeshift.app.headset.session.comeback import Comeback
-from shapeshift.app.headset.shutter import Shutter
-from shapeshift.app.headset.wearing import WEARING, Wearing
-from shapeshift.app.headset.worn_settings import KeptSettings
+from shapeshift.app.headset.session.headset_link import Comeback
+from shapeshift.app.headset.session.recorder import Shutter
+from shapeshift.app.headset.worn_settings import WEARING, KeptSettings, Wearing
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
+from shapeshift.app.inspection.window.probe import Probe
 from shapeshift.app.paths import WorkFolders
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
@@ -42,7 +40,7 @@ from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import REST, Floor, Grid, clearness
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel
-from shapeshift.vr.locomotion.stance import underfoot
+from shapeshift.vr.locomotion.play_space import underfoot
 from shapeshift.vr.openxr.session import Session
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.see_through import SeeThrough

@@ -7,7 +7,6 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.editor.texts.table import said
-from shapeshift.app.headset.fitting import Fitting
 from shapeshift.app.headset.in_hand.hand_tools import HandTools
 from shapeshift.app.headset.over.glass_state import GlassState
 from shapeshift.app.headset.pacing import Pacing
@@ -19,13 +18,54 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
-from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, move
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.locomotion.stance import play_space_before, underfoot
-from shapeshift.vr.locomotion.teleport import ground_of
-from shapeshift.vr.obstacles import Sight, look
+from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, ground_of, move
+from shapeshift.vr.locomotion.play_space import (
+    PlaySpace,
+    lift_of,
+    lifted,
+    play_space_before,
+    underfoot,
+)
+from shapeshift.vr.one_hand import alone
+from shapeshift.vr.openxr.room import EYE_HEIGHT_M
 from shapeshift.vr.openxr.session import Session
+from shapeshift.vr.outline import Sight, look
+from shapeshift.vr.panel.carried import Palm
 from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
+
+# A frame as it is for who wears the headset: how high they are, and which hands they have.
+
+
+class Fitting:
+    """Keeps by how much the room is raised: it is measured at Recentre, and stays until the next.
+
+    `lift_m`: metres.
+    """
+
+    def __init__(self, settings: KeptSettings) -> None:
+        self._settings, self.lift_m = settings, 0.0
+        self._next_m = 0.0  # from the next frame on
+        self._posture = settings.now.posture
+        self._palm = Palm()
+
+    def measure(self, head: Pose) -> None:
+        """Of the head as the last frame had it, raised; from the next frame on it holds."""
+        y = float(head.position[1]) - self.lift_m
+        self._posture = self._settings.now.posture
+        self._next_m = lift_of(self._posture, y, EYE_HEIGHT_M)
+
+    def worn(self, frame: Frame, seconds: float) -> tuple[Frame, bool]:
+        """The frame, and whether the room has another height since the one before."""
+        moves = self._next_m != self.lift_m
+        self.lift_m = self._next_m
+        frame = lifted(frame, self.lift_m)
+        if moves:
+            frame = replace(frame, recentred=True)
+        if self._posture != self._settings.now.posture:
+            self.measure(frame.head)
+        if side := self._settings.now.one_hand:
+            frame, self._palm = alone(frame, side, self._palm, seconds)
+        return frame, moves
 
 
 class XrUser:

@@ -1,5 +1,6 @@
 """A scene's stop of values as numbers: which one it is, its range, and a ValuePicture of a view."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from shapeshift.runtime_models.stops.stop_formula import read_formula, sources_o
 from shapeshift.scene.appearance import NEUTRAL
 from shapeshift.scene.cameras.framing import default_background
 from shapeshift.scene.inspection.value_picture import ValuePicture
-from shapeshift.scene.pose import View
+from shapeshift.scene.pose import View, look_at
 from shapeshift.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -196,3 +197,63 @@ def value_of_colors(colors: np.ndarray, palette: str) -> tuple[np.ndarray, np.nd
     curve = np.stack([np.interp(fine * (STEPS - 1), np.arange(STEPS), c) for c in table.T], axis=1)
     away, nearest = cKDTree(curve).query(np.nan_to_num(colors.reshape(-1, 3)))
     return fine[nearest].reshape(colors.shape[:-1]), away.reshape(colors.shape[:-1])
+
+
+# The value of a place in the world, without a view: read from where its surface faces the eye.
+
+EYES = 32  # directions, spread evenly over the sphere
+AWAY = 0.8  # of the scene's radius, from the place to each eye
+PIXELS = 33  # a side
+FOOTPRINT = 0.002  # of the scene's radius: what a pixel is wide at the place
+REACH = 2  # pixels to each side, for the surface's direction
+STEEPEST = 0.2  # cosine: more grazing views tell nothing of a surface
+GOLDEN_ANGLE = np.pi * (3 - 5**0.5)  # radians
+
+
+def value_facing(
+    values_of: Callable[[View], ValuePicture], point: np.ndarray, radius: float
+) -> float:
+    """The value at a point (3,) metres, world, in the view of EYES that sees it most from the
+    front: emission falls off at grazing angles.  NaN where none sees it.
+
+    radius: of the scene, metres.
+    """
+    best, found = STEEPEST, float("nan")
+    for view in eyes_around(point, radius):
+        picture = values_of(view)
+        value = float(picture.values_at(point[None])[0])
+        if not np.isfinite(value):
+            continue
+        cosine = facing(picture)
+        if cosine > best:
+            best, found = cosine, value
+    return found
+
+
+def eyes_around(point: np.ndarray, radius: float) -> list[View]:
+    """Small views on a point from all sides: a spiral by the golden angle."""
+    distance = AWAY * radius
+    side = PIXELS / 2 * FOOTPRINT * radius / distance  # tangent
+    heights = 1 - 2 * (np.arange(EYES) + 0.5) / EYES
+    turns = GOLDEN_ANGLE * np.arange(EYES)
+    level = np.sqrt(1 - heights**2)
+    directions = np.stack([level * np.sin(turns), heights, level * np.cos(turns)], axis=1)
+    tangents = (-side, side, -side, side)
+    return [
+        View(look_at(point + distance * d, point), tangents, 0.01 * distance, 100 * distance,
+             (PIXELS, PIXELS))
+        for d in directions
+    ]  # fmt: skip
+
+
+def facing(picture: ValuePicture) -> float:
+    """Cosine between the surface in the middle of a picture and the ray to it; 0: not known."""
+    row, column = (side // 2 for side in picture.depth_m.shape)
+    points = picture.points
+    across = points[row, column + REACH] - points[row, column - REACH]
+    down = points[row + REACH, column] - points[row - REACH, column]
+    normal = np.cross(across, down)
+    ray = points[row, column] - picture.view.world_from_eye.position
+    size = float(np.linalg.norm(normal) * np.linalg.norm(ray))
+    cosine = abs(float(normal @ ray)) / size if size > 0 else 0.0
+    return cosine if np.isfinite(cosine) else 0.0

@@ -167,7 +167,7 @@ def known_scale(options: Options, picture: "ValuePicture", origin: "np.ndarray")
     ValueError.
     """
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.inspection.mark_texts import parse_numbers
+    from shapeshift.app.inspection.mark_options import parse_numbers
     from shapeshift.app.terminal import say
     from shapeshift.scene.inspection.lengths import Scale
     from shapeshift.scene.inspection.marks_file import kept_scale, marks_path
@@ -190,7 +190,7 @@ def point_of(text: str, picture: "ValuePicture", origin: "np.ndarray", said: str
     import numpy as np
 
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.inspection.mark_texts import parse_numbers
+    from shapeshift.app.inspection.mark_options import parse_numbers
     from shapeshift.scene.inspection.lengths import Point
 
     numbers = parse_numbers(text, said)

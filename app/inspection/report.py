@@ -24,7 +24,7 @@ from shapeshift.app.program import is_installed
 from shapeshift.runtime_models.files.plain_text import json_text, one_line
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.cameras.camera_list import CameraList, moved
-from shapeshift.scene.cameras.write_own_cameras import own_rows
+from shapeshift.scene.cameras.own_cameras import own_rows
 from shapeshift.scene.inspection.mark_photos import photo_pixels
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.scene.inspection.marks_file import MarksFile

@@ -17,12 +17,14 @@ from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
 from shapeshift.runtime_models.web.limits import COLOR_BITS, MOST_SPLATS
 from shapeshift.runtime_models.web.web_model import (
+    FORMAT,
+    Container,
     ControlEntry,
     ModelEntry,
+    TableEntry,
     control_entry,
     describe_model,
 )
-from shapeshift.runtime_models.web.write_container import FORMAT, Container, TableEntry
 from shapeshift.scene.appearance import plain_color
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document.scene_file import SceneItem, named_stops

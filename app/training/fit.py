@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf, Opt
 from shapeshift.app.terminal import open_console, print_json, say
-from shapeshift.app.training.train_options import SETTINGS, Asked, MachineOptions
+from shapeshift.app.training.train_options import SETTINGS, Asked, MachineOptions, with_settings
 from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings, suited
 
@@ -77,14 +77,15 @@ def run(options: Options) -> int:
     from shapeshift.app.paths import full
     from shapeshift.app.training.run_loop import calibrated
     from shapeshift.app.training.train_options import settings_of
-    from shapeshift.app.training.trials.run_trial import run_trial
     from shapeshift.app.training.trials.run_trials import (
         calibrated_once,
+        run_trial,
         say_of_clock,
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
 
+    options = with_settings(options)
     if options.only is not None:
         return run_trial(options)
     refuse_options(options)

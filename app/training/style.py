@@ -1,6 +1,9 @@
 """launch.py style: a new stop in a finished scene, all others as they were; or one out of it."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from shapeshift.app.opening import open_model
 from shapeshift.app.paths import full
@@ -8,11 +11,9 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.style_looks import check_looks, views_and_size, with_named_style
 from shapeshift.app.training.style_options import Options
+from shapeshift.runtime_models.model import AnchorModel
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.training.styles.add_style import NewStyle
 
 INTERRUPTED = 130  # exit code
@@ -116,9 +117,8 @@ def remove(options: Options, model: "AnchorModel") -> int:
 def add(options: Options, model: "AnchorModel") -> int:
     """Puts a stop into the scene."""
     from shapeshift.app.opening import progress_after
-    from shapeshift.app.training.style_looks import preview_of
-    from shapeshift.app.training.style_region import anchors_inside
-    from shapeshift.app.training.style_sources import pictures_and_views
+    from shapeshift.app.training.style_looks import pictures_and_views, preview_of
+    from shapeshift.app.training.style_options import anchors_inside
     from shapeshift.rasterizer.device import open_device
     from shapeshift.training.styles.add_style import add_style
 
@@ -167,7 +167,7 @@ def with_formula(options: Options, model: "AnchorModel") -> "tuple[AnchorModel, 
 def style_of(options: Options, model: "AnchorModel") -> "NewStyle":
     """What the options say of the new stop.  Raises UsageError."""
     from shapeshift.app.errors import UsageError, as_typed
-    from shapeshift.app.training.style_sources import usual_name
+    from shapeshift.app.training.style_looks import usual_name
     from shapeshift.runtime_models.model import BadFile
     from shapeshift.runtime_models.stops.insert_stop import insert_stop
     from shapeshift.training.styles.add_style import NewStyle
@@ -198,7 +198,6 @@ def finish(
     """Measures the pace, writes the package, and says what there is and what moved."""
     from shapeshift.app.pace import with_every_pace
     from shapeshift.app.progress import working
-    from shapeshift.app.training.style_report import report, write_sheet
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.feature_codes import EXACT
     from shapeshift.runtime_models.package.read_package import read_package
@@ -218,3 +217,52 @@ def finish(
         write_sheet(options.sheet, before, written, style, options.device)
         say(f"{full(options.sheet)}: {style.source} above {style.name}.")
     say(f"look: {program()} {full(options.out)}")
+
+
+# What `style` says at the end: where the stops are, what moved, and a sheet of pictures.
+
+SHEET_VIEWS, SHEET_SIZE = 4, (384, 288)
+UNMOVED_DB = 90.0  # below that something is wrong: float rounding alone left 98.6 in the demo
+
+
+def report(
+    model: AnchorModel,
+    drift: dict[str, float],
+    style: "NewStyle | None",
+    inside: np.ndarray | None,
+) -> list[str]:
+    """Lines: each stop with its x, and how exactly it shows what it showed."""
+    lines = []
+    for stop in model.stops:
+        if stop.name in drift:
+            moved = "" if drift[stop.name] >= UNMOVED_DB else ", MOVED: please report this scene"
+            what = f"as it was, {drift[stop.name]:.0f} dB in the worst of 8 views{moved}"
+        else:
+            what = f"new, from {style.source}" if style is not None else "new"
+            what = f"new, {stop.formula}" if stop.formula else what
+        lines.append(f"x = {stop.x:.3f}  {stop.name}: {what}")
+    if inside is not None:
+        lines.append(f"It changes {int(inside.sum()):,} of {len(inside):,} anchors.")
+    return lines
+
+
+def write_sheet(
+    path: Path, before: AnchorModel, after: AnchorModel, style: "NewStyle", device: str | None
+) -> None:
+    """A PNG: views of the source stop in the upper row, of the new stop below."""
+    from shapeshift.app.drawing import save_png
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.scene.cameras.framing import default_background
+    from shapeshift.training.evaluation.evaluate import ModelRenderer
+    from shapeshift.training.styles.add_style import BEHIND
+    from shapeshift.training.styles.train_stop import dome_views
+
+    behind, opened = default_background(before, BEHIND), open_device(device)
+    views = dome_views(before, SHEET_VIEWS, SHEET_SIZE)
+    rows = []
+    for model, name in ((before, style.source), (after, style.name)):
+        renderer = ModelRenderer(opened, model)
+        renderer.set_control(next(stop.x for stop in model.stops if stop.name == name))
+        rows.append(np.concatenate([renderer.picture(view, behind) for view in views], axis=1))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_png(np.concatenate(rows), path)

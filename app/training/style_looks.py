@@ -1,5 +1,6 @@
-"""Looks from a style picture or from words, as the options of `style` say them."""
+"""What a new stop is learned from, as the options of `style` say it."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -7,13 +8,93 @@ from typing import TYPE_CHECKING, cast
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training.style_options import Options, Shape
+from shapeshift.runtime_models.model import AnchorModel
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from shapeshift.runtime_models.model import AnchorModel
+    from shapeshift.scene.pose import View
     from shapeshift.training.styles.style_pictures import StylePictures
     from shapeshift.training.styles.style_rules import Rule
+
+MOST_STYLES = 64  # of a blend
+NAMES = 24  # letters of a name that comes from a file's
+
+
+def usual_name(options: Options) -> str:
+    """What a stop is called that was given no name."""
+    file = options.image or options.network or options.pictures
+    words = [options.shape.capitalize()] if options.shape else []
+    if options.text:
+        words.append(" ".join(options.text.split())[:NAMES].strip() or "style")
+    elif file is not None:
+        words.append(file.stem[:NAMES].strip() or "style")
+    name = " ".join(words)
+    return name[:1].upper() + name[1:]
+
+
+def pictures_and_views(
+    options: Options, model: AnchorModel, painted: bool = False
+) -> "tuple[StylePictures | None, list[View]]":
+    """Who paints the stop, None where a shape alone is asked for, and the views that are painted.
+
+    painted: the caller has a painter of its own.  Raises UsageError and BadFile.
+    """
+    from shapeshift.training.styles.carried_pictures import CarriedPictures
+    from shapeshift.training.styles.picture_files import PictureFiles, files_for
+    from shapeshift.training.styles.train_stop import dome_views, resized_views
+
+    looks = looks_of(options)
+    if not (painted or looks or options.network or options.pictures):
+        return None, []
+    count, longest = views_and_size(options)
+    names: tuple[str, ...] = ()
+    if options.cameras is None:
+        views = dome_views(model, count, (longest, round(longest * 3 / 4)))
+    else:
+        cameras = read_cameras(options, options.cameras)
+        views, names = resized_views(cameras.views, longest), cameras.names
+    if painted:
+        return None, views
+    if options.pictures is not None:
+        return CarriedPictures(PictureFiles(files_for(options.pictures, names))), views
+    return looks or CarriedPictures(network_of(options)), views
+
+
+def network_of(options: Options) -> "StylePictures":
+    """The network that --network names, with its style."""
+    from shapeshift.training.styles.image_network import ImageNetwork, encode_style
+    from shapeshift.training.styles.picture_files import read_picture
+
+    assert options.network is not None, "checked before"
+    weights, code = read_weights(options.weights), None
+    if options.image is not None and options.encoder is not None:
+        code = encode_style(options.encoder, read_picture(options.image))
+    return ImageNetwork(options.network, weights, code)
+
+
+def read_weights(text: str) -> dict[int, float]:
+    """Style number -> weight, of "3" or "3=0.5,12=0.5".  Raises UsageError."""
+    found: dict[int, float] = {}
+    for word in filter(None, text.split(",")):
+        number, _, weight = word.partition("=")
+        try:
+            index, value = int(number), float(weight or 1)
+        except ValueError:
+            index, value = -1, math.nan
+        if (
+            not (index >= 0 and 0 <= value <= 10 and index not in found)
+            or len(found) >= MOST_STYLES
+        ):
+            raise UsageError(
+                f"--weights is '{text[:60]}'; numbers of styles, each once, and weights of 0 to "
+                "10 are wanted, as 3=0.5,12=0.5."
+            )
+        found[index] = value
+    return found
+
+
+# Looks from a style picture or from words, as the options of `style` say them.
 
 MADE_SIDE = 256  # pixels of a picture of our own
 LONGEST_SIDE = 384  # pixels to which a style picture is made smaller: strokes of some ten pixels
@@ -90,7 +171,7 @@ def with_named_style(options: Options) -> Options:
 
 def style_picture(path: Path) -> "np.ndarray":
     """(H, W, 3) float32 of a file, or of a picture of our own by its name.  Raises BadFile."""
-    from shapeshift.training.style_features.made_styles import MADE_STYLES
+    from shapeshift.training.style_features.named_styles import MADE_STYLES
     from shapeshift.training.styles.image_network import resized
     from shapeshift.training.styles.picture_files import LEAST_PX, read_picture
 
@@ -117,8 +198,8 @@ def looks_of(options: Options) -> "StylePictures | None":
         assert options.vgg is not None and options.image is not None, "checked before"
         return nnfm_pictures(options.vgg, [style_picture(options.image)], seed=options.seed)
     from shapeshift.training.style_features.clip_model import ClipModel
-    from shapeshift.training.style_features.clip_patches import PatchSettings
     from shapeshift.training.style_features.clip_pictures import (
+        PatchSettings,
         clip_pictures,
         picture_direction,
         text_direction,
@@ -158,7 +239,7 @@ def preview_of(
     from shapeshift.training.style_features.splat_features import VIEW_SIZE, scene_views
     from shapeshift.training.style_features.zero_shot import StylePreview, recolor_rule
     from shapeshift.training.styles.add_style import BEHIND
-    from shapeshift.training.styles.style_views import resized_views
+    from shapeshift.training.styles.train_stop import resized_views
 
     assert options.vgg is not None and options.image is not None, "checked before"
     picture = style_picture(options.image)

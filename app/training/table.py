@@ -11,8 +11,14 @@ from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED
-from shapeshift.app.training.table_rows import MEAN, NAMES, TableRow, VggRow, finish, mean_row
-from shapeshift.app.training.train_options import OF_SPLATS, SETTINGS, Asked, MachineOptions
+from shapeshift.app.training.table_parts import MEAN, NAMES, TableRow, VggRow, finish, mean_row
+from shapeshift.app.training.train_options import (
+    OF_SPLATS,
+    SETTINGS,
+    Asked,
+    MachineOptions,
+    with_settings,
+)
 from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.left_options import LEFT
@@ -80,6 +86,7 @@ def run(options: Options) -> int:
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
+    options = with_settings(options)
     if options.seconds is None and options.iterations is None:
         raise UsageError("a comparison needs a budget: give --seconds or --iterations.")
     if not options.methods:
@@ -195,7 +202,7 @@ def pack_splats(capture: "Capture", out: Path, rows: list[TableRow]) -> "dict[st
     from shapeshift.app.errors import UsageError
     from shapeshift.app.training.train_baselines import TrainedFile
     from shapeshift.runtime_models.splats.formats import read_plain
-    from shapeshift.runtime_models.splats.layers.write_layer_list import (
+    from shapeshift.runtime_models.splats.layers.layer_list import (
         layer_name,
         write_layer_list,
     )

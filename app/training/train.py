@@ -24,7 +24,7 @@ from shapeshift.app.training.run_loop import (
     train,
     used,
 )
-from shapeshift.app.training.train_options import Options, settings_of
+from shapeshift.app.training.train_options import Options, settings_of, with_settings
 
 if TYPE_CHECKING:
     from shapeshift.training.train import Trainer
@@ -34,6 +34,7 @@ FEW_STEPS = USUAL_STEPS // 2  # scenes that are worth looking at need about so m
 
 
 def run(options: Options) -> int:
+    options = with_settings(options)
     check_calibrate(options)
     in_blocks = part_in_blocks(options)
     return in_blocks(options) if in_blocks is not None else run_whole(options)

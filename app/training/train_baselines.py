@@ -213,7 +213,7 @@ def train_splats(
     device, capture: "Capture", options: Options, settings: "PlainSettings", room: "PhotoRoom"
 ) -> Outcome:
     """Plain splats of every modality into the folder --out: a PLY each and layers.json."""
-    from shapeshift.runtime_models.splats.layers.write_layer_list import (
+    from shapeshift.runtime_models.splats.layers.layer_list import (
         refuse_other_folder,
         write_list,
     )
@@ -246,7 +246,7 @@ def train_separate(
 
 def files_of(capture: "Capture", out: Path, ending: str) -> list[Path]:
     """One a modality."""
-    from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name
+    from shapeshift.runtime_models.splats.layers.layer_list import layer_name
 
     return [out / layer_name(n, stop, ending) for n, stop in enumerate(capture.stops)]
 

@@ -5,12 +5,167 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shapeshift.decomposition.completion.anchor_looks import looks_of
-from shapeshift.decomposition.completion.plane import Plane, support_plane
-from shapeshift.decomposition.completion.stamp import Stamp, apply_stamp, find_stamp
+from shapeshift.decomposition.completion.plane import (
+    ABOVE,
+    BELOW,
+    AnchorLooks,
+    Footprint,
+    Plane,
+    PlaneCells,
+    Refused,
+    cells_of,
+    footprint_of,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.completion.verify import Cells, PhotoView, Verdict, verify
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.model import AnchorModel
+
+# A clone stamp in anchor space: the place under a thing filled from beside it.
+#
+# Anchors of a free place of the same plane are copied with their features and moved, so that the
+# patch follows the slider as its surroundings do.  Where no place is as large as the hole, several
+# patches fill it.
+
+WHOLE = 0.95  # of a patch's cells that must be good for it to count as one that fits
+LEAST_RING = 0.4  # of the ring's cells that must be known beside a patch, too
+MOST_PATCHES = 8
+LEAST_LEFT = 0.03  # of the hole's cells; so few are left open
+LEAST_PATCH = 4  # cells
+FEWEST_CELLS = 2  # of a hole
+WORTH = 1.5  # shares of the hole that a patch may be smaller for one display unit of seam
+FARTHER = 2e-3  # display units of seam that a place one cell farther away must be better by
+
+
+@dataclass(frozen=True)
+class Stamp:
+    rows: np.ndarray  # (m,) anchors that are copied
+    shifts: np.ndarray  # (m, 3) metres that the copies are moved
+    dropped: np.ndarray  # (A,) bool: what lay in the hole
+    patches: int
+    cells: int  # of the hole
+    filled: int  # of those
+    cell_m: float
+    footprint: np.ndarray  # (filled, 3) metres: the middles of filled cells, on the plane
+
+
+def find_stamp(
+    looks: AnchorLooks,
+    labels: np.ndarray,
+    label: int,
+    plane: Plane,
+    evidence: np.ndarray | None = None,
+    shadows: bool = False,
+    core: bool = True,
+) -> Stamp | Refused:
+    """What fills the plane under a thing; labels (A,), evidence (A,) pixels of background or None.
+
+    core: all of where it stood is made anew, where photos show something of it, too.  A text says
+    why nothing is filled.
+    """
+    grid = cells_of(looks, labels, plane, label)
+    foot = footprint_of(looks, labels, label, grid, evidence, shadows, core)
+    cells = int(foot.hole.sum())
+    if cells < FEWEST_CELLS:
+        return "it hides nothing of the plane"
+    patches = find_patches(grid, foot)
+    if not patches:
+        return f"no free place of the plane is like that under it ({cells} cells)"
+    rows, shifts = [], []
+    axes = plane.axes()
+    for chosen, step in patches:
+        source = np.zeros(grid.shape, bool)
+        source[tuple((np.argwhere(chosen) + step).T)] = True
+        here = np.flatnonzero(grid.on & grid.rows_in(source))
+        rows.append(here)
+        shifts.append(np.tile(-(step @ axes) * grid.cell_m, (len(here), 1)))
+    filled = np.any([chosen for chosen, _ in patches], axis=0)
+    slab = (grid.height > -BELOW * looks.spacing_m) & (grid.height < ABOVE * looks.spacing_m)
+    slab = np.where(grid.rows_in(foot.shade), grid.on, slab)  # there photos show what is beside it
+    dropped = (labels == 0) & grid.rows_in(filled) & slab
+    middles = (np.argwhere(filled) + 0.5) * grid.cell_m + grid.low
+    return Stamp(
+        np.concatenate(rows), np.concatenate(shifts), dropped, len(patches), cells,
+        int(filled.sum()), grid.cell_m, middles @ axes + plane.offset * plane.normal,
+    )  # fmt: skip
+
+
+def find_patches(grid: PlaneCells, foot: Footprint) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(cells of the hole (X, Y), step (2,) to where they are copied from), each cell once."""
+    seam = seams(grid, foot)
+    left, total = foot.hole.copy(), foot.hole.sum()
+    found: list[tuple[np.ndarray, np.ndarray]] = []
+    while left.sum() > LEAST_LEFT * total and len(found) < MOST_PATCHES:
+        cover = correlate(left, foot.good) / left.sum()  # (2X - 1, 2Y - 1) for each step
+        cost = seam - WORTH * np.minimum(cover, WHOLE)
+        fits = cover >= WHOLE
+        cost[fits] -= 10.0  # one place for all of it comes before any in pieces
+        cost[cover * left.sum() < LEAST_PATCH] = np.inf
+        best = np.unravel_index(cost.argmin(), cost.shape)
+        if not np.isfinite(cost[best]):
+            break
+        step = np.array(best) - (np.array(grid.shape) - 1)
+        chosen = left & shifted(np.ones_like(left) if fits[best] else foot.good, step)
+        found.append((chosen, step))
+        left &= ~chosen
+    return found
+
+
+def seams(grid: PlaneCells, foot: Footprint) -> np.ndarray:
+    """(2X - 1, 2Y - 1) display units: how unlike the surroundings each step's place looks.
+
+    The RMS over the ring beside the copied ring, and how far the copy's mean is from the ring's.
+    """
+    known = (grid.count > 0).astype(float)
+    ring = foot.ring.astype(float)
+    beside = np.maximum(correlate(ring, known), 1e-9)
+    under = np.maximum(correlate(foot.hole, known * foot.good), 1e-9)
+    squares, jump = 0.0, 0.0
+    for channel in np.moveaxis(grid.colors, 2, 0):
+        here, there = ring * channel, known * channel
+        squares += (
+            correlate(ring * channel**2, known)
+            - 2 * correlate(here, there)
+            + correlate(ring, known * channel**2)
+        )
+        mean = here.sum() / max(ring.sum(), 1)
+        jump += np.abs(correlate(foot.hole, there * foot.good) / under - mean)
+    channels = grid.colors.shape[2]
+    out = np.sqrt(np.maximum(squares, 0) / channels / beside) + jump / channels
+    middle = np.array(grid.shape) - 1
+    steps = np.indices(out.shape) - middle[:, None, None]
+    out += FARTHER * np.hypot(*steps)
+    out[beside < LEAST_RING * max(ring.sum(), 1)] = np.inf
+    return out
+
+
+def correlate(cells: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(2X - 1, 2Y - 1): sum of cells(c) others(c + step), steps from 1 - X and 1 - Y."""
+    from scipy.signal import fftconvolve
+
+    return fftconvolve(others.astype(float), cells.astype(float)[::-1, ::-1])
+
+
+def shifted(cells: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """(X, Y) bool: cells(c + step), False outside."""
+    out = np.zeros_like(cells)
+    x, y = np.nonzero(cells)
+    x, y = x - step[0], y - step[1]
+    inside = (x >= 0) & (y >= 0) & (x < cells.shape[0]) & (y < cells.shape[1])
+    out[x[inside], y[inside]] = True
+    return out
+
+
+def apply_stamp(model: AnchorModel, stamp: Stamp) -> AnchorModel:
+    """The model without what was dropped, and with the copies behind the rest; label 0."""
+    rows = np.concatenate([np.flatnonzero(~stamp.dropped), stamp.rows])
+    out = model.with_anchors(rows)
+    anchors = out.anchors.copy()
+    copies = slice(len(rows) - len(stamp.rows), None)
+    anchors[copies] += stamp.shifts.astype(np.float32)
+    return replace(out, anchors=anchors)
+
 
 BACKGROUND = 0  # its label
 Progress = Callable[[str, int, int], None]  # what is being done, things done, things in all

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from shapeshift.decomposition.masks.anchor_walk import AnchorGraph
-from shapeshift.decomposition.masks.random_walk import conjugate_gradients
+from shapeshift.decomposition.masks.anchor_walk import AnchorGraph, conjugate_gradients
 
 RETURN = 1e-3  # of an anchor's edges: the chance that a walk ends there
 # The cut of a set is told by its volume to this power.  By 1 (conductance) the largest set wins, by

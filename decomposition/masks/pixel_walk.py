@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import gaussian_filter, label
 
-from shapeshift.decomposition.masks.random_walk import conjugate_gradients
+from shapeshift.decomposition.masks.anchor_walk import conjugate_gradients
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 
 MOST_SIDE = 256  # pixels of what is walked over: more cost time and gain nothing

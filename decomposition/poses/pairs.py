@@ -10,8 +10,8 @@ from pathlib import Path, PurePosixPath
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_names import sort_of_name
-from shapeshift.scene.captures.modalities.name_series import HEAT, LIGHT, SERIES, role_in
 from shapeshift.scene.captures.modalities.photo_modality import LETTER, stem_of
+from shapeshift.scene.captures.modalities.two_sorts import HEAT, LIGHT, SERIES, role_in
 from shapeshift.scene.captures.photo import open_image
 
 # A pair's two photos are exposed within so many seconds, where their files say when: drones and

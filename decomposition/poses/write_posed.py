@@ -6,17 +6,36 @@ looks whole.
 
 import json
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from shapeshift.decomposition.poses.photo_list import PhotoList
-from shapeshift.decomposition.poses.pose_report import PoseReport
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.stop import USUAL_PALETTE
-from shapeshift.scene.cameras.write_colmap_cameras import camera_bytes, image_bytes
+from shapeshift.scene.cameras.colmap_cameras import camera_bytes, image_bytes
 from shapeshift.scene.captures.capture_rules import is_grey
 from shapeshift.scene.captures.colmap_tables import COUNT, ColmapCamera, Posed, read_tables
 from shapeshift.scene.captures.modalities.said_modalities import CHOICES, PhotoGroup, entries_of
+
+# What a search for poses found.
+
+
+@dataclass(frozen=True)
+class PoseReport:
+    """What was found; poses.json holds the same."""
+
+    photos: int
+    placed: int
+    left_out: list[str]
+    few_points: dict[str, int]  # photos with a pose that hangs on few points, and how many
+    points: int
+    error_px: float  # mean reprojection error
+    attempts: list[dict]
+    scale: str  # where metres come from
+    up: str  # where upright comes from
+    paired: int = 0  # photos of a second camera that got the poses of those they were taken with
+    others: list[str] = field(default_factory=list)  # pictures that are masks, depth ... by name
+
 
 REPORT = "poses.json"
 PAIRED_LENS = "SIMPLE_PINHOLE"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.color_slope import color_slope
+from shapeshift.runtime_models.colors.color_bounds import color_slope
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import Model, ScaffoldModel, SplatLayers
 from shapeshift.scene.pose import View

@@ -10,9 +10,16 @@ from typing import Protocol
 import numpy as np
 
 from shapeshift.renderer import layout
-from shapeshift.renderer.debug.classify import Points, classify, eye_places, runs
-from shapeshift.renderer.debug.debug_map import birdseye
-from shapeshift.renderer.debug.points import dim, dot_size, paint_points
+from shapeshift.renderer.debug.debug_map import (
+    Points,
+    birdseye,
+    classify,
+    dim,
+    dot_size,
+    eye_places,
+    paint_points,
+    runs,
+)
 from shapeshift.renderer.settings import (
     CULL_REASONS,
     EDGES,
@@ -143,7 +150,8 @@ def debug_image(
     antialiased = tuple(is_antialiased(obj.model) for obj in scene.objects)
     reason, pixel, depth = classify(points, poses, view, settings, antialiased)
     numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
-    facts = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
+    reasons: tuple[str, ...] = ("drawn", *CULL_REASONS)
+    facts = dict(zip(reasons, map(float, numbers), strict=True))
     colors = np.asarray([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)], np.float32)
     if settings.debug == "birdseye":
         picture, metres = birdseye(points, poses, reason, colors, view, settings)

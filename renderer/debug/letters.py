@@ -31,5 +31,5 @@ def drawable(text: str, height: int) -> str:
     """The text, on one line, with a question mark for every letter that the font has not."""
     text = one_line(text)
     font = letters(height)
-    missing = bytes(font.getmask(MISSING))
-    return "".join(c if c == " " or bytes(font.getmask(c)) != missing else "?" for c in text)
+    missing = bytes(font.getmask(MISSING))  # pyright: ignore[reportArgumentType]  # has a buffer
+    return "".join(c if c == " " or bytes(font.getmask(c)) != missing else "?" for c in text)  # pyright: ignore[reportArgumentType]

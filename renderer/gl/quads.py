@@ -12,13 +12,12 @@ from itertools import pairwise
 import moderngl
 import numpy as np
 
+from shapeshift.rasterizer.splat_edges import BAND_PX, EDGE_POWER, KINDS, POINT_PX
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.foveation import foveas_of
-from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.context import is_software
-from shapeshift.renderer.gl.debug.overdraw import count_overdraw
-from shapeshift.renderer.gl.debug.splat_edges import draw_edges
 from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu, overwrite
 from shapeshift.renderer.gl.lenses.foveated import FoveatedSplatter
@@ -303,3 +302,73 @@ class QuadsDrawing(Drawing):
     def _release_arena(self) -> None:
         while self._allocated:
             self._allocated.pop().release()
+
+
+# overdraw: how many splats each pixel blends, drawn with GL; for debug pictures alone.
+
+
+def count_overdraw(
+    gpu: Gpu, projector: Projector, arena: Arena, view: View, settings: RenderSettings
+) -> np.ndarray:
+    """(H, W) float32, row 0 on top.  Projects the arena again: records and keys become the view's;
+    the counts of the frame before stay.
+    """
+    width, height = view.size
+    if not arena.count:
+        return np.zeros((height, width), np.float32)
+    counts = arena.counts.read()
+    projector.project(arena, [view], settings)
+    overwrite(arena.counts, counts)
+    program = gpu.program("overdraw.vert", "overdraw.frag")
+    program["size"].value, program["min_alpha"].value = view.size, settings.min_alpha
+    target = gpu.target(view.size, "f4")
+    triangles = gpu.ctx.vertex_array(program, [])
+    bind(records=arena.records, keys=arena.keys)
+    with gpu.drawing_into(target):
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        gpu.ctx.enable_only(moderngl.BLEND)
+        gpu.ctx.blend_func = (moderngl.ONE, moderngl.ONE)
+        triangles.render(moderngl.TRIANGLES, vertices=3 * arena.count)
+    texture = target.color_attachments[0]
+    number = np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)[::-1, :, 0]
+    for made in (triangles, target, texture):
+        made.release()
+    return np.ascontiguousarray(number)
+
+
+# splat_edges: splats as ellipses, points or rings, drawn with GL; for debug pictures alone.
+
+
+def draw_edges(
+    gpu: Gpu, projector: Projector, arena: Arena, view: View, settings: RenderSettings, kind: str
+) -> np.ndarray:
+    """(H, W, 4) float32 display sRGB and coverage, row 0 on top, in the order that is there.
+
+    Projects the arena again: records and keys become the view's; the counts of before stay.
+    """
+    width, height = view.size
+    if not arena.count:
+        return np.zeros((height, width, 4), np.float32)
+    counts = arena.counts.read()
+    projector.project(arena, [view], settings, keep_outside=True)
+    overwrite(arena.counts, counts)
+    program = gpu.program("splat.vert", "splat_edges.frag", HEAT=0, KIND=KINDS.index(kind))
+    values = {
+        "size": view.size, "min_alpha": settings.min_alpha, "first": 0, "per_unit": 1.0,
+        "edge_power": EDGE_POWER, "radius": POINT_PX, "band": BAND_PX,
+    }  # fmt: skip
+    for name, value in values.items():
+        if name in program:  # a kind does not ask for all of them
+            program[name].value = value
+    target = gpu.target(view.size, "f4")
+    triangles = gpu.ctx.vertex_array(program, [])
+    bind(order=arena.order, records=arena.records, counts=arena.counts)
+    with gpu.drawing_into(target):
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        gpu.ctx.enable_only(moderngl.NOTHING)
+        triangles.render_indirect(arena.command, moderngl.TRIANGLES, count=1)
+    texture = target.color_attachments[0]
+    image = np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)[::-1].copy()
+    for made in (triangles, target, texture):
+        made.release()
+    return image

@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.runtime_models.colors.color_range import color_range
+from shapeshift.runtime_models.colors.color_bounds import color_range
 from shapeshift.runtime_models.model import Model
 from shapeshift.scene.pose import HiddenMesh, View
 

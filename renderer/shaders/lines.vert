@@ -1,4 +1,4 @@
-// lines: ends of line segments over a picture; see renderer/gl/lines.py.
+// lines: ends of line segments over a picture; see renderer/gl/over_picture.py.
 // Reads:   place, clip_from_object.
 // Writes:  gl_Position.
 // Units:   metres in the object's frame.

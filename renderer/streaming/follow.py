@@ -6,8 +6,7 @@ import numpy as np
 
 from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer.colors.color_cache import forget_colors
-from shapeshift.renderer.cut import place_splats
-from shapeshift.renderer.decoded_object import DecodedObject
+from shapeshift.renderer.decoded_object import DecodedObject, place_splats
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.settings import StreamStats
 from shapeshift.renderer.streaming.stream import Stream, has_leaves

@@ -15,28 +15,33 @@ from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import StreamStats
-from shapeshift.renderer.streaming.ahead import views_ahead
-from shapeshift.renderer.streaming.choose import NOT_DRAWN, base_of, joined, steps_of
-from shapeshift.renderer.streaming.choose_tree import (
+from shapeshift.renderer.streaming.changing import NONE, Fades, comes_finer, patient, swapped
+from shapeshift.renderer.streaming.choose import (
     BESIDE,
+    NOT_DRAWN,
+    base_of,
     choose_nodes,
     is_crowded,
+    joined,
     joined_trees,
+    steps_of,
     upwards,
 )
-from shapeshift.renderer.streaming.fade import Fades
-from shapeshift.renderer.streaming.fetch import PIXELS, Fetcher
+from shapeshift.renderer.streaming.fetch import PIXELS, Fetcher, Sources
+from shapeshift.renderer.streaming.in_sight import (
+    CoarseLook,
+    LeafSight,
+    Weights,
+    bytes_of,
+    sight_of,
+    views_ahead,
+)
 from shapeshift.renderer.streaming.pages import (
     ROOM,
     PageTable,
+    Uploader,
     pages_needed,
 )
-from shapeshift.renderer.streaming.seen import CoarseLook
-from shapeshift.renderer.streaming.sight import LeafSight, sight_of
-from shapeshift.renderer.streaming.sources import Sources
-from shapeshift.renderer.streaming.swap import NONE, comes_finer, patient, swapped
-from shapeshift.renderer.streaming.upload import Uploader
-from shapeshift.renderer.streaming.weights import Weights, bytes_of
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
 from shapeshift.runtime_models.splats.lod.parents import NodeTree, with_parents

@@ -21,7 +21,7 @@ from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.paging.pages import PAGE
 from shapeshift.rasterizer.project import TILE, Projected, grid_of
 from shapeshift.rasterizer.raster import rasterize_noting
-from shapeshift.renderer.hidden import hidden_tiles
+from shapeshift.renderer.foveation import hidden_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPlan
 from shapeshift.scene.pose import View

@@ -4,12 +4,12 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from shapeshift.runtime_models.blocks.block_box import Corner
 from shapeshift.runtime_models.blocks.block_model import FORMAT
 from shapeshift.runtime_models.blocks.read_blocks import (
     ENDING,
     LIST,
     BlockList,
+    Corner,
     has_block_list,
     read_block_list,
 )

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.checkpoint.run_settings import with_settings
+from shapeshift.runtime_models.checkpoint.read_checkpoint import with_settings
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
 from shapeshift.runtime_models.files.json_fields import Fields
 from shapeshift.runtime_models.files.memory import Account

@@ -4,19 +4,19 @@ What is written lies in the same folder under a name of ours until it is whole, 
 long as its writer lives: what a killed writer left is removed by the next one in that folder.
 """
 
+import ctypes
 import errno
 import os
 import re
 import secrets
 import shutil
 import stat
+import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, BinaryIO
-
-from shapeshift.runtime_models.files.swap_folders import swap
 
 PART = re.compile(r"\.shapeshift-[0-9a-f]{16}\.part")  # names of what is not whole yet
 DEVICES = ("/dev/std", "/dev/fd/", "/proc/")  # what they lead to is never replaced
@@ -273,3 +273,24 @@ def remove(part: Path) -> None:
             part.unlink()
     except OSError:
         pass
+
+
+# Two folders change places in one moment, where the system can do that.
+
+AT_FDCWD = -100  # linux/fcntl.h: paths are relative to the current folder
+RENAME_EXCHANGE = 2  # linux/fs.h
+RENAME_SWAP = 2  # sys/stdio.h of macOS
+
+
+def swap(one: Path, other: Path) -> bool:
+    """Whether they have changed places; where not, neither has moved."""
+    try:
+        system = ctypes.CDLL(None, use_errno=True)
+        if sys.platform.startswith("linux"):
+            paths = (AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other))
+            return system.renameat2(*paths, RENAME_EXCHANGE) == 0
+        if sys.platform == "darwin":
+            return system.renamex_np(os.fsencode(one), os.fsencode(other), RENAME_SWAP) == 0
+    except (AttributeError, OSError, TypeError):  # an older C library, another system, Windows
+        pass
+    return False

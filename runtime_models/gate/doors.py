@@ -65,7 +65,7 @@ ELSEWHERE = {
     "scene/colliders/collider_pieces.py": "trimesh writes our own triangles",
     "runtime_models/splats/usd/write_usd.py": "usd-core writes our own splats",
     "runtime_models/package/read_onnx.py": "protobuf of a network, its memory charged beforehand",
-    "runtime_models/package/write_onnx.py": "makes networks of our own numbers",
+    "runtime_models/package/package_files.py": "makes networks of our own numbers",
     "training/gradients/read_network.py": "protobuf of a network, its memory charged beforehand",
     "training/gradients/fold_constants.py": "single nodes whose values are known to be small",
     "training/gradients/onnx_graph.py": "calculates with what read_network has checked",

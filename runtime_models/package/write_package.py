@@ -28,9 +28,9 @@ from shapeshift.runtime_models.package.package_files import (
     MANIFEST,
     format_name,
     open_package,
+    write_onnx,
 )
 from shapeshift.runtime_models.package.read_package import read_files
-from shapeshift.runtime_models.package.write_onnx import write_onnx
 
 DATE = (1980, 1, 1, 0, 0, 0)  # of every zip entry: the same model gives the same bytes
 

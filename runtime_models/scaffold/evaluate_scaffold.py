@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapeshift.runtime_models.model import SCAFFOLD_HEADS, Mlp, Octree, ScaffoldModel
-from shapeshift.runtime_models.package.write_onnx import write_onnx
+from shapeshift.runtime_models.package.package_files import write_onnx
 from shapeshift.runtime_models.rotation import normalize
 from shapeshift.runtime_models.session import open_session
 

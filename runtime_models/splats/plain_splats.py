@@ -86,7 +86,7 @@ class RawSplats:
     front: bool = False  # +Z is the front, as glTF has it: half a turn about +Y from ours
     axes: str = ""  # which they are, and why, where the format alone does not tell
     antialiased: bool = False
-    usual: bool = False  # its coding has no number that invalid_rows.py would find
+    usual: bool = False  # its coding has no number that activate.py would find
     labels: np.ndarray | None = None  # (N,) int32
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) other columns, as filed
     findings: tuple[Finding, ...] = ()  # what the reader itself saw

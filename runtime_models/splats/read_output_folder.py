@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from shapeshift.runtime_models.checkpoint.run_settings import GSPLAT_CLOUDS
+from shapeshift.runtime_models.checkpoint.read_checkpoint import GSPLAT_CLOUDS
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import formats, read_plain, read_raw

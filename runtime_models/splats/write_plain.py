@@ -117,7 +117,7 @@ def held_codes(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
 def moved_by_chunks(splats: PlainSplats) -> tuple[int, float] | None:
     """(splats whose place a compressed PLY may change by more than their largest sigma, the most in
     metres); None where there are none."""
-    from shapeshift.runtime_models.splats.operations.morton import morton_order
+    from shapeshift.runtime_models.splats.operations.merge_pairs import morton_order
     from shapeshift.runtime_models.splats.ply.read_compressed_ply import CHUNK
 
     order = morton_order(splats.means * np.array([1, -1, -1], np.float32))  # as it is written

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shapeshift.runtime_models.bounds import (
+from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.runtime_models.parts import (
     FALLBACK_RADIUS,
     PERCENTILES,
     frame_points,
     seen_points,
 )
-from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.scene.scene import Scene

@@ -43,13 +43,13 @@ from shapeshift.scene.captures.modalities.frame_modalities import (
 from shapeshift.scene.captures.modalities.two_sorts import check_two_sorts, opened_photos
 from shapeshift.scene.captures.normal_photo import NAMES as NORMAL_NAMES
 from shapeshift.scene.captures.normal_photo import normals_of, refuse_other_axes
+from shapeshift.scene.captures.point_clouds import read_points
 from shapeshift.scene.captures.radiometric.stated_bands import (
     of_each_band,
     only_bands,
     sharing_folders,
     stated_bands,
 )
-from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.mask_files import find_masks, is_grey_file
 from shapeshift.scene.other_pictures import other_pictures
 from shapeshift.scene.pose import OPENCV_FROM_EYE

@@ -21,9 +21,9 @@ from shapeshift.scene.document.scene_file import (
     SceneItem,
 )
 from shapeshift.scene.pose import UNIT_SLACK
-from shapeshift.scene.sections.section_rows import read_sections
+from shapeshift.scene.sections.section_texts import read_sections
 from shapeshift.scene.selectors.selector import Box, Selector, Sphere
-from shapeshift.scene.selectors.selector_rows import build, read_selector_row
+from shapeshift.scene.selectors.selector_texts import build, read_selector_row
 from shapeshift.scene.world.reactions import KINDS, Reaction, State, TwoAxes
 
 MOST_OBJECTS = 1000

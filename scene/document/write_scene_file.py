@@ -10,8 +10,8 @@ from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.appearance import NEUTRAL
 from shapeshift.scene.document.appearance_rows import appearance_row, sky_row
 from shapeshift.scene.document.scene_file import FORMAT, HULLS, FirstView, SceneFile, SceneItem
-from shapeshift.scene.sections.section_rows import section_row
-from shapeshift.scene.selectors.selector_rows import selector_row
+from shapeshift.scene.sections.section_texts import section_row
+from shapeshift.scene.selectors.selector_texts import selector_row
 from shapeshift.scene.world.reactions import Reaction
 
 PLAIN = SceneItem(name="plain", model="plain")

@@ -7,8 +7,7 @@ from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import MOST_BYTES, CameraList, CameraReading
-from shapeshift.scene.cameras.read_own_cameras import read_own_cameras
-from shapeshift.scene.cameras.write_own_cameras import own_rows
+from shapeshift.scene.cameras.own_cameras import own_rows, read_own_cameras
 from shapeshift.scene.film.film_path import (
     EASE,
     FPS_RANGE,

@@ -14,8 +14,16 @@ from shapeshift.runtime_models.model import Finding
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import Pose
-from shapeshift.scene.world import physics_rules
-from shapeshift.scene.world.contacts import Contact, ContactTally, any_near, velocities
+from shapeshift.scene.world import physics_shapes
+from shapeshift.scene.world.contacts import (
+    Contact,
+    ContactTally,
+    any_near,
+    hash_of,
+    pack,
+    unpack,
+    velocities,
+)
 from shapeshift.scene.world.grab import (
     WITH_HAND,
     Hold,
@@ -39,7 +47,6 @@ from shapeshift.scene.world.physics_shapes import (
     mesh_shape,
     pose_of,
 )
-from shapeshift.scene.world.physics_state import hash_of, pack, unpack
 
 FLOOR = 0  # the id of the floor; every other id counts from 1
 MOST_REACH = 2e4  # metres along a ray
@@ -59,7 +66,7 @@ class Physics:
         hz: float = 90,
         substeps: int = 4,
     ) -> None:
-        rapier = physics_rules.engine()
+        rapier = physics_shapes.engine()
         gravity = checked_number(gravity_m_s2, "the gravity in m/s2", -100, 100)
         self.hz = checked_number(hz, "the steps a second", 10, 1000)
         self.substeps = int(checked_number(substeps, "the substeps of a step", 1, 64))
@@ -70,7 +77,7 @@ class Physics:
         self._meshes: set[int] = set()  # statics that are triangle meshes
         self._holds: dict[int, Hold] = {}
         self._next_id, self._next_grab = FLOOR + 1, 1
-        self._world = physics_rules.new_world(gravity)
+        self._world = physics_shapes.new_world(gravity)
         self._events = rapier.ChannelEventCollector()
         self._attach()
         if floor_y is not None:
@@ -283,7 +290,7 @@ class Physics:
         free = {n: (self._masses[n], body) for n, body in bodies.items() if n not in held}
         speeds = velocities(bodies)
         at_meshes = [(self._collider(a), self._collider(b)) for a in held for b in self._meshes]
-        substeps = self.substeps * physics_rules.more_substeps(
+        substeps = self.substeps * physics_shapes.more_substeps(
             speeds, any_near(self._world, at_meshes)
         )
         rules = self._world.integration_parameters
@@ -294,7 +301,7 @@ class Physics:
         for k in range(substeps):
             move_hands(self._world, starts, (k + 1) / substeps)
             rules.contact_clustering = not any_near(self._world, at_meshes)
-            rules.normalized_prediction_distance = physics_rules.prediction(speeds)
+            rules.normalized_prediction_distance = physics_shapes.prediction(speeds)
             self._world.step()
             events = self._events.drain_contact_force_events()
             if events:
@@ -302,7 +309,7 @@ class Physics:
             speeds = velocities(bodies)
         for hold in self._holds.values():
             hold.trail.append(hold.target)
-        self.findings += physics_rules.stopped_bodies(self._world, self._handles)
+        self.findings += physics_shapes.stopped_bodies(self._world, self._handles)
         self._queries_stale = True
         return tally.contacts()
 
@@ -346,7 +353,7 @@ class Physics:
         with_hand = lag(hold, self._world.rigid_bodies[hold.hand], body) <= WITH_HAND
         self._remove_hand(grab)
         if with_hand and all(other.body != hold.body for other in self._holds.values()):
-            throw(hold, body, self.hz, physics_rules.MOST_SPEED)
+            throw(hold, body, self.hz, physics_shapes.MOST_SPEED)
 
     def _remove_hand(self, grab: int) -> None:
         hold = self._holds.pop(grab)

@@ -110,7 +110,7 @@ def sections_from(
     sections: Sequence["str | SceneSection"], subject: Document
 ) -> tuple[SceneSection, ...]:
     """Sections of texts and of themselves.  Raises UsageError."""
-    from shapeshift.scene.sections.read_section import read_section
+    from shapeshift.scene.sections.section_texts import read_section
 
     stops = stops_of(subject)
     try:
@@ -123,7 +123,7 @@ def regions_of(
     regions: Sequence["str | Selector"], model: Model, view: View
 ) -> tuple[Selector, ...]:
     """Selectors of texts and of themselves; a text's lens looks along the view.  UsageError."""
-    from shapeshift.scene.selectors.read_selector import read_selector
+    from shapeshift.scene.selectors.selector_texts import read_selector
 
     try:
         return tuple(

@@ -29,8 +29,8 @@ from shapeshift.scene.cameras.camera_list import CameraList, moved
 from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
+    from shapeshift.app.film.draw_film import FrameFolder
     from shapeshift.app.film.film_plan import FilmPlan
-    from shapeshift.app.film.frame_folder import FrameFolder
     from shapeshift.scene.film.film_path import FilmPath
 
 
@@ -137,8 +137,8 @@ def make(
 @contextlib.contextmanager
 def frame_folder(options: Options, plan: "FilmPlan") -> "Iterator[FrameFolder]":
     """Where the frames go: into the folder that was named, or for a video where nobody looks."""
+    from shapeshift.app.film.draw_film import FrameFolder, frame_facts
     from shapeshift.app.film.film import streams_of
-    from shapeshift.app.film.frame_folder import FrameFolder, frame_facts
 
     if is_video(options.out):
         with tempfile.TemporaryDirectory(prefix="shapeshift-film-") as path:

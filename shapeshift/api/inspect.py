@@ -18,8 +18,8 @@ from shapeshift.app.inspection.draw_values import (
     depth_picture,
     draw_values,
     measured_scene,
+    value_facing,
 )
-from shapeshift.app.inspection.facing import value_facing
 from shapeshift.app.inspection.measure_outputs import (
     check_reports,
     keep_file,
@@ -49,7 +49,8 @@ from shapeshift.scene.pose import View
 
 BLACK = (0.0, 0.0, 0.0)
 AirNumbers = Sequence[float]  # metres, per cent of humidity, °C
-Place = Sequence[float]  # (column, row) in pixels of a view, or (x, y, z) metres in the world
+# (column, row) in pixels of a view, or (x, y, z) metres in the world.
+Place = Sequence[float] | np.ndarray
 
 
 class InspectedScene(OpenedScene):
@@ -278,7 +279,8 @@ def _inspection(
     }
     if how.get("taken_as") is not None:
         how = how | {"taken_as": plain(how["taken_as"])}
-    options = Options(scene.path or plain("scene"), **(how | several))
+    given: dict[str, Any] = how | several
+    options = Options(scene.path or plain("scene"), **given)
     check_outputs(options)
     if scene.path is None and options.marks is None and options.save:
         raise UsageError("this scene lies in no file; name a file of marks: marks=.")

@@ -272,7 +272,7 @@ def update(
     """
     from shapeshift.app.commands.exported import check_output
     from shapeshift.app.training.saving import memory_for_training
-    from shapeshift.app.training.update_region import base_of, region_of
+    from shapeshift.app.training.update import base_of, region_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint

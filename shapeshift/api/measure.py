@@ -75,14 +75,14 @@ def compare(
 
 def side_of(scene: PathText | OpenedScene):
     """A scene as it stands, or what a path, or a path with @stop or @x, stands for."""
-    from shapeshift.app.commands.compare_sides import SceneSide, split_stop
-    from shapeshift.runtime_models.stop_weights import control_text
+    from shapeshift.app.commands.compared import SceneSide, split_stop
+    from shapeshift.runtime_models.stop_weights import Control, control_text
 
     at = ""
     if not isinstance(scene, OpenedScene):
         path, at = split_stop(str(plain(scene)))
         scene = opened(path).at(at or None)
-    stops = {stop.x: stop.name for stop in scene.stops}
+    stops: dict[Control, str] = {stop.x: stop.name for stop in scene.stops}
     if not at and scene.x is not None:
         at = stops[scene.x] if scene.x in stops else control_text(scene.x)
     name = scene.path.resolve().name if scene.path else "scene"

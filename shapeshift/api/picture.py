@@ -23,7 +23,8 @@ class Picture(np.ndarray):
         picture.save("workshop.png")
     """
 
-    __array_priority__ = 1.0  # np.concatenate of pictures is a picture
+    # np.concatenate of pictures is a picture.
+    __array_priority__ = 1.0  # pyright: ignore[reportAssignmentType]  # a property in numpy
 
     def to_uint8(self) -> np.ndarray:
         """The same shape in bytes, 0..255, rounded; values beyond 0..1 are cut, NaN is 0.

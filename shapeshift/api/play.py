@@ -16,7 +16,7 @@ from shapeshift.app.paths import plain
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
 
 if TYPE_CHECKING:
-    from shapeshift.decomposition.poses.pose_report import PoseReport
+    from shapeshift.decomposition.poses.write_posed import PoseReport
 
 HZ = 90
 AFTER_S = 2.0  # seconds that go on after the script's last line

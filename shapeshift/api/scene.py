@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from shapeshift.api.measure import Measured
     from shapeshift.api.picture import Picture
     from shapeshift.api.render import Context, Drawing
-    from shapeshift.api.show import NotebookPage
     from shapeshift.api.style import Paint
+    from shapeshift.api.views import NotebookPage
     from shapeshift.api.write import Exported
     from shapeshift.app.training.style_options import Shape
     from shapeshift.decomposition.masks.specs import ObjectSpec
@@ -159,7 +159,7 @@ class Scene(InspectedScene):
 
             ss.load("workshop.shift").show()
         """
-        from shapeshift.api.show import show_scene
+        from shapeshift.api.views import show_scene
 
         return show_scene(self, self.render(camera="front"), height)
 

@@ -60,9 +60,8 @@ def add_style(
 ) -> AnchorModel:  # fmt: skip
     """What Scene.add_style gives: the model with one stop more."""
     from shapeshift.app.training.style import check_options, style_of
-    from shapeshift.app.training.style_looks import preview_of
-    from shapeshift.app.training.style_region import anchors_inside
-    from shapeshift.app.training.style_sources import pictures_and_views
+    from shapeshift.app.training.style_looks import pictures_and_views, preview_of
+    from shapeshift.app.training.style_options import anchors_inside
     from shapeshift.rasterizer.device import open_device
     from shapeshift.renderer.pace import measure_pace
     from shapeshift.training.styles.add_style import add_style as put_in

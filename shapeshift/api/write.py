@@ -106,7 +106,7 @@ def refuse_parts(*parts: Any) -> None:
 
 def export_page(scene: OpenedScene, out: Path, overwrite: bool, progress: Progress) -> Exported:
     """A page for browsers, with a pace between its stops, as the command writes it."""
-    from shapeshift.app.page.export_page import export_page as write_page
+    from shapeshift.app.page.page_file import export_page as write_page
     from shapeshift.app.page.page_scene import PageSettings
     from shapeshift.renderer.pace import measure_pace
     from shapeshift.scene.scene import Scene as DrawnScene

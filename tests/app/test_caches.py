@@ -168,7 +168,7 @@ def test_networks_are_run_without_a_word_to_their_makers(tmp_path):
     """onnxruntime 1.31 writes an identifier into the home and reports sessions unless told."""
     code = (
         "import sys; from tests.support.models import make_random_model\n"
-        "from shapeshift.runtime_models.package.write_onnx import write_onnx\n"
+        "from shapeshift.runtime_models.package.package_files import write_onnx\n"
         "from shapeshift.runtime_models.session import open_session\n"
         "open_session(write_onnx(make_random_model(3).networks['color'], 'color'), 1)\n"
     )

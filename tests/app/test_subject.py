@@ -10,7 +10,7 @@ import pytest
 
 from shapeshift.app import cli
 from shapeshift.app.charts.chart_scene import side_by_side
-from shapeshift.app.commands.compare_sides import open_side
+from shapeshift.app.commands.compared import open_side
 from shapeshift.app.document import Document, open_document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import ReadingOptions

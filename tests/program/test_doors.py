@@ -119,7 +119,7 @@ def test_sessions_of_onnxruntime_are_of_networks_of_our_own():
         "runtime_models/session.py", "training/gradients/fold_constants.py"
     }  # fmt: skip
     assert {path for path in calls(r"^open_session$") if not path.startswith("app/headset")} == {
-        "runtime_models/gate/network_run.py", "runtime_models/network_sessions.py",
+        "runtime_models/gate/network_run.py", "runtime_models/session.py",
         "runtime_models/scaffold/evaluate_scaffold.py",
     }  # fmt: skip
     assert set(calls(r"\bopen_checked$")) == {
@@ -151,14 +151,14 @@ def test_the_page_has_the_table():
 
 def files_for(folder: Path) -> dict[str, tuple[Path, object]]:
     """door: a file that its reader gives to the outside package, and that reader."""
-    from shapeshift.decomposition.masks.sam_network import Network
+    from shapeshift.decomposition.masks.sam import Network
     from shapeshift.decomposition.poses.video_frames import take_frames
     from shapeshift.runtime_models.splats.plain_splats import Reading
     from shapeshift.runtime_models.splats.usd.read_usd import read_raw_usd
     from shapeshift.scene.captures.colmap_tables import ColmapCamera
     from shapeshift.scene.captures.photo import open_image
+    from shapeshift.scene.captures.point_clouds import read_las
     from shapeshift.scene.captures.radiometric.number_photos import radiometric_celsius
-    from shapeshift.scene.captures.read_las import read_las
     from shapeshift.scene.captures.undistort import pixels_of
     from shapeshift.scene.colliders.read_mesh import read_mesh
     from tests.support.scene.flir_files import write_flir

@@ -86,7 +86,7 @@ def test_hostile_files_are_one_sentence_and_do_nothing(tmp_path, monkeypatch, na
 
 @pytest.mark.parametrize("ending", [".png", ".webp", ".jpg", ".bmp", ".tif"])
 def test_pictures_that_are_none_or_bombs(tmp_path, ending):
-    from shapeshift.app.commands.compare_sides import read_picture
+    from shapeshift.app.commands.compared import read_picture
 
     Image.new("RGB", (40, 30)).save(tmp_path / f"a{ending}")
     data = (tmp_path / f"a{ending}").read_bytes()
@@ -225,7 +225,7 @@ def test_scenes_all_in_one_place_are_framed(place, count):
 
 @pytest.mark.parametrize("text", ["x" * 5000, "sphere:" + "\x00" * 300 + ":1:1", "a\nb", "lens:é"])
 def test_selectors_are_quoted_in_one_line_and_in_part(tmp_path, text):
-    from shapeshift.scene.selectors.read_selector import read_selector
+    from shapeshift.scene.selectors.selector_texts import read_selector
 
     with pytest.raises(ValueError, match=r"write|known") as caught:
         read_selector(text)

@@ -109,7 +109,7 @@ def test_a_row_at_each_end_of_a_block_is_dropped_and_the_rest_stays(tmp_path):
     raw.labels = np.arange(2 * BLOCK + 2, dtype=np.int32)
     plain = judge(raw, Reading(allow_huge=True))
     kept = np.setdiff1d(np.arange(2 * BLOCK + 2), rows)
-    np.testing.assert_array_equal(plain.means, was.means[kept] * np.float32([1, -1, -1]))
+    np.testing.assert_array_equal(plain.means, was.means[kept] * np.array([1, -1, -1], np.float32))
     assert plain.extra["kept"].tolist() == plain.labels.tolist() == kept.tolist()
     (found,) = [f for f in plain.findings if f.done == "dropped"]
     assert found.count == 4 and found.rows == tuple(rows)
@@ -146,7 +146,7 @@ def test_a_real_file_is_the_same_by_the_plain_forms(data):
     from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
 
     raw, plain = read_raw_ply(path, Reading()), read_plain(path)
-    np.testing.assert_array_equal(plain.means, raw.means * np.float32([1, -1, -1]))
+    np.testing.assert_array_equal(plain.means, raw.means * np.array([1, -1, -1], np.float32))
     np.testing.assert_allclose(plain.scales, np.exp(raw.scales.astype(float)), rtol=3e-7)
     np.testing.assert_allclose(
         plain.opacity, 1 / (1 + np.exp(-raw.opacity.astype(float))), rtol=3e-7

@@ -93,6 +93,7 @@ def test_another_python_gets_all_that_was_said(launch, monkeypatch):
 @pytest.mark.parametrize(("described", "fits"), [
     ("cpython 3.11 linux-x86_64 2.28 venv", True), ("cpython 3.14 linux-x86_64 2.41 no-venv", True),
     ("cpython 3.11 linux-x86_64 2.27 venv", False), ("cpython 3.13 linux-x86_64 2.41 venv", False),
+    ("cpython 3.11 linux-x86_64 2.9 venv", False),  # 9 is less than 28, whatever letters say
     ("cpython 3.1 linux-x86_64 2.41 venv", False), ("cpython 3.11 linux-x86_64 - venv", True),
     ("pypy 3.11 linux-x86_64 2.41 venv", False), ("cpython 3.11 linux-aarch64 2.41 venv", False),
     ("cpython-free-threaded 3.14 win-amd64 - venv", False), ("cpython 3.14 win-amd64 - venv", True),

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.bin import bin_tiles, sort_order
+from shapeshift.rasterizer.bin import bin_tiles, quantize_keys, sort_order
 from shapeshift.rasterizer.project import grid_of, project
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
-from shapeshift.rasterizer.quantize_keys import quantize_keys
 from tests.support.renderer.rasterizer_scenes import (
     arena,
     device,

@@ -8,7 +8,7 @@ import pytest
 from shapeshift.renderer.colors.eye_colors import SHARED_DB, EyeColors
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.colors.color_slope import color_slope
+from shapeshift.runtime_models.colors.color_bounds import color_slope
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import frame_points, scene_points

@@ -314,7 +314,7 @@ def test_objects_are_merged_where_they_stand():
     objects = (SceneObject("one", one), SceneObject("two", two, pose))
     whole = merged([bake_part(Part(obj), ExportLook()) for obj in objects])
     assert whole.sh.shape == (len(whole.means), 16, 3)
-    whole = replace(whole, means=whole.means + np.float32(whole.origin))
+    whole = replace(whole, means=whole.means + np.array(whole.origin, np.float32))
     view = default_view(one, (90, 60))
     wanted = drawn(*objects, view=view)
     assert psnr(drawn(SceneObject("merged", as_layers(whole)), view=view), wanted) > 60

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.blocks.block_box import BlockBox, turned
 from shapeshift.runtime_models.blocks.block_model import BlockModel, joined, one_network
 from shapeshift.runtime_models.blocks.read_blocks import (
+    BlockBox,
     BlockList,
     ListedBlock,
     read_block_list,
     read_blocks,
+    turned,
 )
 from shapeshift.runtime_models.blocks.write_blocks import write_blocks
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate

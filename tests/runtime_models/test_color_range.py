@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.colors.color_range import color_range, output_range
+from shapeshift.runtime_models.colors.color_bounds import color_range, output_range
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.model import Mlp
 from tests.support.splat_scenes import one_splat, random_layers, random_model

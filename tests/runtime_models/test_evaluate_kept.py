@@ -10,7 +10,7 @@ from shapeshift.runtime_models.evaluate import (
     shape_follows_control,
 )
 from shapeshift.runtime_models.model import HEADS, ControlEncoding
-from shapeshift.runtime_models.network_sessions import FoldedNetwork, WholeNetwork
+from shapeshift.runtime_models.session import FoldedNetwork, WholeNetwork
 from shapeshift.runtime_models.stop_weights import encode_rows
 from tests.support.models import make_random_model, with_frames, without_control
 

@@ -20,7 +20,7 @@ def every_part(model, x) -> list[np.ndarray]:
 @pytest.mark.parametrize("hidden", [(), (32,), (7, 64, 9)])
 def test_each_anchor_has_its_own_control_value(fold, hidden):
     model = make_random_model(101, k=3, features=5, hidden=hidden)
-    values = np.float32([0.0, 0.25, 0.9])
+    values = np.array([0.0, 0.25, 0.9], np.float32)
     which = np.random.default_rng(0).integers(0, 3, 101)
     evaluator = Evaluator(model, fold=fold)
     mixed = [*evaluator.geometry(values[which]), evaluator.color(values[which], EYE)]

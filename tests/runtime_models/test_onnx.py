@@ -7,8 +7,8 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from shapeshift.runtime_models.model import HEADS, BadFile, Mlp
+from shapeshift.runtime_models.package.package_files import write_onnx
 from shapeshift.runtime_models.package.read_onnx import read_onnx
-from shapeshift.runtime_models.package.write_onnx import write_onnx
 from tests.support.models import make_random_model, run_in_numpy
 
 node = helper.make_node

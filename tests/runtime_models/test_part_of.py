@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.bounds import frame_points
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.lod.average_anchors import average_anchors
 from shapeshift.runtime_models.model import (
@@ -17,13 +16,13 @@ from shapeshift.runtime_models.model import (
     SplatLayers,
     Stop,
 )
-from shapeshift.runtime_models.parts import find_label, name_of, part_of, splat_labels
+from shapeshift.runtime_models.parts import find_label, frame_points, name_of, part_of, splat_labels
 from tests.support.models import make_random_model
 
 WHOLE = make_random_model(anchors=60)
 WHOLE = replace(
     WHOLE,
-    labels=np.resize(np.uint8([0, 1, 3, 3]), 60),
+    labels=np.resize(np.array([0, 1, 3, 3], np.uint8), 60),
     objects=(ObjectLabel(1, "mug"), ObjectLabel(3, "7"), ObjectLabel(9, "absent")),
 )
 
@@ -35,7 +34,7 @@ def layers(count: int = 40) -> SplatLayers:
         rng.normal(size=(count, 3)).astype(f), np.full((count, 3), 0.1, f),
         np.tile(f([1, 0, 0, 0]), (count, 1)), rng.uniform(size=count).astype(f),
         rng.normal(size=(count, 4, 3)).astype(f), np.zeros(count, np.int32), (Stop("a", 0.0),),
-        labels=np.resize(np.int32([0, 300, 2]), count), origin=(5.0, 6.0, 7.0),
+        labels=np.resize(np.array([0, 300, 2], np.int32), count), origin=(5.0, 6.0, 7.0),
         extra={"heat": np.arange(count, dtype=f)},
     )  # fmt: skip
 
@@ -86,7 +85,7 @@ def test_a_part_without_rows_at_a_level_has_the_levels_before_it():
     assert len(part_of(whole, 1)[0].coarser) == 1 and len(part_of(whole, 3)[0].coarser) == 2
 
 
-EYE = np.float32([0.3, 2.0, 1.0])
+EYE = np.array([0.3, 2.0, 1.0], np.float32)
 
 
 def color_from(model, x, eye):

@@ -11,8 +11,8 @@ from shapeshift.runtime_models.stop_weights import Pace, StopWeights
 from shapeshift.scene.control import control_key, control_of, covered
 from shapeshift.scene.pose import Pose, look_at
 from shapeshift.scene.scene import SceneObject
-from shapeshift.scene.selectors.read_selector import read_selector
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
+from shapeshift.scene.selectors.selector_texts import read_selector
 from tests.support.models import make_random_model
 from tests.support.splat_scenes import random_layers
 

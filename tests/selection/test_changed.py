@@ -200,11 +200,28 @@ def test_after_its_time_no_test_begins_and_what_is_left_is_said(checkout, monkey
 
 def test_on_a_slow_machine_the_nearest_run_for_a_while_all_the_same(checkout, monkeypatch):
     run = changed.Changed(config_of(checkout), checkout, 0.0)
+    timers: list[float] = []
+    monkeypatch.setattr(changed.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(changed.signal, "setitimer", lambda _, seconds: timers.append(seconds))
     assert run.until == 42
-    for seconds, until in ((10.0, 42.0), (30.0, 42.0), (30.5, 42.5), (100.0, 112.0)):
+    for seconds, until, end in ((10.0, 42.0, 55.2), (30.0, 42.0, 55.2), (30.5, 42.5, 55.2),
+                                (100.0, 112.0, 112.0)):  # fmt: skip
         monkeypatch.setattr(changed.time, "monotonic", lambda seconds=seconds: seconds)
         run.pytest_collection_finish()
-        assert run.until == pytest.approx(until)
+        assert (run.until, run.end) == pytest.approx((until, end))
+        assert timers[-1] == pytest.approx(end - seconds) or not hasattr(changed.signal, "SIGALRM")
+
+
+def test_what_runs_when_its_time_is_over_is_skipped_and_nothing_else_is(checkout):
+    run = changed.Changed(config_of(checkout), checkout, 0.0)
+    run.break_off()  # while nothing runs
+    test = run.pytest_runtest_call()
+    next(test)
+    with pytest.raises(pytest.skip.Exception, match="its time was over"):
+        run.break_off()
+    with pytest.raises(StopIteration):
+        test.send(None)
+    run.break_off()
 
 
 def test_windows_come_before_all_others_or_not_at_all():

@@ -264,6 +264,17 @@ def test_cameras_are_words_files_views_and_lists(demo, tmp_path):
         ss.cameras(path, out=tmp_path / "model", to="colmap-txt")
 
 
+def test_cameras_of_a_file_stand_as_in_it_also_where_a_scene_lies_far_from_zero(tmp_path):
+    layers = random_layers(60)
+    far = replace(layers, means=layers.means + np.float32([50_000, 0, 0]))
+    scene = ss.load(ss.Scene.from_model(far).export(tmp_path / "far.ply").path)
+    assert abs(scene.origin[0] - 50_000) < 2  # it is drawn about a zero of its own
+    eye = ss.look_at((50_000, 1, 3), (50_000, 0, 0))
+    view = ss.View(eye, ss.perspective(1.0, SMALL), 0.05, 100.0, SMALL)
+    (seen,) = scene.views(ss.CameraList((view,), ("a",), "ours"))
+    np.testing.assert_allclose(seen.world_from_eye.position, eye.position - scene.origin)
+
+
 def test_a_film_spreads_x_over_its_frames(demo):
     frames = list(demo.frames(x="sweep", count=3, size=SMALL))
     assert len(frames) == 3

@@ -58,7 +58,7 @@ def test_a_package_of_one_object_is_its_anchors(tmp_path):
     from shapeshift.runtime_models.model import ObjectLabel
     from tests.support.models import make_random_model
 
-    labels = np.uint8([0, 1, 0, 1, 1, 0])
+    labels = np.array([0, 1, 0, 1, 1, 0], np.uint8)
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     whole = ss.Scene.from_model(replace(model, labels=labels, objects=(ObjectLabel(1, "mug"),)))
     for name, label in (("a", "mug"), ("b", 1)):
@@ -117,6 +117,14 @@ def test_a_simulation_is_that_of_the_command(tmp_path):
     assert steps[-1].number == len(steps) == 63 and steps[-1].seconds == pytest.approx(0.7)
     ring = steps[-1].scene.object("ring").world_from_object.position
     assert not np.allclose(ring, steps[0].scene.object("ring").world_from_object.position)
+
+
+def test_a_simulation_goes_on_for_a_while_after_its_script(tmp_path, monkeypatch):
+    monkeypatch.setattr("shapeshift.api.play.AFTER_S", 0.1)
+    script = tmp_path / "script.jsonl"
+    script.write_text('{"t": 0.1, "do": "hand", "position": [0, 2, 0]}')
+    assert len(list(ss.simulate(ss.TOUCH, script))) == 18  # 0.2 s at 90 Hz
+    assert len(list(ss.simulate(ss.TOUCH))) == 9
 
 
 def test_what_falls_falls_as_newton_says():

@@ -34,7 +34,7 @@ def test_a_function_paints_a_region(scene, device):
 
     def green(picture: np.ndarray) -> np.ndarray:
         seen.append(picture.shape)
-        return np.broadcast_to(np.float32([0.0, 1.0, 0.0]), picture.shape)
+        return np.broadcast_to(np.array([0.0, 1.0, 0.0], np.float32), picture.shape)
 
     made = scene.add_style("Green", paint=green, region=["label:pump"], steps=40, views=4, size=64,
                            pace=False)  # fmt: skip

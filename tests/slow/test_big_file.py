@@ -17,7 +17,7 @@ from shapeshift.renderer.limits import TooLarge
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
+from shapeshift.runtime_models.splats.operations.decimate import prune_by_importance
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.scene import Scene, SceneObject

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.stops.remove_stop import remove_stop
 from shapeshift.training.styles.add_style import NewStyle, add_style, drift_db
 from shapeshift.training.styles.carried_pictures import CarriedPictures
 from shapeshift.training.styles.image_network import ImageNetwork
-from shapeshift.training.styles.style_views import dome_views
+from shapeshift.training.styles.train_stop import dome_views
 from tests.support.new_stops import wild_stop
 
 pytestmark = pytest.mark.slow

@@ -46,8 +46,12 @@ def walled() -> SplatLayers:
     one = shell(3000, seed=3)
     scale = np.float32(0.5)
     places = one.means * scale
-    hidden = replace(one, means=places + np.float32([-1, 0, -1]), scales=one.scales * scale)
-    free = replace(one, means=places + np.float32([3.5, 0, -1]), scales=one.scales * scale)
+    hidden = replace(
+        one, means=places + np.array([-1, 0, -1], np.float32), scales=one.scales * scale
+    )
+    free = replace(
+        one, means=places + np.array([3.5, 0, -1], np.float32), scales=one.scales * scale
+    )
     parts = (wall, hidden, free)
     names = ("means", "scales", "wxyz", "opacity", "sh", "layer")
     return replace(wall, **{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})

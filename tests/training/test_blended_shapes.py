@@ -14,7 +14,7 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
+from shapeshift.training.schedule import BlendedShapes, ShapeBlending
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
 from tests.support.training.training_runs import bits, run, run_keeping

@@ -16,8 +16,8 @@ from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.evaluate import evaluate_model, report
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.losses.surface_losses import DepthLoss, DepthTerm
 from shapeshift.training.photos import read
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep

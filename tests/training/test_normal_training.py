@@ -12,11 +12,16 @@ from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.normal_photo import load_normals
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of
-from shapeshift.training.first_anchors import point_sources
+from shapeshift.training.first_anchors import initial
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.losses.normal_loss import NormalLoss, NormalTerm, pairs_of
+from shapeshift.training.losses.surface_losses import (
+    DepthLoss,
+    DepthTerm,
+    NormalLoss,
+    NormalTerm,
+    pairs_of,
+)
 from shapeshift.training.photos import read
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import TrainingStep
@@ -192,7 +197,7 @@ def test_normal_maps_bring_the_shape_nearer_where_photos_are_few(device, tmp_pat
     this seed, 0.032 against 0.063 with another.  From points two pixels apart, as a run takes them,
     there is less to mend: 0.037 against 0.053.
     """
-    monkeypatch.setattr(point_sources, "one_a_cell", lambda points, edge: points)
+    monkeypatch.setattr(initial, "one_a_cell", lambda points, edge: points)
     balls = with_normals(make_balls(tmp_path / "balls", 64, 3, 3, depth=True), tmp_path)
     mapped = load_normals(balls.photos[0])
     assert mapped[..., 3].mean() > 0.3 and (mapped[..., 2][mapped[..., 3] > 0] > -30).mean() > 0.9

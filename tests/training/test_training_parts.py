@@ -11,15 +11,14 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.divergence_guard import DivergenceGuard
-from shapeshift.training.first_anchors.initial import (
-    filler_points,
-    initial_points,
-)
-from shapeshift.training.first_anchors.spacing import (
+from shapeshift.training.first_anchors.hull import (
     choose_voxel,
     median_neighbour,
     voxel_centres,
+)
+from shapeshift.training.first_anchors.initial import (
+    filler_points,
+    initial_points,
 )
 from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.networks import HeadLayout
@@ -34,6 +33,7 @@ from shapeshift.training.settings import (
     adjusted,
     suited,
 )
+from shapeshift.training.step import DivergenceGuard
 from shapeshift.training.supervision.backgrounds import choose_background
 
 RNG = np.random.default_rng

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.area import CLEAR_M, HEIGHTS_M, MOST, SEEN_M, area_edges, edges
 from shapeshift.vr.drawn import Drawn
+from shapeshift.vr.floor import CLEAR_M, HEIGHTS_M, MOST, SEEN_M, area_edges, edges
 from shapeshift.vr.frame import LOST, Area
 from shapeshift.vr.overlay import FINE, Overlay
 from shapeshift.vr.scene_depth import SceneDepth

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.bare_hand import (
+from shapeshift.vr.frame import Hand
+from shapeshift.vr.glove import fingertip, glove
+from shapeshift.vr.openxr.tracked import (
     APART_M,
     FINGERS,
     HOLDS_M,
@@ -17,8 +19,6 @@ from shapeshift.vr.bare_hand import (
     TOGETHER_M,
     bare_hand,
 )
-from shapeshift.vr.frame import Hand
-from shapeshift.vr.glove import fingertip, glove
 from tests.support.vr.vr_hands import HEAD
 
 ACROSS = (-0.027, -0.009, 0.009, 0.027)  # metres, of index to little finger, right hand

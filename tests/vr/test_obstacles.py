@@ -6,7 +6,7 @@ import pytest
 from shapeshift.app.headset.xr_user import XrUser
 from shapeshift.vr.locomotion.locomotion import Rules
 from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.obstacles import BEGINS_M, MOST, WAYS, WHOLE_M, Sight, look, nearest_wall
+from shapeshift.vr.outline import BEGINS_M, MOST, WAYS, WHOLE_M, Sight, look, nearest_wall
 from tests.support.scene.world_scenes import item, real
 from tests.support.vr.vr_frames import at, frame
 

@@ -12,8 +12,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.vr.drawn import Drawn, PanelQuad
 from shapeshift.vr.frame import FAR_M, NEAR_M
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.openxr.gl_depth import DepthFramebuffers, NoDepth
-from shapeshift.vr.openxr.swapchain import read_depth
+from shapeshift.vr.openxr.graphics import DepthFramebuffers, NoDepth, read_depth
 from shapeshift.vr.overlay import FINE, PLAIN, Overlay
 from shapeshift.vr.scene_depth import SceneDepth
 from tests.support.renderer.frames import texture_target

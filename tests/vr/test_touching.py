@@ -10,10 +10,8 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import FLOOR_NAME
 from shapeshift.vr.frame import SIDES, Pulse
-from shapeshift.vr.locomotion.locomotion import Travel, move
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.locomotion.stance import pinned, turned
-from shapeshift.vr.locomotion.teleport import ground_of
+from shapeshift.vr.locomotion.locomotion import Travel, ground_of, move
+from shapeshift.vr.locomotion.play_space import PlaySpace, pinned, turned
 from shapeshift.vr.touching import (
     ACTED,
     FULL_N_S,

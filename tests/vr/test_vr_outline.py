@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.card import HALF_CLEAR, card_picture
+from shapeshift.vr.cards import HALF_CLEAR, card_picture
 from shapeshift.vr.frame import LOST, SIDES
 from shapeshift.vr.hints import FADES_S, SHOWN_S, hint_lines, hints
 from shapeshift.vr.locomotion.locomotion import Rules
 from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.openxr.bindings import PROFILES
+from shapeshift.vr.openxr.hands import PROFILES
 from shapeshift.vr.outline import AWAY_M, BY_HAND, Outlines, hull_of, outline
 from tests.support.vr.vr_hands import HEAD, a_frame, hand_at
 

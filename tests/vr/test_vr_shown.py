@@ -6,7 +6,7 @@ import pytest
 
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import IDENTITY
-from shapeshift.vr.openxr.swapchain import FORMATS, choose_format, read
+from shapeshift.vr.openxr.graphics import FORMATS, choose_format, read
 from shapeshift.vr.shown import (
     WHOLE,
     Blit,

@@ -10,7 +10,7 @@ import pytest
 
 from shapeshift.app.document import Document, open_document
 from shapeshift.app.opening import ReadingOptions
-from shapeshift.app.page.export_page import export_page
+from shapeshift.app.page.page_file import export_page
 from shapeshift.app.page.page_scene import PageSettings
 from tests.support.web.page_pictures import write_page
 from tests.support.web.page_scenes import paced_model, several_objects

@@ -11,11 +11,11 @@ import pytest
 
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.page.export_page import export_page
 from shapeshift.app.page.page_file import (
     MODULES,
     START,
     digest,
+    export_page,
     one_file,
     one_script,
     packed,

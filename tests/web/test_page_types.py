@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from shapeshift.app.document import Document
-from shapeshift.app.page.page_file import one_script
+from shapeshift.app.page.page_file import one_script, squeeze
 from shapeshift.app.page.page_scene import PageSettings, page_scene
-from shapeshift.app.page.squeeze import squeeze
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.runtime_models.web.web_model import ControlEntry
 from shapeshift.scene.scene import Scene

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.locomotion.stance import heading
+from shapeshift.vr.locomotion.play_space import PlaySpace, heading
 from tests.support.xr.person import pose_of
 
 

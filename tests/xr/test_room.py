@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.vr.openxr.spaces import EYE_HEIGHT_M, KINDS
+from shapeshift.vr.openxr.room import EYE_HEIGHT_M, KINDS
 
 PROGRAM = Path(__file__).resolve().parents[1] / "support" / "xr" / "tell_room.py"
 STANDS_M = 1.6  # where Monado's remote head is until a script moves it, above STAGE's floor

@@ -34,11 +34,11 @@ import numpy as np  # noqa: E402
 from shapeshift.app.editor.options import Options  # noqa: E402
 from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer  # noqa: E402
 from shapeshift.app.editor.state.editor_state import EditorState  # noqa: E402
-from shapeshift.app.editor.state.files.refine import Refiner  # noqa: E402
 from shapeshift.app.editor.window.overlay.presented import Presented  # noqa: E402
 from shapeshift.app.editor.window.viewer import Viewer  # noqa: E402
 from shapeshift.app.editor.window.window import Window  # noqa: E402
 from shapeshift.app.paths import DEMO  # noqa: E402
+from shapeshift.app.streaming.refine import Refiner  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.settings import FrameStats  # noqa: E402
 

@@ -24,21 +24,27 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import looks_of  # noqa: E402
 from shapeshift.decomposition.completion.complete import (  # noqa: E402
+    Stamp,
+    apply_stamp,
     complete,
+    find_stamp,
     only_background,
     with_background_copies,
 )
-from shapeshift.decomposition.completion.draw import ModelPictures, over  # noqa: E402
-from shapeshift.decomposition.completion.plane import support_plane  # noqa: E402
-from shapeshift.decomposition.completion.stamp import apply_stamp, find_stamp  # noqa: E402
+from shapeshift.decomposition.completion.plane import (  # noqa: E402
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.completion.verify import (  # noqa: E402
     MARGIN,
     OPEN,
     Cells,
+    ModelPictures,
     PhotoView,
     decibels,
+    over,
     verify,
 )
 from shapeshift.decomposition.partition import (  # noqa: E402
@@ -47,7 +53,7 @@ from shapeshift.decomposition.partition import (  # noqa: E402
     partition,
 )
 from shapeshift.rasterizer.device import open_device  # noqa: E402
-from shapeshift.runtime_models.model import ObjectLabel  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.training.synthetic.openness import Clearance  # noqa: E402
 from shapeshift.training.synthetic.tracer import Place, look, photograph, shade  # noqa: E402
@@ -83,6 +89,7 @@ def photos_without(name: str, views: list) -> list[np.ndarray]:
 def labelled_demo(device) -> tuple:
     """(model with labels, evidence of background (A,), views that verify)."""
     model, views = read_model(DEMO), dome(VIEWS, 0.0, SIZE)
+    assert isinstance(model, AnchorModel)
     pictures = [LabelledView(view, 0.0, label_map(view)) for view in views]
     sums = gather_evidence(device, model, pictures, len(LABELS))
     objects = tuple(ObjectLabel(LABELS[name], name) for name in OBJECTS)
@@ -127,7 +134,9 @@ def wrong_stamps(device, model, evidence, views: list, label: int) -> list:
     """(step, verdict) of stamps that must be refused."""
     looks = looks_of(model)
     plane = support_plane(looks, model.labels, label)
+    assert isinstance(plane, Plane)
     stamp = find_stamp(looks, model.labels, label, plane, evidence)
+    assert isinstance(stamp, Stamp)
     pipe = np.flatnonzero(model.labels == LABELS["pipe"])[: len(stamp.rows)]
     target = looks.places[stamp.rows[: len(pipe)]] + stamp.shifts[: len(pipe)]
     wrong = {
@@ -179,8 +188,8 @@ def rows_of(device, names: list[str], sheets: Path | None):
             )
             seconds = time.process_time() - begun
             sheet = save_sheet(sheets / f"{name}-{step.split()[-1]}.png") if sheets else None
-            pair = [each.with_anchors(each.labels != label) for each in (model, after)]
-            figures = held_out(device, name, *pair, views, maps, real, sheet)
+            before, then = (each.with_anchors(each.labels != label) for each in (model, after))
+            figures = held_out(device, name, before, then, views, maps, real, sheet)
             stamp = told.stamp
             counts = (
                 [len(stamp.rows), int(stamp.dropped.sum()), stamp.patches] if stamp else [0] * 3

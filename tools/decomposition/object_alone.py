@@ -11,8 +11,12 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "decomposition")]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import AnchorLooks, looks_of  # noqa: E402
-from shapeshift.decomposition.completion.plane import Plane, support_plane  # noqa: E402
+from shapeshift.decomposition.completion.plane import (  # noqa: E402  # noqa: E402
+    AnchorLooks,
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.partition import (  # noqa: E402
     LabelledView,
     gather_evidence,
@@ -70,7 +74,9 @@ def cut_objects(device: Device, names: list[str]) -> Iterator[Cut]:
     model = read_model(DEMO)
     pictures = [LabelledView(view, 0.0, label_map(view)) for view in dome(VIEWS, 0.0, SIZE)]
     sums = gather_evidence(device, model, pictures, len(LABELS))
+    assert isinstance(model, AnchorModel)
     model = partition(model, sums, tuple(ObjectLabel(LABELS[n], n) for n in OBJECTS))
+    assert isinstance(model, AnchorModel) and model.labels is not None
     looks = looks_of(model)
     for name in names:
         label = LABELS[name]

@@ -60,6 +60,7 @@ def load_pile(data: Path) -> SplatLayers:
     )]  # fmt: skip
     for label, (name, size, (x, z)) in enumerate(THINGS, 1):
         model = read_model(sorted((data / name).glob("*.splat"))[0])
+        assert isinstance(model, SplatLayers)
         core = np.percentile(model.means, (1, 99), axis=0)
         scale = size / (core[1] - core[0]).max()
         means = (model.means - core.mean(axis=0)) * scale
@@ -79,8 +80,9 @@ def cameras(count: int) -> list[View]:
     out = []
     for i in range(count):
         turn, up = 2 * np.pi * i * 0.61803, np.deg2rad(12 + 55 * (i * 0.754877 % 1))
-        eye = (np.cos(up) * np.sin(turn), np.sin(up) + 0.05, np.cos(up) * np.cos(turn))
-        out.append(View(look_at(eye, (0, 0.07, 0)), perspective(0.75, SIZE), 0.05, 100.0, SIZE))
+        eye = np.array([np.cos(up) * np.sin(turn), np.sin(up) + 0.05, np.cos(up) * np.cos(turn)])
+        pose = look_at(eye, np.array([0, 0.07, 0]))
+        out.append(View(pose, perspective(0.75, SIZE), 0.05, 100.0, SIZE))
     return out
 
 
@@ -120,12 +122,15 @@ def quality_rows(pile: SplatLayers) -> tuple[list[str], np.ndarray]:
 
 def speed_row(pile: SplatLayers, sums: np.ndarray) -> str:
     """Processor time of labelling, cutting and writing several piles beside each other."""
-    apart = np.concatenate([pile.means + np.float32([2 * i, 0, 0]) for i in range(COPIES)])
+    apart = np.concatenate(
+        [pile.means + np.array([2 * i, 0, 0], np.float32) for i in range(COPIES)]
+    )
     fields = {name: np.concatenate([getattr(pile, name)] * COPIES)
               for name in ("scales", "wxyz", "opacity", "sh", "layer")}  # fmt: skip
     many, sums = replace(pile, means=apart, labels=None, **fields), np.tile(sums, (COPIES, 1))
     began = time.process_time()
     cut = partition(many, sums, ())
+    assert isinstance(cut, SplatLayers)
     labelled = time.process_time() - began
     with tempfile.TemporaryDirectory() as folder:
         for label in range(len(THINGS) + 1):

@@ -143,7 +143,8 @@ class Trial:
                     values = np.zeros((self.shown.count, 3))
                     values[:, 0] = np.maximum(self.supports[label].belief(), 0)
                     hidden[label] = self.shown.picture(view, 0.0, values)[..., 0]
-            out.append(merge(here, view.size[::-1], hidden))
+            width, height = view.size
+            out.append(merge(here, (height, width), hidden))
         return out
 
 

@@ -23,17 +23,23 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "decomposition")]
 from completion import HELD_OUT, SIZE, VIEWS  # noqa: E402
 
 from shapeshift.app.paths import DEMO  # noqa: E402
-from shapeshift.decomposition.completion.anchor_looks import looks_of  # noqa: E402
-from shapeshift.decomposition.completion.plane import Plane, support_plane  # noqa: E402
+from shapeshift.decomposition.assemble import (  # noqa: E402
+    candidates_of,
+    choose_proxy,
+    standing_mesh,
+)
+from shapeshift.decomposition.completion.plane import (  # noqa: E402
+    Plane,
+    looks_of,
+    support_plane,
+)
 from shapeshift.decomposition.partition import (  # noqa: E402
     LabelledView,
     gather_evidence,
     partition,
 )
-from shapeshift.decomposition.proxies.choose import candidates_of, choose_proxy  # noqa: E402
-from shapeshift.decomposition.proxies.standing import standing_mesh  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
-from shapeshift.runtime_models.model import ObjectLabel  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.parts import part_of  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.colliders.collider import Making, collider_of_model  # noqa: E402
@@ -92,12 +98,15 @@ def rows_of(device, names):
     pictures = [LabelledView(view, 0.0, label_map(view)) for view in views]
     sums = gather_evidence(device, model, pictures, len(LABELS))
     objects = tuple(ObjectLabel(LABELS[name], name) for name in OBJECTS)
+    assert isinstance(model, AnchorModel)
     model = partition(model, sums, objects)
+    assert isinstance(model, AnchorModel) and model.labels is not None
     looks = looks_of(model)
     tests = [LabelledView(view, 0.0, label_map(view)) for view in dome(HELD_OUT, 0.17, SIZE)]
     for name in names:
         label = LABELS[name]
         part, at = part_of(model, label)
+        assert isinstance(part, AnchorModel)
         at = np.array(at)
         plane = support_plane(looks, model.labels, label)
         if isinstance(plane, str):

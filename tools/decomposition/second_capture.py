@@ -20,7 +20,7 @@ from object_alone import (  # noqa: E402
     turned_over,
 )
 
-from shapeshift.decomposition.completion.anchor_looks import AnchorLooks, looks_of  # noqa: E402
+from shapeshift.decomposition.completion.plane import AnchorLooks, looks_of  # noqa: E402
 from shapeshift.decomposition.completion.verify import OPEN  # noqa: E402
 from shapeshift.decomposition.partition import (  # noqa: E402
     LEAST_SHARE,

@@ -44,8 +44,11 @@ from second_capture import (  # noqa: E402
     second_capture,
 )
 
-from shapeshift.decomposition.completion.draw import over  # noqa: E402
-from shapeshift.decomposition.completion.verify import OPEN, decibels  # noqa: E402
+from shapeshift.decomposition.completion.verify import (  # noqa: E402
+    OPEN,
+    decibels,
+    over,
+)
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.scene.pose import Pose  # noqa: E402

@@ -21,6 +21,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
 from shapeshift.app.paths import DEMO  # noqa: E402
+from shapeshift.decomposition.label_photos import prompts_of  # noqa: E402
 from shapeshift.decomposition.label_pictures import LabelPictures  # noqa: E402
 from shapeshift.decomposition.masks.anchor_walk import (  # noqa: E402
     AnchorGraph,
@@ -30,10 +31,10 @@ from shapeshift.decomposition.masks.anchor_walk import (  # noqa: E402
 )
 from shapeshift.decomposition.masks.pixel_walk import PixelWalk  # noqa: E402
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt  # noqa: E402
-from shapeshift.decomposition.masks.view_prompts import prompts_of  # noqa: E402
 from shapeshift.decomposition.propagate import Support, propagate  # noqa: E402
 from shapeshift.decomposition.shown import ShownAnchors  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome  # noqa: E402
 from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
@@ -56,7 +57,9 @@ class Bench:
     """The demo, its pictures and its truth."""
 
     def __init__(self) -> None:
-        self.model = read_model(DEMO)
+        model = read_model(DEMO)
+        assert isinstance(model, AnchorModel)
+        self.model = model
         self.shown = ShownAnchors(open_device("cpu"), self.model)
         self.views = dome(VIEWS, 0.0, SIZE)
         self.maps = [label_map(view) for view in self.views]
@@ -65,7 +68,7 @@ class Bench:
                        for v in self.views]  # fmt: skip
         self.eyes = np.array([view.world_from_eye.position for view in self.views])
         began = time.process_time()
-        self.nodes = nodes_of(self.model, np.float32(EYE))
+        self.nodes = nodes_of(self.model, np.array(EYE, np.float32))
         self.graph: AnchorGraph = make_graph(self.nodes, self.eyes)
         self.graph_s = time.process_time() - began
 

@@ -80,6 +80,7 @@ def quality_rows(device: Device, model: AnchorModel) -> list[str]:
     for name, views in given.items():
         sums = gather_evidence(device, model, views, COUNT)
         cut = partition(model, sums, NAMES)
+        assert isinstance(cut, AnchorModel)
         for x in tests:
             rows.append(f"{name},{x},anchors at .4,{quality(device, cut, tests[x])}")
             sys.stdout.write(rows[-1] + "\n")
@@ -141,6 +142,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     device, model = open_device("cpu"), read_model(DEMO)
+    assert isinstance(model, AnchorModel)
     rows = quality_rows(device, model)
     speed = speed_rows(device, model)
     head = [

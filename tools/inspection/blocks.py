@@ -28,7 +28,8 @@ import shapeshift as ss  # noqa: E402, F401  # makes the folders its subpackages
 from shapeshift.app.charts.chart_rows import write_text  # noqa: E402
 from shapeshift.app.training.blocks.train_in_blocks import join  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
-from shapeshift.runtime_models.blocks.block_box import turned  # noqa: E402
+from shapeshift.runtime_models.blocks.read_blocks import turned  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.package.write_package import write_package  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
@@ -178,6 +179,7 @@ def main() -> None:
     for name, file in files.items():
         path = asked.work / file
         model = read_model(path)
+        assert isinstance(model, AnchorModel)
         values, drawn[name] = scores(device, model, photos, bands)
         size = sum(f.stat().st_size for f in (path.iterdir() if path.is_dir() else [path]))
         rows.append(["scene", name, *(f"{v:.2f}" for v in values), len(model.anchors), "",

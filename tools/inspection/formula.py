@@ -24,20 +24,23 @@ from shapeshift.app.inspection.draw_values import (  # noqa: E402
     draw_values,
     measured_scene,
 )
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.training.styles.style_views import dome_views  # noqa: E402
+from shapeshift.training.styles.train_stop import dome_views  # noqa: E402
 
 SIZE = (320, 240)
 
 
 def difference(path: Path, views: int) -> list[str]:
     model, lines = read_model(path), []
+    assert isinstance(model, AnchorModel)
     document = Document.of(model)
     with open_renderer("none", "tiles") as (renderer, _):
         for stop in model.stops:
             if not stop.formula:
                 continue
             measured = measured_scene(document, ValueChoice(stop.name))
+            assert stop.value_range is not None
             low, high = stop.value_range
             errors, decibels, alone = [], [], []
             for view in dome_views(model, views, SIZE):

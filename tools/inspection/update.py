@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 import shapeshift as ss  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
-from shapeshift.scene.change.read_change import read_change  # noqa: E402
+from shapeshift.scene.change.similarity import read_change  # noqa: E402
 from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
 from shapeshift.training.photos import load_photos  # noqa: E402
 from shapeshift.training.update.regions import UpdateRegion  # noqa: E402
@@ -110,7 +110,9 @@ def main() -> None:
     rows = []
     with ss.Renderer("tiles") as renderer:
         first = models[0][3]
+        assert isinstance(first, ss.AnchorModel)
         for name, steps, seconds, model in models:
+            assert isinstance(model, ss.AnchorModel)
             inside = int(region.holds(model.anchors).sum())
             kept = len(set(rows_as_bytes(first)) & set(rows_as_bytes(model)))
             values = score(renderer, model, photos, region, capture.background or (0, 0, 0))

@@ -73,7 +73,8 @@ def touch_frames(renderer: ss.Renderer) -> Iterator[Image.Image]:
     acts = read_script(script, items)
     view = replace(
         scene.views("front", 1, SIZE)[0],
-        world_from_eye=ss.look_at(EYE, TARGET), tangents=ss.perspective(FOV_Y, SIZE),
+        world_from_eye=ss.look_at(np.array(EYE), np.array(TARGET)),
+        tangents=ss.perspective(FOV_Y, SIZE),
     )  # fmt: skip
     states = {state.name: state.x for item in items if item.name == THROWN for state in item.states}
     times = [TOUCH_FROM_S + i / PER_SECOND for i in range(TOUCH_FRAMES)]
@@ -99,7 +100,7 @@ def turned(view: ss.View, centre: np.ndarray, angle: float) -> ss.View:
 
 def to_image(picture: np.ndarray) -> Image.Image:
     """(H, W, 3) display sRGB as 8 bits, with room for the slider below."""
-    whole = np.concatenate([picture, np.tile(np.float32(BACKGROUND), (BAND, SIZE[0], 1))])
+    whole = np.concatenate([picture, np.tile(np.array(BACKGROUND, np.float32), (BAND, SIZE[0], 1))])
     return Image.fromarray((np.clip(whole, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 

@@ -177,7 +177,7 @@ def still(renderer: Renderer, view: View, way: str, picture: Path) -> dict:
         renderer.draw([view])
         times.append(time.process_time() - begun)
     streamed = stats.streaming
-    row = {"splats": streamed.shown if streamed else stats.splats}
+    row: dict[str, float] = {"splats": streamed.shown if streamed else stats.splats}
     if way != "four":
         row["psnr_db"] = round(psnr(image, np.load(f"{picture}.npy")), 2)
     return row | {

@@ -29,7 +29,7 @@ from shapeshift.renderer.gl.decode import MLPS, Decoder  # noqa: E402
 from shapeshift.renderer.gl.gpu import Gpu  # noqa: E402
 from shapeshift.runtime_models.evaluate import BATCH, Evaluator, directions  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
-from shapeshift.runtime_models.package.write_onnx import write_onnx  # noqa: E402
+from shapeshift.runtime_models.package.package_files import write_onnx  # noqa: E402
 from shapeshift.runtime_models.session import open_session  # noqa: E402
 from tests.support.splat_scenes import random_model  # noqa: E402
 

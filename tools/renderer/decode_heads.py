@@ -35,7 +35,7 @@ from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.tiles.tiles import TilesDrawing  # noqa: E402
 from shapeshift.runtime_models.evaluate import BATCH, directions  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
-from shapeshift.runtime_models.package.write_onnx import write_onnx  # noqa: E402
+from shapeshift.runtime_models.package.package_files import write_onnx  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.session import open_session  # noqa: E402
 from shapeshift.scene.pose import View, look_at  # noqa: E402
@@ -173,7 +173,9 @@ def frame_row(model: AnchorModel) -> str:
 
 def cold(form: str) -> None:
     """In a process of its own: what the first decoding costs more than the second, ms."""
-    model = read_model(DEMO).with_anchors(slice(0, 100))
+    demo = read_model(DEMO)
+    assert isinstance(demo, AnchorModel)
+    model = demo.with_anchors(slice(0, 100))
     open_device()
     taken = []
     for _ in range(2):
@@ -214,6 +216,7 @@ def main() -> None:
         cold(asked.cold)
         return
     device, demo = open_device(), read_model(DEMO)
+    assert isinstance(demo, AnchorModel)
     counts = " ".join(map(str, asked.anchors))
     lines = [
         f"# python3 tools/renderer/decode_heads.py --anchors {counts}",

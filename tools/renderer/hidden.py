@@ -1,7 +1,7 @@
 """What a frame of the OpenCL tiles costs where part of a scene is out of view or behind others,
 with and without leaving it out, and beside an earlier checkout.
 
-    python tools/renderer/hidden.py LEG_FOLDER --before CHECKOUT --out docs/bench/hidden.csv
+    python tools/renderer/foveation.py LEG_FOLDER --before CHECKOUT --out docs/bench/hidden.csv
 
 Scenes are made of one model: thinned, or jittered copies within its splats, smaller so that they
 cover as much; "field" is a square of copies; "building" is a square of rooms of opaque walls with
@@ -89,7 +89,7 @@ def made_of(model, case: Case):
 
     from shapeshift.runtime_models.model import SplatLayers, Stop
     from shapeshift.runtime_models.rotation import rotation_matrices
-    from shapeshift.runtime_models.splats.operations.morton import morton_order
+    from shapeshift.runtime_models.splats.operations.merge_pairs import morton_order
 
     if case.scene == "as it is":
         return model
@@ -308,7 +308,7 @@ def main() -> int:
     trees = {"now": here, "in view": here, "whole": here}
     if options.before:
         trees["before"] = options.before
-    words = f"python tools/renderer/hidden.py {options.leg.name}"
+    words = f"python tools/renderer/foveation.py {options.leg.name}"
     words += " --before CHECKOUT" if options.before else ""
     words += f" --out {options.out.name}" if options.out else ""
     load = f"load average {os.getloadavg()[0]:.1f} at the start"

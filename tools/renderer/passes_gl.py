@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from shapeshift.renderer.gl.context import open_context  # noqa: E402
 from shapeshift.renderer.gl.gpu import Gpu, groups_for  # noqa: E402
 from shapeshift.renderer.gl.project import Projector  # noqa: E402
 from shapeshift.renderer.gl.quads import QuadsDrawing  # noqa: E402
-from shapeshift.renderer.gl.sort import Sorter, quantize  # noqa: E402
+from shapeshift.renderer.gl.sort_check import Sorter, quantize  # noqa: E402
 from shapeshift.renderer.gl.splat import Splatter  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.settings import RenderSettings  # noqa: E402
@@ -39,10 +40,11 @@ from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 from tests.support.splat_scenes import random_model, shell  # noqa: E402
 
 SIZE = (1280, 720)
-EYES = [View(look_at((x, 0.3, 4.5), (x, 0, 0)), (-0.6, 0.6, -0.34, 0.34), 0.05, 50, SIZE)
+EYES = [View(look_at(np.array([x, 0.3, 4.5]), np.array([x, 0, 0])),
+             (-0.6, 0.6, -0.34, 0.34), 0.05, 50, SIZE)
         for x in (0.0, 0.064)]  # fmt: skip
 EXACT = RenderSettings()
-CULLS = {"max_pixels": 8.0, "max_distance": 4.5, "min_pixels": 1.0}
+CULLS: dict[str, Any] = {"max_pixels": 8.0, "max_distance": 4.5, "min_pixels": 1.0}
 PROJECTED = {  # name: (settings, number of views)
     "exact": (EXACT, 1),
     "culls": (RenderSettings(**CULLS), 1),

@@ -33,6 +33,7 @@ from shapeshift.app.opening import ReadingOptions  # noqa: E402
 from shapeshift.app.page.page_scene import PageSettings, page_scene  # noqa: E402
 from shapeshift.renderer.reference.reference import reference_image  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.runtime_models.model import SplatLayers  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats  # noqa: E402
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply  # noqa: E402
@@ -102,7 +103,8 @@ def ours(model, views: list[View]) -> Frames:
             if len(wall) == WARM_UP:
                 picture = renderer.image(0)[..., :3].copy()
         name = f"ours, {renderer.backends['drawing']}"
-    return Frames(name, "", np.mean(cpu[WARM_UP:]), np.median(wall[WARM_UP:]), picture)
+    cpu_ms, wall_ms = float(np.mean(cpu[WARM_UP:])), float(np.median(wall[WARM_UP:]))
+    return Frames(name, "", cpu_ms, wall_ms, picture)
 
 
 def gausscam(folder: Path) -> Frames:
@@ -116,7 +118,7 @@ def gausscam(folder: Path) -> Frames:
     run([python, HERE / "peer_pages" / "gausscam_frames.py", folder])
     found = json.loads((folder / "result.json").read_text())
     picture = np.load(folder / "picture.npy").astype(np.float32) / 255
-    cpu, wall = np.mean(found["cpu_ms"]), np.median(found["wall_ms"])
+    cpu, wall = float(np.mean(found["cpu_ms"])), float(np.median(found["wall_ms"]))
     return Frames("gausscam (degree 0 only)", found["version"], cpu, wall, picture)
 
 
@@ -126,7 +128,9 @@ def in_browser(peer: str, folder: Path) -> Frames:
         run(["npm", "install", "--no-audit", "--no-fund", "--prefix", folder, *NPM_PACKAGES])
     found = browser_frames(peer, folder)
     cpu = found.cpu_s * 1e3 / len(found.wall_ms)
-    return Frames(found.name, found.version, cpu, np.median(found.wall_ms), found.picture)
+    assert found.picture is not None
+    wall = float(np.median(found.wall_ms))
+    return Frames(found.name, found.version, cpu, wall, found.picture)
 
 
 def run(command: list) -> None:
@@ -162,6 +166,7 @@ def main() -> int:
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
     layers = read_model(options.scene)
+    assert isinstance(layers, SplatLayers)
     bigger = (layers.means * SCALE, layers.scales * SCALE)
     splats = PlainSplats(*bigger, layers.wxyz, layers.opacity, layers.sh)
     write_ply(splats, options.work / "splats.ply")

@@ -25,6 +25,7 @@ from scipy.special import ndtr  # noqa: E402
 
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.evaluate import evaluate  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.rotation import rotation_matrices  # noqa: E402
 from shapeshift.scene.cameras.framing import (  # noqa: E402
@@ -214,6 +215,7 @@ def main() -> None:
     names = ("offset", "scale", "rotation", "opacity")
     for row in picture_rows(demo):
         say(row.rstrip("\n") + ",,\n")
+    assert isinstance(demo, AnchorModel)
     alike = without_control(demo, *names)
     plain = tuple(replace(stop, kind="rgb", palette="") for stop in demo.stops)
     cases = {

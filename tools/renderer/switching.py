@@ -21,9 +21,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.streaming import fade
+from shapeshift.renderer.streaming import changing
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.files.part_cache import PartCache
+from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import LeafReading, Reading
 from shapeshift.scene.pose import View, look_at, perspective
@@ -41,7 +42,7 @@ COLUMNS = (
     "worst_change",
     "as_finer_comes",
 )
-PARTS = ((), (0.30,), (0.16, 0.50), (0.25, 0.50, 0.75), fade.PARTS)  # of the finer level
+PARTS = ((), (0.30,), (0.16, 0.50), (0.25, 0.50, 0.75), changing.PARTS)  # of the finer level
 
 
 def main() -> None:
@@ -75,13 +76,14 @@ def measure(folder: Path, view: View, budget: int) -> Iterator[dict]:
         renderer.draw([view])
         stream = renderer.streaming.stream
         level, pixels = stream.table.level, stream.weights.pixels
+        assert isinstance(model, SplatLayers)
         coarsest = model.leaves.levels.coarsest
         able = np.flatnonzero((level >= 0) & (level < coarsest) & (pixels >= PIXELS))
         leaves = np.random.default_rng(0).permutation(able)[:LEAVES]
         stream.converges = False
         shown = [weight_of(renderer, view, leaf) for leaf in leaves]
         for parts in PARTS:
-            fade.PARTS = parts or (0.5,)
+            changing.PARTS = parts or (0.5,)
             changes = {1: [], -1: []}
             for leaf, weight in zip(leaves, shown, strict=True):
                 if weight.sum() > PIXELS / 4:

@@ -16,6 +16,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -60,11 +61,11 @@ class Arena:
 
     device: Device
     model: SplatLayers
-    mean_opacity: object
-    covariance: object
-    color: object
-    object_index: object
-    sh: object
+    mean_opacity: Any
+    covariance: Any
+    color: Any
+    object_index: Any
+    sh: Any
 
     @staticmethod
     def of(device: Device, model: SplatLayers) -> "Arena":
@@ -88,7 +89,9 @@ class Arena:
 
     def frame(self, views: list[View], into: list[Projected] | None) -> tuple:
         projected = self.project(views, into)
-        order = sort_order(self.device, projected[0].scratch)
+        scratch = projected[0].scratch
+        assert scratch is not None
+        order = sort_order(self.device, scratch)
         size = views[0].size
         binned = [(p, bin_tiles(self.device, p, size, order=order)) for p in projected]
         return projected, rasterize_rgba_views(self.device, binned, size)
@@ -239,6 +242,7 @@ def main() -> int:
     elif options.prototype:
         sys.stderr.write(f"The prototype is left out: there is no {options.prototype}.\n")
     leg = read_model(options.leg)
+    assert isinstance(leg, SplatLayers)
     three = side_by_side(leg, 3)
     sys.stderr.write("The scene of 410k splats is the first one three times, without SH.\n")
     words = f"python tools/renderer/tiles.py {options.leg.name} --poses {options.poses}"

@@ -17,8 +17,9 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
-from shapeshift.renderer.colors.two_looks import same_shape  # noqa: E402
+from shapeshift.renderer.colors.decode_colors import same_shape  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.cameras.framing import (  # noqa: E402
     frame_points,
@@ -79,6 +80,7 @@ def costs_of(model) -> dict[str, float]:
 
 def main() -> None:
     demo = read_model(ROOT / "assets" / "workshop.shift")
+    assert isinstance(demo, AnchorModel)
     say = sys.stdout.write
     say("# python3 tools/renderer/two_stops.py > docs/bench/two_stops.csv\n")
     say("scene,way,cpu_ms,times_a_frame\n")

@@ -92,8 +92,8 @@ def measure(renderer: Renderer, name: str, model, x: float, folder: Path) -> lis
             codes = [psnr(a, b) for a, b in zip(found, baked, strict=True)]
             row = (
                 name, f"{x:g}", stop, writer.ending, degree, len(splats.means),
-                path.stat().st_size, db_text(min(likeness)), db_text(np.mean(likeness)),
-                db_text(np.mean(np.minimum(codes, MOST_DB))),
+                path.stat().st_size, db_text(min(likeness)), db_text(float(np.mean(likeness))),
+                db_text(float(np.mean(np.minimum(codes, MOST_DB)))),
             )  # fmt: skip
             rows.append(dict(zip(COLUMNS, row, strict=True)))
     return rows

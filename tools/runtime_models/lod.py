@@ -49,6 +49,7 @@ def orbits(model: SplatLayers) -> list[list]:
 
 def measure(path: Path, renderer) -> list[str]:
     model = read_model(path)
+    assert isinstance(model, SplatLayers)
     own = round(model.sh.shape[1] ** 0.5) - 1
     return [row for degree in sorted({0, own}) for row in rows_of(path, model, degree, renderer)]
 

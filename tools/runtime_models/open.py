@@ -53,7 +53,7 @@ def ours(path: Path) -> list[np.ndarray]:
 
 
 def by_plyfile(path: Path) -> list[np.ndarray]:
-    from plyfile import PlyData
+    from plyfile import PlyData  # pyright: ignore[reportMissingImports]  # a peer
 
     vertex = PlyData.read(path)["vertex"]
     names = [p.name for p in vertex.properties]
@@ -61,8 +61,8 @@ def by_plyfile(path: Path) -> list[np.ndarray]:
 
 
 def by_gsply(path: Path) -> list[np.ndarray]:
-    import gsply
-    from gsply.sog_reader import sogread
+    import gsply  # pyright: ignore[reportMissingImports]  # a peer
+    from gsply.sog_reader import sogread  # pyright: ignore[reportMissingImports]
 
     read = {".spz": gsply.read_spz, ".sog": sogread}.get(path.suffix, gsply.plyread)
     data = read(str(path))

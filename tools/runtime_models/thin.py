@@ -5,7 +5,7 @@
 Each scene is drawn whole and with fewer splats from views around it; the rows are the mean PSNR (dB
 of the mean squared error over all views) against the whole one at each stop, and the processor
 seconds that the way took.  "merge" is --max-splats (runtime_models/splats/operations/decimate.py),
-with two other ways to treat an opacity above 1; "prune" is prune_by_importance.py beside it;
+with two other ways to treat an opacity above 1; "prune" is decimate.py beside it;
 "even" draws along the Z-curve with chances by a weight.  Where splat-transform is on the PATH
 (`npm install @playcanvas/splat-transform`), what its --decimate makes of the same file is measured
 too, reading and writing included in its seconds.
@@ -32,13 +32,13 @@ from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.splats.operations import moment_matching  # noqa: E402
-from shapeshift.runtime_models.splats.operations.decimate import decimate  # noqa: E402
-from shapeshift.runtime_models.splats.operations.morton import morton_order  # noqa: E402
-from shapeshift.runtime_models.splats.operations.prune_by_importance import (  # noqa: E402
+from shapeshift.runtime_models.splats.operations.decimate import (  # noqa: E402
+    decimate,
     evenly,
     largest,
     prune_by_importance,
 )
+from shapeshift.runtime_models.splats.operations.merge_pairs import morton_order  # noqa: E402
 from shapeshift.scene.cameras.framing import frame_points, model_points, orbit_path  # noqa: E402
 from shapeshift.scene.metrics import psnr  # noqa: E402
 from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
@@ -87,7 +87,9 @@ def decimated_by_peer(path: Path, model: SplatLayers, count: int) -> SplatLayers
         out = Path(folder) / "fewer.ply"
         command = [PEER, "-q", "-g", "cpu", str(path), "--decimate", str(count), str(out)]
         subprocess.run(command, check=True)
-        return read_model(out)
+        fewer = read_model(out)
+        assert isinstance(fewer, SplatLayers)
+        return fewer
 
 
 def cpu_seconds() -> float:
@@ -129,6 +131,7 @@ def pictures(renderer, model: SplatLayers, views: list, x: float) -> np.ndarray:
 
 def measure(path: Path, renderer) -> list[str]:
     model = read_model(path)
+    assert isinstance(model, SplatLayers)
     views = orbit_path(VIEWS, *frame_points(*model_points(model)), SIZE)
     whole = {stop.x: pictures(renderer, model, views, stop.x) for stop in model.stops}
     rows = []
@@ -149,7 +152,9 @@ def measure(path: Path, renderer) -> list[str]:
     return rows
 
 
-def write_scenes(doc: str, columns: str, measure: Callable[[Path, Renderer], list[str]]) -> None:
+def write_scenes(
+    doc: str | None, columns: str, measure: Callable[[Path, Renderer], list[str]]
+) -> None:
     """Measures every scene that is named; the rows go below their command into --out."""
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("scenes", nargs="+", type=Path)

@@ -24,8 +24,10 @@ sys.path[:0] = [str(ROOT)]
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.colliders.collider import Collider, Making, collider_of_splats, parts_volume  # noqa: E402
-from shapeshift.scene.colliders.collider_wrap import volume  # noqa: E402
-from shapeshift.scene.colliders.stitch_mesh import is_watertight  # noqa: E402
+from shapeshift.scene.colliders.collider_wrap import (  # noqa: E402
+    is_watertight,
+    volume,
+)
 
 FIELDS = (
     "capture", "splats", "hulls", "faces", "watertight", "wrap_s", "pieces_s", "outside_percent",

@@ -29,7 +29,7 @@ from shapeshift.app.charts.chart_rows import write_lines  # noqa: E402
 from shapeshift.app.charts.chart_scene import Walk, arc  # noqa: E402
 from shapeshift.renderer.gl.context import NoContext, open_context  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
-from shapeshift.runtime_models.model import AnchorModel, Model  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.cameras.framing import default_view, frame_points, model_points  # noqa: E402
 from shapeshift.scene.metrics import psnr  # noqa: E402
@@ -49,12 +49,15 @@ COLUMNS = (
 
 def rows_of(model: Model, rows: np.ndarray) -> Model:
     """The model of these rows alone."""
-    return model.with_anchors(rows) if isinstance(model, AnchorModel) else model.with_rows(rows)
+    if isinstance(model, AnchorModel):
+        return model.with_anchors(rows)
+    assert isinstance(model, SplatLayers)
+    return model.with_rows(rows)
 
 
 def deal(model: Model, count: int) -> tuple[list[Model], Model]:
     """`count` models that take a row each in turns, and all of them joined in that order."""
-    total = len(model.anchors if isinstance(model, AnchorModel) else model.means)
+    total = model.splat_count if isinstance(model, SplatLayers) else len(model.anchors)
     hands = [np.arange(first, total, count) for first in range(count)]
     return [rows_of(model, rows) for rows in hands], rows_of(model, np.concatenate(hands))
 

@@ -60,6 +60,7 @@ def made(source: Path, folder: Path, count: int) -> Path:
             "file_path": file.name, "transform_matrix": pose.tolist(), "fl_x": fx * x,
             "fl_y": fy * y, "cx": cx * x, "cy": cy * y, "w": SIZE[0], "h": SIZE[1],
         })  # fmt: skip
+    assert capture.points is not None
     np.savez(folder / "points.npz", xyz=capture.points)
     about = {"frames": frames, "up": [0, 1, 0], "points": "points.npz"}
     (folder / "transforms.json").write_text(json.dumps(about))
@@ -102,7 +103,7 @@ def measure(folder: Path, megabytes: int) -> dict:
 def in_turns(folder: Path) -> list[dict]:
     """All in memory, and from the store, whose window holds a tenth, after it was filled."""
     megabytes = FEW * SIZE[0] * SIZE[1] * 4 // 10 / 1e6
-    ways = [trainer_of(folder, ALL, TURNS), trainer_of(folder, megabytes, TURNS)]
+    ways = [trainer_of(folder, ALL, TURNS), trainer_of(folder, megabytes, TURNS)]  # pyright: ignore[reportArgumentType]
     store = ways[1].photos.store
     for number in range(FEW):
         store.get(number)

@@ -86,7 +86,7 @@ def held_costs() -> Iterator[Row]:
             physics.step()
             spent.append((time.process_time() - begun) * 1e3)
         case = f"20 objects, a hand ploughs one through them, {kind}"
-        yield "cost of a step, mean", case, np.mean(spent), "ms CPU", None
+        yield "cost of a step, mean", case, float(np.mean(spent)), "ms CPU", None
 
 
 def rest() -> Iterator[Row]:
@@ -272,6 +272,7 @@ def busy(steps: int) -> str:
             physics.set_pose(body, at(*np.clip(start, -0.4, 0.4)))
             start = physics.pose(body).position
             grab = physics.grab(body, at(*start), start)
+        assert grab is not None
         if step % 100 < 60:
             physics.move_hand(
                 grab, at(*(start + 0.2 * np.sin(step * np.array([0.11, 0.07, 0.05]))))

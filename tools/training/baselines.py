@@ -24,7 +24,7 @@ from ways import add_cluster, write_rows  # noqa: E402
 
 from shapeshift.app.charts.chart_rows import RowsFile  # noqa: E402
 from shapeshift.app.training.table import Options, run  # noqa: E402
-from shapeshift.app.training.table_rows import TableRow, VggRow  # noqa: E402
+from shapeshift.app.training.table_parts import TableRow, VggRow  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
 

@@ -1,6 +1,6 @@
 """What a viewer draws between two stops, by the share of steps with blended shapes.
 
-    python3 tools/training/blended_shapes.py CAPTURE ... --iterations 1200 --out FILE
+    python3 tools/training/schedule.py CAPTURE ... --iterations 1200 --out FILE
 
 CAPTURE is as of growth.py.  A way is a share of TrainSettings.blended_shapes.  A row whose `where`
 is a stop has the mean PSNR over its held-out photos, `mean` that of the stops; a row "A to B" has

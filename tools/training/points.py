@@ -28,8 +28,8 @@ sys.path[:0] = [str(HERE.parents[1])]
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import BadFile  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402
+from shapeshift.scene.captures.point_clouds import read_points  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
-from shapeshift.scene.captures.read_points import read_points  # noqa: E402
 from shapeshift.training.first_anchors.initial import SOURCES  # noqa: E402
 from shapeshift.training.photos import choose_downscale, load_photos  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402

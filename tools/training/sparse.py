@@ -58,10 +58,10 @@ from shapeshift.training.photos import (  # noqa: E402
     load_photos,
 )
 from shapeshift.training.settings import ONE_MODALITY, TrainSettings  # noqa: E402
+from shapeshift.training.step import Visibility  # noqa: E402
 from shapeshift.training.synthetic import workshop  # noqa: E402
 from shapeshift.training.synthetic.tracer import depth_under, look, pixel_rays  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
-from shapeshift.training.visibility import Visibility  # noqa: E402
 from tools.synthetic import one_shape  # noqa: E402
 
 COLUMNS = (

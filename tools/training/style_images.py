@@ -30,8 +30,9 @@ from shapeshift.runtime_models.package.write_package import write_package  # noq
 from shapeshift.scene.cameras.framing import default_background, orbit_path  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.training.evaluation.evaluate import ModelRenderer  # noqa: E402
-from shapeshift.training.style_features.made_styles import MADE_STYLES  # noqa: E402
+from shapeshift.training.style_features.named_styles import MADE_STYLES  # noqa: E402
 from shapeshift.training.style_features.nnfm_pictures import (  # noqa: E402
+    VggStyle,
     covered_part,
     nnfm_pictures,
 )
@@ -39,7 +40,6 @@ from shapeshift.training.style_features.splat_features import (  # noqa: E402
     drawn,
     scene_views,
 )
-from shapeshift.training.style_features.vgg_style import VggStyle  # noqa: E402
 from shapeshift.training.style_features.zero_shot import (  # noqa: E402
     StylePreview,
     recolor_rule,
@@ -51,7 +51,7 @@ from shapeshift.training.styles.add_style import (  # noqa: E402
     drift_db,
 )
 from shapeshift.training.styles.image_network import resized  # noqa: E402
-from shapeshift.training.styles.style_views import dome_views  # noqa: E402
+from shapeshift.training.styles.train_stop import dome_views  # noqa: E402
 
 COLUMNS = (
     "scene,way,style,once_s,cpu_s,bytes,bytes_before,drift_db,nnfm_source,nnfm,warp3_source,warp3,"

@@ -44,7 +44,7 @@ from shapeshift.training.styles.carried_pictures import (  # noqa: E402
 )
 from shapeshift.training.styles.image_network import ImageNetwork  # noqa: E402
 from shapeshift.training.styles.style_pictures import StyleView  # noqa: E402
-from shapeshift.training.styles.style_views import dome_views, resized_views  # noqa: E402
+from shapeshift.training.styles.train_stop import dome_views, resized_views  # noqa: E402
 
 COLUMNS = (
     "scene,style,cpu_s,bytes,bytes_before,drift_db,warp3_source,warp3,warp3_frames,warp24_source,"
@@ -160,7 +160,7 @@ def row_of(device, scene: Path, name: str, networks: Path, arguments) -> str:
         frames = [
             [
                 view.coverage[..., None] * network.stylise(view.source)
-                + (1 - view.coverage[..., None]) * np.float32(behind)
+                + (1 - view.coverage[..., None]) * np.array(behind, np.float32)
                 for view in group
             ]
             for group in before

@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT))
 
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.scene.pose import View, look_at, perspective  # noqa: E402
-from shapeshift.training.density.densification_stats import DensificationStats  # noqa: E402
+from shapeshift.training.density.densify import DensificationStats  # noqa: E402
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded  # noqa: E402
 from shapeshift.training.heads.optimizer import Adam  # noqa: E402
 from shapeshift.training.losses.losses import ImageLoss  # noqa: E402
@@ -65,7 +65,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
         "weights": initial_weights(layout, rng),
         "anchors": ball(anchors, rng),
         "features": features.astype(np.float32),
-        "frames": np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (anchors, 1)),
+        "frames": np.tile(np.array([0, 0, 0, 1, 0, 0, 0], np.float32), (anchors, 1)),
         "colors": np.zeros((anchors, 3), np.float32),
     }
     adam = Adam(device, values, {name: np.full(1, 1e-3, np.float32) for name in values})

@@ -35,7 +35,7 @@ from shapeshift.training.evaluation.evaluate import evaluate_model  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
 from shapeshift.training.styles.add_style import NewStyle, add_style  # noqa: E402
 from shapeshift.training.styles.style_pictures import Turns  # noqa: E402
-from shapeshift.training.styles.style_views import resized_views  # noqa: E402
+from shapeshift.training.styles.train_stop import resized_views  # noqa: E402
 from shapeshift.training.synthetic.balls import make_balls  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 

@@ -51,7 +51,7 @@ class Turn:
     photos: dict[str, list[LoadedPhoto]]  # of the splits train and test
 
 
-def parser_of(doc: str, ways: Mapping[str, Way]) -> argparse.ArgumentParser:
+def parser_of(doc: str | None, ways: Mapping[str, Way]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("captures", nargs="+")
     parser.add_argument("--out", type=Path, required=True)

@@ -23,9 +23,9 @@ import numpy as np
 import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.document import Document
 from shapeshift.app.headset.headset import Options
-from shapeshift.app.headset.open_xr import open_xr
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.paths import DEMO, TOUCH
-from shapeshift.renderer.hidden import hidden_pixels
+from shapeshift.renderer.foveation import hidden_pixels
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import HiddenMesh, Pose, View

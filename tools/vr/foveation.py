@@ -26,7 +26,7 @@ from eyes import eyes_of
 import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.document import Document
 from shapeshift.app.headset.headset import Options
-from shapeshift.app.headset.open_xr import open_xr
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.paths import DEMO, TOUCH
 from shapeshift.renderer.foveation import RADIUS_DEGREES, fovea_of
 from shapeshift.renderer.gl.context import open_context

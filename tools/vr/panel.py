@@ -16,8 +16,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.headset.headset import DEMO, Options
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.panel_picture import PanelPicture
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.renderer.gl.context import open_context
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import FROM, LEFT, Wearer, a_state

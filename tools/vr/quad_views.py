@@ -24,7 +24,7 @@ from foveation import crowd, eyes_in
 
 import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.headset.headset import Options
-from shapeshift.app.headset.open_xr import open_xr
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.paths import DEMO, TOUCH
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.resample import bilinear

@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.headset.headset import Options
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.panel_picture import PANEL
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.renderer.gl.context import open_context
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings

@@ -28,8 +28,7 @@ from shapeshift.renderer.gl.target import MOST_UNIT
 from shapeshift.renderer.reference.reference import JACOBIAN_MARGIN
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.web import limits
-from shapeshift.runtime_models.web.web_model import ControlEntry, ModelEntry
-from shapeshift.runtime_models.web.write_container import Section, SectionKind
+from shapeshift.runtime_models.web.web_model import ControlEntry, ModelEntry, Section, SectionKind
 from shapeshift.scene.control import SHIFT_S, SNAP, Sweep
 
 HEAD = """// conventions: shared with Python, written by tools/web/write_conventions.py from

@@ -21,8 +21,10 @@ import numpy as np  # noqa: E402
 
 from shapeshift.app.document import open_document  # noqa: E402
 from shapeshift.app.opening import ReadingOptions  # noqa: E402
-from shapeshift.app.page.export_page import export_page  # noqa: E402
-from shapeshift.app.page.page_file import one_script  # noqa: E402
+from shapeshift.app.page.page_file import (  # noqa: E402
+    export_page,
+    one_script,
+)
 from shapeshift.app.page.page_scene import PageSettings  # noqa: E402
 from shapeshift.app.terminal import say  # noqa: E402
 from shapeshift.runtime_models.files.whole_file import write_whole  # noqa: E402

@@ -11,7 +11,7 @@ SHORTEST_RUN, SHORT_RUN = 400, 1000  # iterations at most
 class PlainRates:
     """Adam's learning rates at the start.  Those of places are shares of the extent, as in 3DGS."""
 
-    means: float  # of the extent, see plain_density.py
+    means: float  # of the extent, see plain.py
     scales: float  # of the logarithm
     wxyz: float
     opacity: float  # of the logit

@@ -10,7 +10,7 @@ from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.networks import KERNELS
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss, Target
-from shapeshift.training.losses.normal_loss import ShapeTerm
+from shapeshift.training.losses.surface_losses import ShapeTerm
 
 # What the optimiser holds of N splats of degree n: means (N, 3) metres, scales (N, 3) logarithms of
 # one sigma, wxyz (N, 4) any length, opacity (N,) logits, base (N, 3) first coefficient of the

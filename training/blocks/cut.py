@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.runtime_models.blocks.block_box import BlockBox, turned
 from shapeshift.runtime_models.blocks.block_model import MOST_BLOCKS
+from shapeshift.runtime_models.blocks.read_blocks import BlockBox, turned
 
 FAR = 3.0  # times the largest side of the box of all cameras: what is farther from it is far
 HORIZONTAL = (0, 2)  # axes that are cut

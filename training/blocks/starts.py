@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shapeshift.runtime_models.blocks.block_box import BlockBox
+from shapeshift.runtime_models.blocks.read_blocks import BlockBox
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
@@ -22,15 +22,18 @@ from shapeshift.training.blocks.block_start import (
     ADVICE,
     BlockPlace,
     BlockStart,
+    CoarsePicture,
+    Cover,
+    Progress,
     begun_anew,
+    cover_of,
     endless,
     finite,
     part_of_state,
     photos_of,
 )
-from shapeshift.training.blocks.cover import CoarsePicture, Cover, Progress, cover_of
 from shapeshift.training.blocks.cut import FAR, Wanted, cut_whole, far_away
-from shapeshift.training.first_anchors.spacing import (
+from shapeshift.training.first_anchors.hull import (
     median_neighbour,
     voxel_centres,
 )

@@ -10,6 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.rasterizer.project import LEAST_ALPHA
+from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
+from shapeshift.runtime_models.package.package_files import LIGHT
+from shapeshift.runtime_models.package.write_package import package_files, zip_files
+from shapeshift.training.export import model_of
+from shapeshift.training.heads.networks import KERNELS, HeadLayout, initial_weights, padded
+from shapeshift.training.settings import TrainSettings
 
 GRAD2D_THRESHOLD = 6e-4  # half image widths; absolute ones are some 3 times 3DGS's 2e-4
 SHRINK = 0.5  # size of a new anchor in that of its parent
@@ -18,7 +24,7 @@ LEAST_OPACITY = 0.005  # mean of an anchor's splats below which it goes
 LEAST_VIEWS = 10  # steps that must have shown a splat, or an anchor, for its sums to count
 LEAST_STOP_VIEWS = 5  # steps of one stop; fewer count as so many, as chance is large
 LEAST_STEPS = 50  # before an anchor can go for its opacity ...
-LEAST_RUNS = 3  # ... and of these such as ran it: what is absent runs rarely, see visibility.py
+LEAST_RUNS = 3  # ... and of these such as ran it: what is absent runs rarely, see step.py
 AXIS_BITS = 21  # of a key of a grid cell
 
 
@@ -157,3 +163,100 @@ def resize_optimizer_state(
             fresh = rows if part == "value" else np.zeros_like(rows)
             out[f"{name}.{part}"] = np.concatenate([old, fresh]).astype(np.float32)
     return out
+
+
+# How many anchors a budget of megabytes allows: --max-mb is of the package on disk.
+
+POSITION_BYTES, NUMBER_BYTES = 12, 2  # of an anchor, and of each of its other numbers but light
+NOTES_BYTES = 4096  # provenance and names in the manifest
+GROWN = 1.02  # times the networks of the start: trained weights may compress less
+
+
+def bytes_without_anchors(
+    layout: HeadLayout, encoding: ControlEncoding, stops: tuple[Stop, ...]
+) -> int:
+    """At most, of a package whose networks have this layout."""
+    state = {
+        "weights.value": initial_weights(layout, np.random.default_rng(0)),
+        "anchors.value": np.zeros((1, 3), np.float32),
+        "features.value": np.zeros((1, padded(layout.features)), np.float32),
+    }
+    for name, width in layout.own_widths.items():
+        state[f"{name}.value"] = np.ones((1, width), np.float32)
+    one = model_of(state, layout, 1.0, encoding, stops, {})
+    return int(GROWN * len(zip_files(package_files(one, "float16")))) + NOTES_BYTES
+
+
+def anchor_cap(
+    settings: TrainSettings,
+    layout: HeadLayout,
+    encoding: ControlEncoding,
+    stops: tuple[Stop, ...],
+) -> int:
+    """The cap of growing, from the number and the megabytes (1,000,000 bytes) that are allowed.
+
+    Raises BadFile where no anchor would fit.
+    """
+    if settings.max_mb is None:
+        return settings.max_anchors
+    fixed = bytes_without_anchors(layout, encoding, stops)
+    widths = layout.own_widths
+    numbers = layout.features + sum(width for name, width in widths.items() if name != LIGHT)
+    size = POSITION_BYTES + NUMBER_BYTES * numbers + widths.get(LIGHT, 0)  # light: a byte each
+    fits = int((settings.max_mb * 1e6 - fixed) // size)
+    if fits < 1:
+        raise BadFile(
+            f"--max-mb {settings.max_mb:g} leaves no room for anchors: the networks alone take up "
+            f"to {fixed / 1e6:.3f} MB; allow more, or make them smaller by the setting hidden."
+        )
+    return min(settings.max_anchors, fits)
+
+
+# Densification statistics: sums over the steps since the last change of the anchors.
+
+
+class DensificationStats:
+    """Sums over the steps since the last change.  `stop` says whose step the next one is."""
+
+    def __init__(self, device, layout: HeadLayout, anchors_count: int, stops: int) -> None:
+        self.device, self.stop = device, 0
+        self.kernel = device.program(KERNELS / "density.cl", SPLATS=layout.splats)["accumulate"]
+        self.grad2d = [device.zeros((anchors_count * layout.splats, 2)) for _ in range(stops)]
+        self.opacity = device.zeros((anchors_count, 2))
+        self.contribution = [device.zeros((anchors_count, 2)) for _ in range(stops)]
+        self.everything = device.upload(np.arange(anchors_count, dtype=np.int32))
+        self.steps = 0
+
+    def add(self, record, grad_record, opacity, size: tuple[int, int], rows=None) -> None:
+        """A step: records (N, 12) and gradients by them, opacities (N,), pixels of the picture.
+
+        The gradients are those of rasterize_backward with `absolute` and `weight`.
+        rows: (R,) int32 on the device, where the step ran these anchors alone.
+        """
+        self.steps += 1
+        rows = self.everything if rows is None else rows
+        self.device.launch(
+            self.kernel, len(rows), 16, len(rows), size[0] / 2, rows, record, grad_record,
+            opacity, self.grad2d[self.stop], self.opacity, self.contribution[self.stop],
+        )  # fmt: skip
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Sums and how many steps make each.
+
+        grad2d (stops, N, 2): absolute gradient by the mean on the screen, in half image widths,
+        over the steps of a stop that showed the splat.  opacity (A, 2): of an anchor's splats,
+        over the steps that ran it.  contribution (stops, A, 2): alpha times transmittance in
+        pixels, over the pictures of a stop that showed any of its splats.
+        """
+        return {
+            "densify.grad2d": np.stack([self.device.download(g) for g in self.grad2d]),
+            "densify.opacity": self.device.download(self.opacity),
+            "densify.contribution": np.stack([self.device.download(g) for g in self.contribution]),
+            "densify.steps": np.array(self.steps),
+        }
+
+    def load(self, state: dict[str, np.ndarray]) -> None:
+        self.grad2d = [self.device.upload(g) for g in state["densify.grad2d"]]
+        self.opacity = self.device.upload(state["densify.opacity"])
+        self.contribution = [self.device.upload(c) for c in state["densify.contribution"]]
+        self.steps = int(state["densify.steps"])

@@ -26,12 +26,12 @@ from shapeshift.training.supervision.exposure import fitted_psnr
 from shapeshift.training.supervision.still_background import (
     PICTURE_PHOTOS,
     StillBackground,
+    StillPicture,
     chosen,
     key_of,
     still_background,
     still_share,
 )
-from shapeshift.training.supervision.still_picture import StillPicture
 
 MOST_LOOKED_AT, LOOKED_AT_PX = 12, 64  # held-out photos, for the colour behind them
 # Fields of ModalityScore that not every photo has.

@@ -70,7 +70,7 @@ def check_size(width: int, height: int) -> None:
 
 def opened(data: bytes, path: Path) -> StrangeNetwork:
     """A network's bytes, opened behind the gate on all cores.  Raises BadFile."""
-    from shapeshift.training.gradients.check_network import check_network
+    from shapeshift.training.gradients.read_network import check_network
 
     check_network(data, path)
     return StrangeNetwork(path, 0, data)

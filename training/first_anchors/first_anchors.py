@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapeshift.training.first_anchors.initial import (
-    InitialPoints,
-)
-from shapeshift.training.first_anchors.spacing import (
+from shapeshift.training.first_anchors.hull import (
     median_neighbour,
     voxel_centres,
+)
+from shapeshift.training.first_anchors.initial import (
+    InitialPoints,
 )
 from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH

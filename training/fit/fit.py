@@ -2,22 +2,28 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass, fields, replace
+from itertools import combinations, pairwise
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from shapeshift.rasterizer.raster import rasterize_backward
 from shapeshift.runtime_models.evaluate import Evaluator
-from shapeshift.runtime_models.model import AnchorModel, BadFile
+from shapeshift.runtime_models.files.json_fields import LONGEST_TEXT, Fields, read_json
+from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
 from shapeshift.runtime_models.package.drop_unused import drop_unused
 from shapeshift.runtime_models.package.feature_codes import FEATURES
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_package import package_files, zip_files
 from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.evaluation.evaluate import ModelRenderer, stop_for
+from shapeshift.training.evaluation.metrics import psnr
+from shapeshift.training.first_anchors.initial import SOURCES
 from shapeshift.training.fit.ablation import COMPONENTS, DROPPED, Ablation, Component, Trial, decide
-from shapeshift.training.fit.view_metrics import largest_contribution, outline_ious, view_psnr
 from shapeshift.training.photo_store.open_photos import open_photos
-from shapeshift.training.photos import BLACK, choose_downscale
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.supervision.still_background import leave_out_still
@@ -49,7 +55,7 @@ class FitReport:
     full: Trial  # the largest
     fitted: Trial
     decisions: tuple[Ablation, ...]
-    outlines: dict[tuple[str, str], float]  # of every two stops of the largest, see view_metrics.py
+    outlines: dict[tuple[str, str], float]  # of every two stops of the largest, see fit.py
     photos: dict[str, int]  # held out, by modality
     seeds: int
     tolerance_db: float
@@ -230,3 +236,118 @@ def shift_ms(model: AnchorModel) -> float:
         evaluator.color(i % 2, np.array([i, 1.0, 2.0]))
         times.append(1e3 * (time.perf_counter() - start))
     return min(times[1:])
+
+
+# The settings of one training from a JSON file, as TrainSettings.as_dict gives them.
+
+MOST_BYTES = 1 << 16
+ADVICE = "take it as `fit --cluster` wrote it"
+# Whole numbers up to this, so that nothing asks for more memory than there could be.
+MOST = {
+    "iterations": 1 << 31, "max_anchors": 1 << 31, "seed": 1 << 62, "downscale": 1 << 16,
+    "splats_per_anchor": 1 << 10, "features": 1 << 12, "hidden": 1 << 12, "grow_every": 1 << 31,
+}  # fmt: skip
+
+
+def read_settings(path: Path) -> TrainSettings:
+    """Every field has to be there, and none besides.  Raises BadFile."""
+    row = Fields(read_json(path, most_bytes=MOST_BYTES, unique=True), str(path), ADVICE)
+    kinds = get_type_hints(TrainSettings)
+    values = {each.name: read_value(row, each.name, kinds[each.name])
+              for each in fields(TrainSettings)}  # fmt: skip
+    row.refuse_unknown_keys()
+    try:
+        return TrainSettings(**values)
+    except ValueError as error:
+        raise BadFile(f"{path}: {str(error).rstrip('.')}; {ADVICE}.") from None
+
+
+def read_value(row: Fields, name: str, kind: Any) -> Any:
+    """One field of the type that TrainSettings has.  Raises BadFile."""
+    if row.value(name) is None and type(None) in get_args(kind):
+        return None
+    kinds = {kind, *get_args(kind)}
+    if name == "points":  # files of points are not among what a trial reads
+        return row.line(name, known=SOURCES)
+    if get_origin(kind) is Literal:
+        return row.line(name, known=get_args(kind))
+    if bool in kinds:
+        return row.typed(name, bool)
+    if int in kinds:
+        return row.count(name, 0, MOST[name])
+    if float in kinds:
+        return row.number(name, wanted="a number from 0", low=0)
+    text = row.typed(name, str)
+    if not (text.isprintable() and (name == "rig" or len(text) <= LONGEST_TEXT)):
+        raise row.error(name, "one line of text")
+    return text
+
+
+# What photos say of a model: how alike each is, what every anchor gives them, and outlines.
+
+Color = tuple[float, float, float]
+COVERED = 0.5  # of a pixel, from where on it lies inside of an outline
+
+
+def view_psnr(
+    device, model: Model, photos: list[LoadedPhoto], stops: tuple, background: Color
+) -> dict[str, np.ndarray]:
+    """PSNR in dB of every photo, in their order, by modality."""
+    renderer, found = ModelRenderer(device, model), {}
+    for stop in stops:
+        mine = [p for p in photos if p.modality == stop.name]
+        renderer.set_control(stop_for(model, stop).x)
+        found[stop.name] = np.array(
+            [psnr(renderer.picture(p.view, background), p.over(background), p.weight) for p in mine]
+        )
+    return found
+
+
+def largest_contribution(
+    device, model: AnchorModel, photos: list[LoadedPhoto], stops: tuple
+) -> np.ndarray:
+    """(A,) pixels that an anchor's splats make up in the photo where they make up most.
+
+    A splat makes up the sum of alpha T over the picture of its own stop; what hides behind others,
+    or lies outside of every photo, makes up nothing.
+    """
+    renderer, most = ModelRenderer(device, model), np.zeros(len(model.anchors))
+    for stop in stops:
+        renderer.set_control(stop_for(model, stop).x)
+        for photo in photos:
+            if photo.modality != stop.name:
+                continue
+            projected, tiles, frame = renderer.draw(photo.view, BLACK)
+            grad = device.zeros(frame.image.shape)
+            record = rasterize_backward(
+                device, projected, tiles, frame, grad, None, absolute=False, weight=True
+            )
+            weight = device.download(record)[:, 11].reshape(len(most), -1)
+            most = np.maximum(most, weight.sum(axis=1, dtype=np.float64))
+    return most
+
+
+def outline(renderer: ModelRenderer, photo: LoadedPhoto) -> np.ndarray:
+    """(H, W) bool: where the model at the renderer's control value covers the photo's view."""
+    _, _, frame = renderer.draw(photo.view, BLACK)
+    return 1 - renderer.device.download(frame.transmittance) > COVERED
+
+
+def outline_ious(
+    device, model: Model, photos: list[LoadedPhoto], stops: tuple
+) -> dict[tuple[str, str], float]:
+    """Mean over the photos' views of (both) / (either) of the outlines at every pair of stops.
+
+    1: the stops have one shape, as far as outlines tell; 0: nothing in common.
+    """
+    renderer, outlines = ModelRenderer(device, model), {}
+    for stop in stops:
+        renderer.set_control(stop_for(model, stop).x)
+        outlines[stop.name] = [outline(renderer, photo) for photo in photos]
+    found = {}
+    for a, b in combinations(outlines, 2):
+        both = [(x & y).sum() for x, y in zip(outlines[a], outlines[b], strict=True)]
+        either = [(x | y).sum() for x, y in zip(outlines[a], outlines[b], strict=True)]
+        seen = [i / u for i, u in zip(both, either, strict=True) if u]
+        found[a, b] = float(np.mean(seen)) if seen else 1.0
+    return found

@@ -1,4 +1,4 @@
-// What densification decides on, summed over steps.  Defined by densification_stats.py: SPLATS.
+// What densification decides on, summed over steps.  Defined by densify.py: SPLATS.
 // Reads:   rows of the step; record and grad_record (N, 12), opacity (N,) of these.
 // Writes:  sums over steps: grad2d (N, 2), opacity_sum (A, 2), contribution (A, 2).
 // Units:   gradients times `unit`; opacity 0..1; alpha T summed over pixels.

@@ -1,4 +1,4 @@
-// Which anchors a view can show: see visibility.py.  One work-item an anchor.
+// Which anchors a view can show: see step.py.  One work-item an anchor.
 // Reads:   anchors (A, 3), their splats' means, scales and opacity; camera (common/camera.cl).
 // Writes:  reach (A,) of what a step ran; seen (A,) bytes.
 // Units:   metres; one sigma; opacity 0..1; pixels.

@@ -13,7 +13,7 @@ from shapeshift.scene.pose import View
 from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.evaluation.evaluate import ModelRenderer
 from shapeshift.training.style_features.vgg_features import VggFeatures
-from shapeshift.training.styles.style_views import dome_views
+from shapeshift.training.styles.train_stop import dome_views
 
 LAYERS = (("relu2_1", 2), ("relu3_1", 4))  # and how many pixels a side each place of them has
 NUMBERS = 32  # of a splat, as in the paper: of 384 they keep some 85 % of the variance

@@ -1,7 +1,7 @@
 """Shapes by rule: what becomes of the source stop's splats, in a few lines each.
 
 A rule is a function of the splats that a stop shows, where they are, to what they shall be.  What
-it asks for is brought into the reach of the networks by fit_rule.py: a splat stays within 2 voxels
+it asks for is brought into the reach of the networks by add_style.py: a splat stays within 2 voxels
 of its anchor, in the anchor's own axes and sizes, which are flat on surfaces.
 """
 

@@ -2,9 +2,11 @@
 
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.training.baselines.plain_settings import PlainSettings
-from shapeshift.training.losses.depth_loss import DepthLoss, DepthTarget, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss, Target
-from shapeshift.training.losses.normal_loss import (
+from shapeshift.training.losses.surface_losses import (
+    DepthLoss,
+    DepthTarget,
+    DepthTerm,
     NormalLoss,
     NormalTarget,
     NormalTerm,

@@ -1,19 +1,23 @@
-"""A controller as capsules, of our own making: what one holds, with its buttons where they are.
-
-One shape for each family of profiles, not the makers' own.  In the grip's own frame, as OpenXR has
-it: the fist holds a tube along Z with the thumb at -Z, open fingers point to -Y, and the right
-hand's back is at +X.  Below, places are (out, ahead, up) of a right hand whose thumb is up: out of
-the back of the hand, to where its fingers point, to its thumb.
-"""
+"""The names of a controller's buttons, each on a card of its own with a line to its button."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.cards import Card
 from shapeshift.vr.frame import Hand
 from shapeshift.vr.glove import LIT, MIRROR, Capsule
+from shapeshift.vr.panel.plane import facing
+
+# A controller as capsules, of our own making: what one holds, with its buttons where they are.
+#
+# One shape for each family of profiles, not the makers' own. In the grip's own frame, as OpenXR
+# has it: the fist holds a tube along Z with the thumb at -Z, open fingers point to -Y, and the
+# right hand's back is at +X. Below, places are (out, ahead, up) of a right hand whose thumb is
+# up: out of the back of the hand, to where its fingers point, to its thumb.
 
 SHELL, KEY = (0.74, 0.75, 0.79), (0.34, 0.36, 0.43)  # display sRGB
 HEAD = (0.0, 0.012, 0.046)  # the middle of what the thumb lies on
@@ -228,3 +232,44 @@ def face(out: float, along: float, over: float = 0.0) -> np.ndarray:
 def mixed(color, other, part: float) -> tuple[float, ...]:
     """A colour on its way to another one."""
     return tuple(a + (b - a) * part for a, b in zip(color, other, strict=True))
+
+
+AWAY_M = 0.085  # from the grip to the cards' near edge, outwards
+ABOVE_M = 0.02  # their middle over the grip
+GAP_M = 0.004  # between two cards
+LINE_M = 0.0011  # radius
+INK = (0.92, 0.93, 0.96)  # display sRGB
+
+
+def labelled(
+    side: str, held: HeldController, rows: Mapping[str, str], grip: np.ndarray, head: Pose,
+    opacity: float,
+) -> tuple[list[Card], list[Capsule]]:  # fmt: skip
+    """Cards outwards of a hand, from top to bottom as their buttons are, and the lines to these.
+
+    rows: what each button is called and does; a row whose name is no button has no line.
+    """
+    level = facing(grip, head)
+    axes = level.matrix()[:3, :3]
+    outwards = axes[:, 0] * (1 if side == "right" else -1)
+    up = axes[:, 1]
+
+    def height(name: str) -> float:
+        place = held.buttons.get(name)
+        return -np.inf if place is None else float(place @ up)
+
+    names = sorted(rows, key=height, reverse=True)
+    cards = [Card((rows[name],), level, opacity) for name in names]
+    sizes = [card.size_m for card in cards]
+    tall = sum(size[1] for size in sizes) + GAP_M * (len(sizes) - 1)
+    edge = grip + outwards * AWAY_M + up * (ABOVE_M + tall / 2)
+    placed, lines = [], []
+    for name, card, (wide, high) in zip(names, cards, sizes, strict=True):
+        near = edge - up * (high / 2)
+        middle = near + outwards * (wide / 2)
+        placed.append(replace(card, play_from_card=Pose(middle, level.wxyz)))
+        if name in held.buttons:
+            ink = (*INK, 0.9 * opacity)
+            lines.append(Capsule(held.buttons[name], near, (LINE_M, LINE_M), ink))
+        edge = edge - up * (high + GAP_M)
+    return placed, lines

@@ -7,16 +7,147 @@ Callers put hands to rest that a panel or an object has.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shapeshift.vr.frame import SIDES, Frame
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.locomotion.stance import heading, moved, pinned, resized, turned, underfoot, yaw
-from shapeshift.vr.locomotion.teleport import Arc, Ground, level_ground, throw_arc
-from shapeshift.vr.locomotion.world_grip import Grips, drawn_along, held_points
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.frame import SIDES, Frame, grip_of
+from shapeshift.vr.locomotion.play_space import (
+    PlaySpace,
+    heading,
+    moved,
+    pinned,
+    resized,
+    scaled,
+    turned,
+    underfoot,
+    yaw,
+)
 from shapeshift.vr.one_hand import shared_stick
+
+# Taking hold of the world: one hand draws it along, two turn and stretch it as well.
+#
+# Each hand pins a point of the world to itself; one is kept exactly, of two the middle, the
+# direction seen from above and the distance.
+
+LEAST_APART = 0.05  # metres between two hands: nearer, their distance and direction say nothing
+
+Grips = tuple[tuple[str, np.ndarray], ...]  # side, (3,) metres of the world that it holds
+
+
+def held_points(play_space: PlaySpace, frame: Frame, sides: frozenset[str]) -> Grips:
+    """What these hands hold now."""
+    return tuple(
+        (side, play_space.point(grip_of(frame.hands[side]).position)) for side in sorted(sides)
+    )
+
+
+def drawn_along(play_space: PlaySpace, frame: Frame, grips: Grips) -> PlaySpace:
+    """The standing in which the hands hold what they took."""
+    here = [grip_of(frame.hands[side]).position for side, _ in grips]  # (3,) metres, room
+    there = [world for _, world in grips]
+    if len(grips) == 1:
+        return pinned(play_space, here[0], there[0])
+    middle = (here[0] + here[1]) / 2
+    apart, apart_world = here[1] - here[0], there[1] - there[0]
+    length = float(np.linalg.norm(apart))
+    if length >= LEAST_APART:
+        play_space = scaled(play_space, float(np.linalg.norm(apart_world)) / length, middle)
+    across, across_world = (math.hypot(v[0], v[2]) for v in (apart, apart_world))
+    if across >= LEAST_APART and across_world >= LEAST_APART * play_space.scale:
+        now = play_space.world_from_play.matrix()[:3, :3] @ apart
+        angle = _bearing(apart_world) - _bearing(now)
+        play_space = turned(play_space, math.remainder(angle, math.tau), middle)
+    return pinned(play_space, middle, (there[0] + there[1]) / 2)
+
+
+def _bearing(direction: np.ndarray) -> float:
+    """Radians about up."""
+    return math.atan2(direction[0], direction[2])
+
+
+# Where a thrown arc comes down: points in the room, a landing, and whether one can stand there.
+
+SPEED = 6.0  # m/s of the room at which the arc leaves the hand: 3.7 m far on level ground, and more
+FALL = 9.81  # m/s2
+STEP_S, STEPS = 0.05, 40  # of the arc
+SLIVER = 0.02  # metres: from so far above a floor is looked for where a wall was met
+
+# ground(start, end), (3,) metres of the world each -> (point, can be stood on), or None
+Ground = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, bool] | None]
+
+
+@dataclass(frozen=True)
+class Arc:
+    """What is drawn while one aims."""
+
+    points: np.ndarray  # (n, 3) metres, room
+    landing: np.ndarray | None  # (3,) metres, room
+    fine: bool  # one can stand there
+
+
+def level_ground(floor_y: float) -> Ground:
+    """An endless floor in the world."""
+
+    def ground(start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, bool] | None:
+        if not start[1] >= floor_y > end[1]:
+            return None
+        part = (start[1] - floor_y) / (start[1] - end[1])
+        return start + part * (end - start), True
+
+    return ground
+
+
+def ground_of(world, level_y: float | None = None) -> Ground:
+    """What does not move in a scene.world.World, and a level where that has no floor.
+
+    At a wall one lands at its foot; on what can be carried away nobody stands.
+    """
+    level = level_ground(level_y) if level_y is not None else None
+
+    def ground(start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, bool] | None:
+        way = end - start
+        length = float(np.linalg.norm(way))
+        hit = world.aim(start, way) if length > 0 else None
+        if hit is None or hit.distance_m > length:
+            return level(start, end) if level else None
+        above = hit.point - way / length * SLIVER + [0.0, SLIVER, 0.0]
+        below = world.aim(above, np.array([0.0, -1.0, 0.0]))
+        if below is None:
+            return hit.point, False
+        stands = all(
+            met.object not in world.objects or not world.objects[met.object].moves
+            for met in (hit, below)
+        )
+        return below.point, stands
+
+    return ground
+
+
+def throw_arc(aim: Pose, play_space: PlaySpace, ground: Ground) -> Arc:
+    """The arc of a hand that aims."""
+    along = -aim.matrix()[:3, 2]
+    if not math.isfinite(float(along.sum())):
+        return Arc(aim.position[None], None, False)
+    seconds = np.arange(STEPS + 1)[:, None] * STEP_S
+    points = aim.position + along * SPEED * seconds  # (n, 3) metres, room
+    points[:, 1] -= FALL / 2 * seconds[:, 0] ** 2
+    room = play_space.world_from_play
+    world = room.position + play_space.scale * points @ room.matrix()[:3, :3].T  # (n, 3)
+    for number in range(STEPS):
+        met = ground(world[number], world[number + 1])
+        if met is not None:
+            landing = _into_room(play_space, met[0])
+            return Arc(np.vstack([points[: number + 1], landing]), landing, met[1])
+    return Arc(points, None, False)
+
+
+def _into_room(play_space: PlaySpace, world: np.ndarray) -> np.ndarray:
+    room = play_space.world_from_play
+    return room.matrix()[:3, :3].T @ (world - room.position) / play_space.scale
+
 
 TURNINGS = ("snap", "smooth", "none")
 LONGEST_S = 0.1  # of a frame: after a hitch nobody is thrown far

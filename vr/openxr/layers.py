@@ -14,16 +14,16 @@ import numpy as np
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import FAR_M, NEAR_M
-from shapeshift.vr.openxr.gl_depth import NoDepth
-from shapeshift.vr.openxr.hands import posef_of
-from shapeshift.vr.openxr.instance import DEPTH_LAYER, Instance
-from shapeshift.vr.openxr.swapchain import (
+from shapeshift.vr.openxr.graphics import (
     DEPTH_FORMATS,
     DepthSwapchain,
+    NoDepth,
     Swapchain,
     SwapchainFormat,
     choose_format,
 )
+from shapeshift.vr.openxr.hands import posef_of
+from shapeshift.vr.openxr.instance import DEPTH_LAYER, Instance
 from shapeshift.vr.shown import Blit
 
 WriteDepth = Callable[[int, moderngl.Framebuffer], None]  # of an eye: NEAR_M is 0 and FAR_M is 1
@@ -110,7 +110,7 @@ class FrameLayers:
         projected = []
         for i, (chain, texture, view) in enumerate(zip(self._eyes, textures, views, strict=True)):
             picture = chain.show(texture, self._shown, self.keep)
-            if self.keep:
+            if picture is not None:
                 self.kept.append(picture)
             behind = deep[i] if deep else None
             each = xr.CompositionLayerProjectionView(view.pose, view.fov, chain.whole, next=behind)
@@ -130,7 +130,7 @@ class FrameLayers:
         deep = []
         for i, chain in enumerate(self._depths):
             kept = chain.fill(partial(write_depth, i), self.keep)
-            if self.keep:
+            if kept is not None:
                 self.kept_depth.append(kept)
             info = xr.CompositionLayerDepthInfoKHR(chain.whole, 0.0, 1.0, NEAR_M, FAR_M)
             deep.append(info)

@@ -16,34 +16,39 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from shapeshift.renderer.foveation import hidden_pixels
 from shapeshift.renderer.gl.context import is_software
-from shapeshift.renderer.hidden import hidden_pixels
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
 from shapeshift.vr.frame import FAR_M, NEAR_M, Frame, Hand
-from shapeshift.vr.openxr.bounds import Bounds
-from shapeshift.vr.openxr.display import display_period
 from shapeshift.vr.openxr.events import (
+    BEGIN,
+    END,
+    LOST,
     ControllersChanged,
     GoingAway,
+    Life,
     MaskChanged,
     PassthroughChanged,
     Recentred,
     StateChanged,
     poll_events,
 )
-from shapeshift.vr.openxr.gaze import Gaze, tangents_along
-from shapeshift.vr.openxr.graphics import bind_current, check_requirements
+from shapeshift.vr.openxr.graphics import bind_current, check_requirements, choose_format
 from shapeshift.vr.openxr.hands import Hands, pose_of
-from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
-from shapeshift.vr.openxr.joints import HandTrackers
+from shapeshift.vr.openxr.instance import DISPLAY_RATE, Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.layers import FrameLayers, QuadPicture, WriteDepth
-from shapeshift.vr.openxr.life import BEGIN, END, LOST, Life
-from shapeshift.vr.openxr.passthrough import Passthrough
-from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
-from shapeshift.vr.openxr.swapchain import choose_format
-from shapeshift.vr.openxr.view_configuration import choose_views, with_insets
-from shapeshift.vr.openxr.visibility import VisibilityMasks
+from shapeshift.vr.openxr.room import (
+    Bounds,
+    Passthrough,
+    locate,
+    moved_by,
+    open_head_space,
+    open_play_space,
+    valid,
+)
+from shapeshift.vr.openxr.tracked import Gaze, HandTrackers, tangents_along
+from shapeshift.vr.openxr.view_configuration import VisibilityMasks, choose_views, with_insets
 from shapeshift.vr.pace import FramePace
 
 REST_S = 0.01  # between two looks at what the runtime says while there is nothing to draw
@@ -364,3 +369,21 @@ def known_part(pose: Pose, old: Pose, placed: bool, turned: bool) -> Pose:
         return Pose(pose.position, old.wxyz) if placed else old
     wxyz = pose.wxyz / np.linalg.norm(pose.wxyz)  # float32 of the runtime
     return Pose(pose.position if placed else old.position, wxyz)
+
+
+# How often the headset's display shows a picture, where the runtime tells it.
+
+
+def display_period(instance: Instance, session: Any) -> float:
+    """Seconds between two pictures of the display; 0 where the runtime does not tell."""
+    if DISPLAY_RATE not in instance.extensions:
+        return 0.0
+    xr = instance.xr
+    address = xr.get_instance_proc_addr(instance.handle, "xrGetDisplayRefreshRateFB")
+    ask = ctypes.CFUNCTYPE(ctypes.c_int, xr.Session, ctypes.POINTER(ctypes.c_float))(
+        ctypes.cast(address, ctypes.c_void_p).value or 0
+    )
+    hz = ctypes.c_float(0.0)
+    if ask(session, ctypes.byref(hz)) != 0:  # XR_SUCCESS
+        return 0.0
+    return 1 / hz.value if hz.value > 0 else 0.0

@@ -1,4 +1,4 @@
-// container: reads what runtime_models/web/write_container.py wrote: 8 bytes "SHIFTWEB", length of
+// container: reads what runtime_models/web/web_model.py wrote: 8 bytes "SHIFTWEB", length of
 // the JSON (uint32), the JSON, then arrays at multiples of 4.  The file is a stranger's: nothing in
 // it runs, and every count and length is checked here, before anything is allocated for it.
 import { MOST_ANCHORS, MOST_SPLATS, MOST_BYTES, MOST_WEIGHTS } from "../conventions.js";

@@ -8,8 +8,8 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.empty_panel import CHOICES, OPEN
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
 from shapeshift.app.editor.panels.widgets.panel_rows import item_label, tip
-from shapeshift.app.editor.panels.widgets.textures import Textures
 from shapeshift.app.editor.state.user.recent import RecentFiles
 from shapeshift.app.editor.state.user.recent_pictures import RecentPictures
 from shapeshift.app.editor.texts.table import said

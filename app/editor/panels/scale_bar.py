@@ -11,7 +11,7 @@ from shapeshift.renderer.colors.palette import (
     palette_between,
     value_blend,
 )
-from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
+from shapeshift.renderer.debug.debug_map import nice_ticks, tick_text
 from shapeshift.scene.scene import Scene
 
 Vec = imgui.ImVec2

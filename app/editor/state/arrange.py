@@ -8,9 +8,9 @@ import numpy as np
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
-from shapeshift.app.editor.state.film.timeline import FilmKeys
 from shapeshift.app.editor.state.scene_objects import with_background
 from shapeshift.app.editor.state.track import next_stop, stepped
+from shapeshift.app.film.window.timeline import FilmKeys
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.control import Shift, Sweep

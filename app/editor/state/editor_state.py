@@ -10,10 +10,9 @@ import numpy as np
 
 from shapeshift.app.document import DARK, Document
 from shapeshift.app.editor.state.bodies import Bodies
-from shapeshift.app.editor.state.camera.first_look import FirstLook
+from shapeshift.app.editor.state.camera.framed import FirstLook
 from shapeshift.app.editor.state.files.edited_file import EditedFile, edited_from_scene
 from shapeshift.app.editor.state.files.opened import Source
-from shapeshift.app.editor.state.film.timeline import Timeline
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.regions import Regions
 from shapeshift.app.editor.state.scene_objects import (
@@ -23,9 +22,9 @@ from shapeshift.app.editor.state.scene_objects import (
     with_background,
     with_palette,
 )
-from shapeshift.app.editor.state.shown_scene import ShownScene
-from shapeshift.app.editor.state.split_state import SplitState
+from shapeshift.app.editor.state.shown_scene import ShownScene, SplitState
 from shapeshift.app.editor.state.track import Grip
+from shapeshift.app.film.window.timeline import Timeline
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
 from shapeshift.runtime_models.model import Finding, Model, Stop
 from shapeshift.runtime_models.stop_weights import Control

@@ -5,8 +5,7 @@ from collections.abc import Callable
 from shapeshift.app.editor.state.arrange import as_it_stands, copy_offset, edit, redo, undo
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.texts.deeds import said_deed
-from shapeshift.app.editor.texts.table import said
+from shapeshift.app.editor.texts.table import said, said_deed
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document import edits

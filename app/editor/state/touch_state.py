@@ -11,7 +11,7 @@ from shapeshift.app.editor.texts.table import said
 from shapeshift.app.paths import is_bundled
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.world.follow import reset_objects
-from shapeshift.scene.world.mouse_hand import MouseHand
+from shapeshift.scene.world.grab import MouseHand
 from shapeshift.scene.world.record import Record
 from shapeshift.scene.world.world import World
 

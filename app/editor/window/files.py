@@ -10,8 +10,8 @@ from shapeshift.app.camera_files import camera_reading, in_scene
 from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
 from shapeshift.app.editor.panels.open_row import NEW, OpenRow
-from shapeshift.app.editor.panels.widgets.path_box import PathBox
-from shapeshift.app.editor.panels.widgets.textures import Textures
+from shapeshift.app.editor.panels.widgets.boxes import PathBox
+from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState

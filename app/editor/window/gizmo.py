@@ -21,7 +21,7 @@ from shapeshift.app.editor.window.window import (
     Release,
     Window,
 )
-from shapeshift.runtime_models.bounds import MIN_OPACITY, PERCENTILES
+from shapeshift.runtime_models.parts import MIN_OPACITY, PERCENTILES
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document.scene_file import FAR_M
 from shapeshift.scene.pose import Pose, View

@@ -1,13 +1,20 @@
 """What a person does to the objects of the scene by keys and clicks: choose, edit, undo, save."""
 
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
 import glfw
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.save_boxes import draw_saving
+from shapeshift.app.camera_files import camera_reading
+from shapeshift.app.editor.panels.widgets.boxes import PathBox, answer_row, question_box
+from shapeshift.app.editor.state.arrange import edit, undo
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, Progress, read_files
 from shapeshift.app.editor.state.files.saving import Saving, unsaved
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.texts.table import said
-from shapeshift.app.editor.window.adding import Adding
+from shapeshift.app.editor.window.files import poll_opener
 from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.window import (
     CLICK_PIXELS,
@@ -19,6 +26,93 @@ from shapeshift.app.editor.window.window import (
     Release,
     Window,
 )
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import is_scene_file
+from shapeshift.scene.scene import Scene
+
+# Adding an object to the scene that is open: the box that takes a path or a dropped file.
+
+
+class Adding:
+    """The box, and the reading that may be under way."""
+
+    def __init__(
+        self, state: EditorState, options: ReadingOptions, upload: Callable[[Scene], None],
+        added: Callable[[], None], recent: Callable[[], Sequence[Path]],
+    ) -> None:  # fmt: skip
+        """`upload` gives a scene to the device and raises BadFile where it does not fit."""
+        self._state, self._options = state, options
+        self._upload, self._added, self._recent = upload, added, recent
+        self._opener = Opener()
+        self._box = PathBox("Add to the scene", "Add")
+
+    @property
+    def asking(self) -> bool:
+        return self._box.asking
+
+    def ask(self) -> None:
+        self._box.ask()
+
+    def begin(self, paths: tuple[Path, ...]) -> None:
+        """Reads files and adds them when all are there."""
+        self._box.close()
+        options = self._options
+
+        def read(paths: tuple[Path, ...], progress: Progress) -> OpenedFiles:
+            return read_files(
+                paths,
+                lambda path, progress: open_model(path, options, progress),  # finest level at once
+                camera_reading(options),
+                progress,
+                options.reading(),
+                beside=False,
+            )
+
+        self._opener.start(paths, read)
+        self._state.say(self._opener.note)
+
+    def poll(self) -> bool:
+        """Takes over what has been read; True while something is being read or looked for."""
+        return poll_opener(self._state, self._opener, self.add_opened) or self._box.browsing
+
+    def add_opened(self, found: OpenedFiles) -> None:
+        """One object more of each source; a scene that the device cannot hold stays without."""
+        state = self._state
+        if found.path is not None:
+            state.problem = said(
+                "{name} is a scene file: open it instead, or add its models one by one.",
+                name=found.path.name,
+            )
+            return
+        if not found.sources:
+            state.problem = said("A file of cameras is no object; drop it on the window itself.")
+            return
+        file = state.edited.file
+        for source in found.sources:
+            item = state.edited.item(source)
+            file = edits.add(file, item)
+        try:
+            edit(state, file, f"add {file.items[-1].name}")
+        except (BadFile, ValueError) as error:
+            state.problem = str(error)
+            return
+        try:
+            self._upload(state.scene)
+        except BadFile as error:
+            undo(state)
+            state.problem = str(error)
+            return
+        state.chosen = file.items[-1].name
+        self._added()
+
+    def draw(self, ui_scale: float) -> None:
+        """The box: a path, a recent file, or something that is dropped meanwhile."""
+        paths = [path for path in self._recent() if not is_scene_file(path)]
+        if chosen := self._box.draw(paths, ui_scale):
+            self.begin(chosen)
+
 
 KEYS = (
     ("click", "choose an object"),
@@ -141,3 +235,58 @@ class Objects:
         """The boxes that ask for a name, before something is lost, for what to add."""
         draw_saving(self.saving, self.state.edited.name, ui_scale)
         self.adding.draw(ui_scale)
+
+
+# The two boxes about saving: one asks for a name, one before something is lost.
+
+OVER = "Over it"  # writes over the file that was opened
+SAVE, LOSE = "Save the scene", "Changes are not saved"
+
+
+def draw_saving(saving: Saving, scene_name: str, ui_scale: float) -> None:
+    """Whichever box is open."""
+    if saving.name:
+        if question_box(SAVE, ui_scale):
+            _draw_name(saving, ui_scale)
+            imgui.end_popup()
+    elif saving.then is not None and question_box(LOSE, ui_scale):
+        _draw_lose(saving, scene_name, ui_scale)
+        imgui.end_popup()
+
+
+def _draw_name(saving: Saving, ui_scale: float) -> None:
+    imgui.push_item_width(-1)
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    flags = imgui.InputTextFlags_.enter_returns_true
+    entered, name = imgui.input_text("##path", saving.name, flags)
+    imgui.pop_item_width()
+    saving.retype(name)
+    if saving.taken:
+        imgui.push_text_wrap_pos(0)
+        imgui.text_unformatted(said("{name} is there already.", name=Path(saving.name).name))
+        imgui.pop_text_wrap_pos()
+    label, original = "Replace it" if saving.taken else "Save", saving.original
+    words: tuple[str, ...] = (label, "Cancel")
+    if original is not None and not saving.taken:
+        imgui.text_disabled(said("{name} was not written by you here.", name=original.name))
+        words = (label, OVER, "Cancel")
+    clicked = answer_row(words, ui_scale)
+    if clicked == label or (entered and not saving.taken):
+        saving.named(saving.name, replace=saving.taken)
+    elif clicked == OVER:
+        saving.ask_over()
+    elif clicked == "Cancel":
+        saving.cancel_name()
+    if not saving.name:
+        imgui.close_current_popup()
+
+
+def _draw_lose(saving: Saving, scene_name: str, ui_scale: float) -> None:
+    imgui.push_text_wrap_pos(0)
+    imgui.text_unformatted(said("{name} has changes that are not saved.", name=scene_name))
+    imgui.pop_text_wrap_pos()
+    clicked = answer_row(("Save", "Discard", "Cancel"), ui_scale)
+    if clicked:
+        imgui.close_current_popup()
+        saving.answer(clicked)

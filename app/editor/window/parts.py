@@ -1,13 +1,16 @@
 """The mouse and the keys of the tool "Parts": things light up, are chosen, become objects."""
 
+from collections.abc import Sequence
+
 import glfw
 import numpy as np
+from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.outlines import draw_brush, draw_segments, segments
 from shapeshift.app.editor.panels.panel import Section
-from shapeshift.app.editor.panels.parts_marks import draw_drag
 from shapeshift.app.editor.panels.sections.objects_panel import FOUR_VIEW_NAMES
 from shapeshift.app.editor.panels.sections.parts_panel import DRAG_WORDS, draw_parts
+from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import ADD, REMOVE, REPLACE, PartsTool
@@ -259,3 +262,28 @@ class MouseParts:
             obj = self._state.scene.objects[tool.index]
             lines = segments(box, 0.0)
             draw_segments(lines, obj, self._viewpoint.view(), window.logical_size, ui_scale)
+
+
+# What a drag of the tool "Parts" draws over the picture: a box, a lasso, the edge of a sphere.
+
+Vec = imgui.ImVec2
+Place = tuple[float, float]  # logical pixels
+
+
+def draw_drag(
+    drag: str, start: Place, way: Sequence[Place], removes: bool, ui_scale: float
+) -> None:
+    """From where the button went down, along the way that the mouse has gone since."""
+    draw = imgui.get_background_draw_list()
+    ink, wide = theme.color(theme.TEXT if removes else theme.ACCENT, 0.9), 1.5 * ui_scale
+    if drag == LASSO:
+        points = [Vec(*start), *(Vec(x, y) for x, y in way)]
+        draw.add_polyline(points, ink, wide, imgui.ImDrawFlags_.closed)
+    elif drag == SPHERE:
+        radius = float(np.hypot(way[-1][0] - start[0], way[-1][1] - start[1]))
+        draw.add_circle(Vec(*start), radius, ink, 0, wide)
+        draw.add_circle_filled(Vec(*start), 2.5 * ui_scale, ink)
+    else:
+        corners = np.array([start, way[-1]])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        draw.add_rect(Vec(*low), Vec(*high), ink, 0.0, wide)

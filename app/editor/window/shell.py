@@ -1,20 +1,175 @@
 """What concerns the window and no scene: text size, language, folded panel, keys, messages."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping, Sequence
 
 import glfw
+from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.keys_sheet import Row, draw_keys
 from shapeshift.app.editor.panels.messages_panel import draw_messages
 from shapeshift.app.editor.panels.panel import PanelActions
-from shapeshift.app.editor.panels.sections.settings_panel import draw_settings
+from shapeshift.app.editor.panels.scale_bar import KELVIN
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.panel_rows import choice, item_label, tip
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.user.settings import ProgramSettings, other_text_size
 from shapeshift.app.editor.texts.fonts import is_offered, why_not
-from shapeshift.app.editor.texts.table import all_languages, said, use_language
+from shapeshift.app.editor.texts.table import all_languages, language_in_use, said, use_language
 from shapeshift.app.editor.window.monitor import place_of
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
+
+# The sheet of keys: everything that keys and mouse do, in groups; F1 opens and closes it.
+
+Vec = imgui.ImVec2
+Row = tuple[str, str]  # key, what it does
+# What is printed on keys, and the text by which tables have it in the language of a keyboard.
+KEY_WORDS = {
+    "Ctrl": "the key Ctrl", "Shift": "the key Shift", "Space": "the key Space",
+    "Enter": "the key Enter", "Delete": "the key Delete",
+}  # fmt: skip
+WORDS = re.compile(rf"\b({'|'.join(KEY_WORDS)})\b")
+COLUMN = 330.0  # logical pixels, of a group
+KEY_PART = 0.40  # of a column, where what a key does begins
+MOUSE_AND_CAMERA = (
+    ("drag", "orbit; look about when flying"),
+    ("right drag", "pan; look about when flying"),
+    ("wheel", "nearer, farther"),
+    ("double click", "centre that place"),
+    ("V", "orbit or fly"),
+    ("W A S D Q E", "move; Shift fast, Ctrl slow"),
+    ("F", "frame everything"),
+    ("Shift+F", "the first view"),
+    ("numpad 1, 3, 7", "front, right, top; Ctrl: the other side"),
+    ("numpad 5", "parallel rays, or those of an eye"),
+    ("N, P", "next, previous camera of a file"),
+    ("K", "keep this view in a file"),
+)
+SLIDER = (
+    ("drag", "x from stop to stop; Alt: without snapping"),
+    ("1 \u2013 9", "go to a stop"),
+    ("left, right", "a hundredth of x"),
+    ("Shift+left, right", "to the next stop"),
+    ("Space", "play, pause"),
+    ("number beside it", "click to type x, or a stop's name"),
+)
+REGIONS = (
+    ("L", "lens on, off"),
+    ("B + drag", "paint a region; Shift erases"),
+    ("Esc", "leave the region"),
+)
+PROGRAM = (
+    ("Ctrl+O", "open; or drop files on the window"),
+    ("Ctrl+N", "an empty scene"),
+    ("Ctrl+Z, Ctrl+Y", "undo, redo an edit"),
+    ("Ctrl+S", "save the scene; Shift: as"),
+    ("F12", "save a picture"),
+    ("G, Shift+G", "debug views"),
+    ("Ctrl +, Ctrl \u2013", "larger, smaller text; Ctrl 0 as at first"),
+    ("Ctrl+click", "on a slider of the panel: type its number"),
+    ("H, Tab", "hide all this"),
+    ("F11", "full screen"),
+    ("F1", "this sheet"),
+)
+GROUPS = {
+    "Slider": SLIDER,
+    "Camera": MOUSE_AND_CAMERA,
+    "Program": PROGRAM,
+    "Regions": REGIONS,
+}
+
+
+def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
+    """The sheet over the window's middle; `more` are groups of other parts of the program.
+
+    Returns where it is, and whether it was closed by its button.
+    """
+    screen = imgui.get_io().display_size
+    groups = {**{name: list(rows) for name, rows in GROUPS.items()}, **more}
+    columns = max(1, min(3, int(0.94 * screen.x / (COLUMN * ui_scale)), len(groups)))
+    width = min(columns * COLUMN * ui_scale, 0.94 * screen.x)
+    imgui.set_next_window_pos(Vec(screen.x / 2, screen.y / 2), 0, Vec(0.5, 0.5))
+    imgui.set_next_window_size_constraints(Vec(width, 0), Vec(width, 0.94 * screen.y))
+    flags = imgui.WindowFlags_
+    imgui.push_style_color(imgui.Col_.window_bg, imgui.ImVec4(*theme.SURFACE, 0.98))
+    imgui.begin(
+        "##keys",
+        None,
+        flags.no_title_bar | flags.no_resize | flags.no_move | flags.no_saved_settings
+        | flags.always_auto_resize,
+    )  # fmt: skip
+    imgui.pop_style_color()
+    closed = _heading(ui_scale)
+    start, each = imgui.get_cursor_pos(), imgui.get_content_region_avail().x / columns
+    lowest = start.y
+    for column, names in enumerate(spread(groups, columns)):
+        imgui.set_cursor_pos(Vec(start.x + column * each, start.y))
+        for name in names:
+            _group(name, groups[name], each, ui_scale)
+        lowest = max(lowest, imgui.get_cursor_pos_y())
+    imgui.set_cursor_pos(Vec(start.x, lowest))
+    imgui.dummy(Vec(0, 0))  # the window reaches down to here
+    box = theme.window_box()
+    imgui.end()
+    return box, closed
+
+
+def _heading(ui_scale: float) -> bool:
+    """What this is, and the button that closes it, at the right; True when it was clicked."""
+    start, room = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
+    imgui.text_unformatted(said("Keys and mouse"))
+    below, width = imgui.get_cursor_pos(), 80 * ui_scale
+    imgui.set_cursor_pos(Vec(start.x + room - width, start.y))
+    closed = imgui.button(item_label("Close"), Vec(width, 0))
+    tip("F1 or Esc.", ui_scale)
+    imgui.set_cursor_pos(Vec(below.x, below.y + 10 * ui_scale))
+    return closed
+
+
+def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> None:
+    """A heading and its rows, one below the other from the cursor on."""
+    left, gap = imgui.get_cursor_pos_x(), 16 * ui_scale
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), said(name))
+    for key, what in rows:
+        imgui.set_cursor_pos_x(left)
+        y = imgui.get_cursor_pos_y()
+        imgui.push_text_wrap_pos(left + KEY_PART * width - gap / 4)
+        imgui.text_unformatted(key_text(key))
+        imgui.pop_text_wrap_pos()
+        below = imgui.get_cursor_pos_y()
+        imgui.set_cursor_pos(Vec(left + KEY_PART * width, y))
+        imgui.push_text_wrap_pos(left + width - gap)
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))
+        imgui.text_unformatted(said(what))
+        imgui.pop_style_color()
+        imgui.pop_text_wrap_pos()
+        imgui.set_cursor_pos_y(max(below, imgui.get_cursor_pos_y()))
+    imgui.set_cursor_pos(Vec(left, imgui.get_cursor_pos_y() + gap / 2))
+
+
+def key_text(key: str) -> str:
+    """A row's key as keyboards of the language in use have it."""
+    text = said(key)
+    if text != key and key not in KEY_WORDS:
+        return text
+    return WORDS.sub(lambda found: _printed(found[0]), key)
+
+
+def _printed(word: str) -> str:
+    text = KEY_WORDS[word]
+    return word if said(text) == text else said(text)
+
+
+def spread(groups: Mapping[str, Sequence[Row]], columns: int) -> list[list[str]]:
+    """The groups' names by column, in their order, each to the column that is shortest so far."""
+    out: list[list[str]] = [[] for _ in range(columns)]
+    length = [0] * columns
+    for name, rows in groups.items():
+        at = length.index(min(length))
+        out[at].append(name)
+        length[at] += len(rows) + 2
+    return out
+
 
 LARGER, SMALLER, AS_AT_FIRST = ("+", "="), ("-",), ("0",)  # with Ctrl
 
@@ -112,3 +267,36 @@ def speak_first(settings: ProgramSettings, messages: Messages) -> None:
         messages.fail(why_not(language))
         language = None
     use_language(language.code if language is not None else "")
+
+
+# The panel's section "Settings": language and units, which the next start keeps.
+
+
+def draw_settings(
+    settings: ProgramSettings, speak: Callable[[str], None], keep: Callable[[], None],
+    ui_scale: float,
+) -> None:  # fmt: skip
+    """`speak` shows another language, by its code; `keep` writes the settings."""
+    imgui.push_item_width(-1)
+    languages = all_languages()
+    offered = [code for code in languages if is_offered(code)]
+    now = language_in_use().code
+    names = [languages[code].name for code in offered]
+    chosen = choice("language", now, offered, names, names=True)
+    tip("The language of this panel. A file of texts is all that another one needs.", ui_scale)
+    if chosen != now:
+        speak(chosen)
+    missing = [language for code, language in languages.items() if code not in offered]
+    imgui.push_text_wrap_pos(0)
+    for language in missing:
+        imgui.text_disabled(why_not(language))
+    imgui.pop_text_wrap_pos()
+    units = ["", *KELVIN]
+    labels = [said("temperature: as filed"), *(said("temperature: {unit}", unit=u) for u in KELVIN)]
+    known = settings.temperature if settings.temperature in units else ""
+    unit = choice("temperature", known, units, labels)
+    tip("The unit of the legend beside the picture.", ui_scale)
+    if unit != known:
+        settings.temperature = unit
+        keep()
+    imgui.pop_item_width()

@@ -7,8 +7,8 @@ import moderngl
 
 from shapeshift.app.charts.comparison import Comparison, is_exact, measure_error, same_picture
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
+from shapeshift.renderer.colors.decode_colors import same_shape
 from shapeshift.renderer.colors.palette import ALL_VALUES
-from shapeshift.renderer.colors.two_looks import same_shape
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile

@@ -30,25 +30,24 @@ from shapeshift.app.editor.state.user.kept_palette import KeptPalette
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.texts.table import said
-from shapeshift.app.editor.window.adding import Adding
 from shapeshift.app.editor.window.devices.input_devices import InputDevices
 from shapeshift.app.editor.window.files import Files, OpenActions
-from shapeshift.app.editor.window.film.films import attach_films
 from shapeshift.app.editor.window.gizmo import Gizmo
 from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
-from shapeshift.app.editor.window.inspection.attach_inspection import attach_inspection
-from shapeshift.app.editor.window.inspection.attach_ruler import attach_ruler
-from shapeshift.app.editor.window.inspection.picture_under import Seen
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
-from shapeshift.app.editor.window.objects import Objects
+from shapeshift.app.editor.window.objects import Adding, Objects
 from shapeshift.app.editor.window.parts import attach_parts
 from shapeshift.app.editor.window.pictures import write_numbered_png, write_png
-from shapeshift.app.editor.window.sections.section_handles import attach_sections
+from shapeshift.app.editor.window.section_handles import attach_sections
 from shapeshift.app.editor.window.shell import Shell
 from shapeshift.app.editor.window.shown import FrameRequest, Shown
 from shapeshift.app.editor.window.touch import attach_touch
 from shapeshift.app.editor.window.window import Event, Window
+from shapeshift.app.film.window.films import attach_films
+from shapeshift.app.inspection.window.attach_inspection import attach_inspection
+from shapeshift.app.inspection.window.attach_ruler import attach_ruler
+from shapeshift.app.inspection.window.picture_under import Seen
 from shapeshift.app.paths import WorkFolders
 from shapeshift.renderer.debug.debug import debug_legend
 from shapeshift.renderer.gl.context import describe

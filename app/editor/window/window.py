@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
-from shapeshift.app.editor.panels.widgets.textures import Textures
+from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
 from shapeshift.app.editor.state.user.settings import default_text_size
 from shapeshift.app.editor.window.monitor import (
     Place,

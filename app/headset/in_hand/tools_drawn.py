@@ -6,13 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from shapeshift.app.editor.panels.marks_over import words_of
 from shapeshift.app.editor.panels.outlines import circles
 from shapeshift.app.headset.in_hand.hand_tools import HandTools
 from shapeshift.app.inspection.pictures import ALARMS
+from shapeshift.app.inspection.window.marks_over import words_of
 from shapeshift.scene.inspection.lengths import length
 from shapeshift.scene.inspection.marks import Mark
-from shapeshift.vr.card import Card
+from shapeshift.vr.cards import Card
 from shapeshift.vr.drawn import DOT_M, FINE, PALE, WRONG, Drawn
 from shapeshift.vr.frame import SIDES, Frame
 from shapeshift.vr.glove import Capsule

@@ -8,8 +8,8 @@ import moderngl
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.over.glass_state import seen_through
 from shapeshift.app.headset.xr_user import XrState
+from shapeshift.renderer.colors.decode_colors import same_shape
 from shapeshift.renderer.colors.palette import value_blend
-from shapeshift.renderer.colors.two_looks import same_shape
 from shapeshift.renderer.gl.gpu import release_framebuffer
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile
@@ -18,9 +18,16 @@ from shapeshift.scene.scene import Scene
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
 from shapeshift.vr.frame import SIDES, Frame, Hand
-from shapeshift.vr.glass.held import HeldGlass, PixelBox, boxes_of, frame_of, held_glass
-from shapeshift.vr.glass.legend import GlassScale, cards_of
-from shapeshift.vr.glass.pane import Pane
+from shapeshift.vr.glass.held import (
+    GlassScale,
+    HeldGlass,
+    Pane,
+    PixelBox,
+    boxes_of,
+    cards_of,
+    frame_of,
+    held_glass,
+)
 from shapeshift.vr.panel.carried import Carried
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.see_through import SeeThrough

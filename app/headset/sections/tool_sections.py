@@ -9,14 +9,14 @@ from imgui_bundle import imgui
 from shapeshift.app.editor.panels.cuts_panel import draw_cuts
 from shapeshift.app.editor.panels.panel import Section
 from shapeshift.app.editor.panels.scale_bar import in_unit
-from shapeshift.app.editor.panels.sections.inspect_panel import InspectActions, draw_inspect
 from shapeshift.app.editor.panels.sections.regions_panel import draw_regions
 from shapeshift.app.editor.panels.widgets.panel_rows import item_label, labelled_slider
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.headset.in_hand.finger_brush import LEAST_M, MOST_M
 from shapeshift.app.headset.in_hand.hand_tools import HandTools
-from shapeshift.app.headset.in_hand.ray_marks import LENGTHS, SPOTS
 from shapeshift.app.headset.sections.comfort_section import lit_button
+from shapeshift.app.inspection.window.inspect_panel import InspectActions, draw_inspect
+from shapeshift.app.inspection.window.ray_marks import LENGTHS, SPOTS
 
 Vec = imgui.ImVec2
 HOW = {

@@ -38,7 +38,7 @@ def train_quietly(
 
     progress: hears what is under way.  Raises UsageError, BadFile, in the words of Python.
     """
-    from shapeshift.app.cluster.board import board_of_words
+    from shapeshift.app.cluster.run_task import board_of_words
 
     def hear(*lines: str) -> None:
         for line in lines:

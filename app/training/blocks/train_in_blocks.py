@@ -18,7 +18,7 @@ from shapeshift.app.terminal import say
 from shapeshift.app.training.train_options import LINES, Asked, Options
 
 if TYPE_CHECKING:
-    from shapeshift.app.cluster.board import Shown
+    from shapeshift.app.cluster.run_task import Shown
     from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.blocks.cut import Wanted

@@ -3,8 +3,7 @@
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.paging.drawn_pages import DrawnPages
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.paging.pages import PAGE, DrawnPages
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.gpu import Gpu, overwrite
 

@@ -1,10 +1,134 @@
 """A window's picture and a layer over it, kept on software GL: only what changes is drawn anew."""
 
+from ctypes import c_int, c_uint, c_void_p
+
 import moderngl
 import numpy as np
 
-from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.window.window_bytes import PixelBox, WindowBytes
+from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
+from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
+
+# A picture in a texture that is laid out as a window's memory is: software GL copies between the
+# two, where it draws from any other.
+
+GL_TEXTURE0, GL_TEXTURE_2D, GL_RGBA, GL_BGRA = 0x84C0, 0x0DE1, 0x1908, 0x80E1
+GL_UNSIGNED_INT_8_8_8_8_REV, GL_NEAREST, GL_COLOR_BUFFER_BIT = 0x8367, 0x2600, 0x4000
+GL_READ_FRAMEBUFFER = 0x8CA8
+
+PixelBox = tuple[int, int, int, int]  # left, top, right, bottom; the upper left pixel is 0, 0
+
+
+class WindowBytes:
+    """Such a texture: of no stated size, and given blue first.  Blitted upside down it needs no
+    turn, since GL counts rows from below and a window's memory from above.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._source: moderngl.Framebuffer | None = None
+        try:
+            self._functions: GlFunctions | None = GlFunctions()
+        except NoFunction:
+            self._functions = None
+
+    @property
+    def works(self) -> bool:
+        """Whether there are the functions that this needs; GL's own order of bytes does without."""
+        return self._functions is not None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Of what it holds; (0, 0) before the first."""
+        return (0, 0) if self._source is None else self._source.size
+
+    @property
+    def framebuffer(self) -> moderngl.Framebuffer:
+        """What draws into it; the upper row comes first."""
+        assert self._source is not None, "nothing was laid out"
+        return self._source
+
+    def lay_out(self, size: tuple[int, int]) -> None:
+        """Takes room for a picture of that size, undefined, if what is there has another one."""
+        if self.size != size:
+            self.release()
+            self._source = self._gpu.ctx.framebuffer([self._gpu.ctx.texture(size, 4)])
+            self._gpu.allocations += 1
+            self._write(None, *size)
+
+    def copy(self, pixels: np.ndarray, framebuffer: moderngl.Framebuffer) -> None:
+        """Fills the viewport of a window's, which is bound, with (H, W, 4) uint8 of its size."""
+        self.upload(pixels)
+        self._show(framebuffer)
+
+    def show(self, framebuffer: moderngl.Framebuffer) -> None:
+        """Fills the viewport of a window's framebuffer, which is as large as this is."""
+        with self._gpu.drawing_into(framebuffer):
+            self._show(framebuffer)
+
+    def _show(self, framebuffer: moderngl.Framebuffer) -> None:
+        (width, height), (left, below) = self.size, framebuffer.viewport[:2]
+        shown = (left, below + height, left + width, below)  # upside down
+        self._blit(self.framebuffer, (0, 0, width, height), shown)
+
+    def copy_window(self, framebuffer: moderngl.Framebuffer) -> None:
+        """Keeps what is in the viewport of a window's framebuffer."""
+        left, below, width, height = framebuffer.viewport
+        self.lay_out((width, height))
+        with self._gpu.drawing_into(self.framebuffer):
+            taken = (left, below + height, left + width, below)
+            self._blit(framebuffer, taken, (0, 0, width, height))
+
+    def upload(self, pixels: np.ndarray) -> None:
+        """Holds (H, W, 4) uint8 from now on."""
+        height, width = pixels.shape[:2]
+        self.lay_out((width, height))
+        self._write(np.ascontiguousarray(pixels).ctypes.data, width, height)
+
+    def read_box(self, box: PixelBox) -> np.ndarray:
+        """(H, W, 4) uint8 of a part of what was drawn into it by GL's rules: row 0 on top."""
+        left, top, right, low = box
+        pixels = np.empty((low - top, right - left, 4), np.uint8)
+        place = (left, self.size[1] - low, right - left, low - top)
+        order = (GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, pixels.ctypes.data)
+        with self._gpu.drawing_into(self.framebuffer):
+            kinds = (*(c_int,) * 4, c_uint, c_uint, c_void_p)
+            self._call("glReadPixels", kinds, *place, *order)
+        return pixels[::-1]
+
+    def copy_box(self, other: "WindowBytes", box: PixelBox) -> None:
+        """Copies a part of another one of this size to the same place."""
+        with self._gpu.drawing_into(self.framebuffer):
+            self._blit(other.framebuffer, box, box)
+
+    def _blit(self, source: moderngl.Framebuffer, of: PixelBox, to: PixelBox) -> None:
+        """From a framebuffer into the one that is bound."""
+        self._call("glBindFramebuffer", (c_uint, c_uint), GL_READ_FRAMEBUFFER, source.glo)
+        how = (GL_COLOR_BUFFER_BIT, GL_NEAREST)
+        self._call("glBlitFramebuffer", (c_int,) * 8 + (c_uint,) * 2, *of, *to, *how)
+
+    def _write(self, data: int | None, width: int, height: int) -> None:
+        """Into the texture; None: lays it out."""
+        (texture,) = self.framebuffer.color_attachments
+        unit = GL_TEXTURE0 + self._gpu.ctx.default_texture_unit  # where moderngl writes, too
+        self._call("glActiveTexture", (c_uint,), unit)
+        self._call("glBindTexture", (c_uint, c_uint), GL_TEXTURE_2D, texture.glo)
+        order = (GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, data)
+        kinds = (c_uint, *(c_int,) * 5, c_uint, c_uint, c_void_p)
+        if data is None:
+            self._call("glTexImage2D", kinds, GL_TEXTURE_2D, 0, GL_RGBA, width, height, 0, *order)
+        else:
+            place = (0, 0, 0, width, height)
+            self._call("glTexSubImage2D", kinds, GL_TEXTURE_2D, *place, *order)
+
+    def _call(self, name: str, kinds: tuple, *arguments) -> None:
+        assert self._functions is not None
+        self._functions.call(name, None, kinds, *arguments)
+
+    def release(self) -> None:
+        if self._source is not None:
+            release_framebuffer(self._source)
+            self._source = None
+
 
 CORNERS = np.array([(0, 1), (2, 1), (2, 3), (0, 1), (2, 3), (0, 3)])  # of two triangles
 

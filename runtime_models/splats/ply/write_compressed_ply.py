@@ -9,7 +9,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.files.blocks import BLOCK, each_block
 from shapeshift.runtime_models.files.whole_file import write_whole
-from shapeshift.runtime_models.splats.operations.morton import morton_order
+from shapeshift.runtime_models.splats.operations.merge_pairs import morton_order
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, rotator
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.read_compressed_ply import (

@@ -1,7 +1,7 @@
 """Levels of detail to PlayCanvas's streamed SOG: the inverse of read_streamed, with errors."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,109 @@ import numpy as np
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.runtime_models.rotation import covariance
-from shapeshift.runtime_models.splats.lod.leaves import Tree, cut_leaves
-from shapeshift.runtime_models.splats.lod.levels import Level, count_levels, make_levels
+from shapeshift.runtime_models.splats.operations.merge_pairs import merging_losses, pair_groups
+from shapeshift.runtime_models.splats.operations.moment_matching import merge_groups, shown_area
 from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.sog.read_streamed import LARGEST_TREE, TREE
 from shapeshift.runtime_models.splats.sog.write_sog import write_sog
+
+# A scene cut into leaves of few splats each, under a tree: what levels of detail are chosen by.
+
+Tree = int | tuple["Tree", "Tree"]  # a leaf's number, or two halves
+
+
+@dataclass(frozen=True)
+class Leaves:
+    """Splats by leaf; leaves are numbered in the order of the tree."""
+
+    of_splat: np.ndarray  # (N,) int32
+    count: int
+    tree: Tree
+
+
+def cut_leaves(means: np.ndarray, most: int) -> Leaves:
+    """Leaves of at most `most` splats at places (N, 3), N > 0: halves along the longest side of
+    their box, again and again (a k-d tree).  The same places give the same leaves.
+    """
+    of_splat, count = np.empty(len(means), np.int32), 0
+
+    def cut(rows: np.ndarray) -> Tree:
+        nonlocal count
+        if len(rows) <= most:
+            of_splat[rows] = count
+            count += 1
+            return count - 1
+        places = means[rows]
+        with np.errstate(over="ignore"):
+            axis = int(np.argmax(places.max(axis=0) - places.min(axis=0)))
+        order = np.argpartition(places[:, axis], len(rows) // 2)
+        # In their order: which of two equal places comes first must not hang on the sorting.
+        return tuple(
+            cut(np.sort(rows[half])) for half in (order[: len(rows) // 2], order[len(rows) // 2 :])
+        )  # type: ignore[return-value]
+
+    tree = cut(np.arange(len(means)))
+    return Leaves(of_splat, count, tree)
+
+
+# Levels of detail of plain splats: each with half of the splats of the one before, by merging.
+
+LEAST = 32  # splats of a leaf on average; coarser levels would only add to the files
+MOST_LEVELS = 10
+PAIRING = 0.7  # of the time that a level takes; the rest is for its moments and errors
+LEAST_WEIGHT = 1e-300  # m^2: of a leaf that shows nothing, whose errors are 0
+
+
+@dataclass(frozen=True)
+class Level:
+    """All leaves at one level of detail, leaf after leaf."""
+
+    number: int  # 0 is the finest
+    splats: SplatLayers  # (N,) of one stop
+    leaf: np.ndarray  # (N,) int32, rising
+    errors: np.ndarray  # (leaves,) what merging costs beside all that the leaf shows; level 0: 0
+
+
+def count_levels(splats: int, leaves: int) -> int:
+    """How many levels are worth it."""
+    number = 1
+    while number < MOST_LEVELS and splats >> number >= LEAST * leaves:
+        number += 1
+    return number
+
+
+def make_levels(
+    splats: SplatLayers, leaves: Leaves, count: int, merged: Callable[[int, float], None]
+) -> Iterator[Level]:
+    """`count` levels, the finest first.  merged(level, part 0..1): how far each coarser one is.
+
+    Merging does not cross leaves, and chooses over all of them at once: a smooth leaf gets coarse
+    sooner than one of fine detail.  The error of a leaf is the loss of merge_pairs from level 0 on,
+    by the weight of its splats; it never falls from level to level.
+    """
+    order = np.argsort(leaves.of_splat, kind="stable")
+    splats, leaf = splats.with_rows(order), leaves.of_splat[order]
+    finest, row_of = splats, np.arange(len(order))
+    first_leaf = leaf
+    weight = np.bincount(leaf, shown_area(splats.scales, splats.opacity), leaves.count)
+    errors = np.zeros(leaves.count)
+    yield Level(0, splats, leaf, errors)
+    for number in range(1, count):
+
+        def paired(part: float, number: int = number) -> None:
+            merged(number, PAIRING * part)
+
+        group = pair_groups(splats, len(leaf) // 2, paired, kinds=leaf)
+        splats, into = merge_groups(splats, group)
+        rows = np.empty(splats.splat_count, np.int32)
+        rows[into] = leaf
+        leaf, row_of = rows, into[row_of]
+        losses = np.bincount(first_leaf, merging_losses(finest, splats, row_of), leaves.count)
+        errors = np.maximum(errors, losses / np.maximum(weight, LEAST_WEIGHT))
+        merged(number, 1.0)
+        yield Level(number, splats, leaf, errors)
+
 
 # Splats.  A reader decodes a file whole: views of 2 million splats of a garden decode 20 million of
 # files of 2^19, as the format's own writer has it by default, 10.7 and 12.7 of 2^16, 7.8 and 9.7 of

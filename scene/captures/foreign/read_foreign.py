@@ -1,26 +1,120 @@
 """Poses in other programs' files that lie with photos: which file is whose, and which is used."""
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.files.plain_text import name_line, path_end
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.foreign.foreign_frames import PhotoIndex
-from shapeshift.scene.captures.foreign.known_programs import Program, program_of
+from shapeshift.scene.captures.foreign.foreign_frames import (
+    Z_UP,
+    Gathered,
+    PhotoIndex,
+    brown_lens,
+    checked_lens,
+    checked_size,
+    text_in,
+    world_from,
+)
 from shapeshift.scene.captures.foreign.read_alicevision import alicevision_frames
 from shapeshift.scene.captures.foreign.read_blocks import blocks_frames
-from shapeshift.scene.captures.foreign.read_bundler import bundler_frames, nvm_frames
+from shapeshift.scene.captures.foreign.read_bundler import TableWords, bundler_frames, nvm_frames
 from shapeshift.scene.captures.foreign.read_metashape import metashape_frames
 from shapeshift.scene.captures.foreign.read_openmvg import openmvg_frames
 from shapeshift.scene.captures.foreign.read_opensfm import SHOTS, odm_frames, opensfm_frames
-from shapeshift.scene.captures.foreign.read_pix4d import MARK as PIX4D_MARK
-from shapeshift.scene.captures.foreign.read_pix4d import pix4d_frames
 from shapeshift.scene.captures.foreign.read_realityscan import realityscan_frames
-from shapeshift.scene.captures.foreign.read_scaniverse import scaniverse_frames
 from shapeshift.scene.captures.foreign.read_xmp import xmp_frames
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
+
+# Pix4D's params/NAME_calibrated_camera_parameters.txt, with NAME_offset.xyz beside it.
+#
+# Its head says the form: name and size, K (3 rows), radial (3) and tangential (2) distortion,
+# place, R (3 rows), m = K [R|-Rt] X; pixels from the upper left, z of the world up.
+
+MARK, LAST = "fileName imageWidth imageHeight", "camera model"
+ROWS = 10  # lines of a photo
+
+
+def pix4d_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
+    """Raises BadFile."""
+    lines = [line.strip() for line in text_in(path, photos).splitlines()]
+    start = next((i for i, line in enumerate(lines) if line.startswith(LAST)), -1)
+    rows = [line for line in lines[start + 1 :] if line]
+    if start < 0 or not rows or len(rows) % ROWS:
+        raise BadFile(
+            f"{path}: {len(rows)} lines after its head; {ROWS} a photo are wanted; copy it again"
+        )
+    out = Gathered(path, "Pix4D", photos, Z_UP)
+    shift = offset_beside(path)
+    for first in range(0, len(rows), ROWS):
+        words = rows[first].rsplit(maxsplit=2)
+        if len(words) != 3:
+            raise BadFile(f"{path}: {rows[first][:40]!r} is no name, width and height")
+        name, where = words[0], f"{path}: {words[0]}"
+        width, height = TableWords(path, " ".join(words[1:])).numbers(2)
+        size = checked_size(width, height, where)
+        numbers = TableWords(path, " ".join(rows[first + 1 : first + ROWS]))
+        k = np.reshape(numbers.numbers(9), (3, 3))
+        radial, tangential = numbers.numbers(3), numbers.numbers(2)
+        place, rotation = np.array(numbers.numbers(3)), np.reshape(numbers.numbers(9), (3, 3))
+        pinhole = (k[0, 0], k[1, 1], k[0, 2], k[1, 2])
+        lens = brown_lens(size, pinhole, radial, tangential, where)
+        out.add(name, world_from(rotation, place + shift), lens)
+    return out.finished()
+
+
+def offset_beside(path: Path) -> np.ndarray:
+    """(3,) what Pix4D has taken off all places, metres; zeros without the file."""
+    name = path.name.partition("_calibrated_camera_parameters")[0]
+    table = path.with_name(f"{name}_offset.xyz")
+    return (
+        np.array(TableWords(table, text_in(table)).numbers(3)) if table.is_file() else np.zeros(3)
+    )
+
+
+# Scaniverse's raw data (scan.pb, frames.pb) as descaniverse writes it as JSON: 'scan' and 'frames'
+# with a focal length, a principal point, a quaternion xyzw and a place each.
+
+MOST_BYTES = 1 << 30
+LARGE, SMALL = "imgl", "img"  # folders of photos; the numbers of the lens are of small ones
+
+
+def scaniverse_frames(path: Path, photos: PhotoIndex) -> PosedFrames:
+    """World from camera, OpenCV axes; the large photos where there are such.  Raises BadFile."""
+    from scipy.spatial.transform import Rotation
+
+    said = Fields(read_json(path, most_bytes=MOST_BYTES), str(path))
+    sizes = said.object("scan").object("configuration")
+    small, large = (size_of(sizes, key) for key in ("smallImageSize", "largeImageSize"))
+    rows = said.object("frames").rows("frames", 1 << 24, "frame", 0)
+    any_large = any(row.value("isLargeImage", False) is True for row in rows)
+    size, folder = (large, LARGE) if any_large else (small, SMALL)
+    scale = size[0] / small[0]
+    out = Gathered(path, "Scaniverse", photos)
+    for row in rows:
+        if any_large and row.value("isLargeImage", False) is not True:
+            continue
+        name = f"{folder}/{int(row.number('id', 0.0)):05d}.jpg"
+        camera, place = row.object("camera"), row.object("transform")
+        xyzw = place.numbers("rotation", 4)
+        if not math.hypot(*xyzw) > 0.5:
+            raise BadFile(f"{row.where}: its quaternion has no direction; write it again")
+        turn = Rotation.from_quat(xyzw).as_matrix()
+        pose = world_from(turn.T, np.array(place.numbers("translation", 3)))
+        f, *centre = (scale * camera.number(key) for key in ("f", "px", "py"))
+        out.add(name, pose, checked_lens("PINHOLE", size, (f, f, *centre), row.where))
+    return out.finished()
+
+
+def size_of(said: Fields, key: str) -> tuple[int, int]:
+    size = said.object(key)
+    return checked_size(size.value("width"), size.value("height"), size.where)
+
 
 PEEK_BYTES = 1 << 16
 MOST_LOOKED_AT = 400  # files of a folder, and folders in it
@@ -54,7 +148,7 @@ FORMS = (
     Form("Bundler", bundler_frames, (r"^\s*# Bundle file",), (".out", ".txt")),
     Form("RealityScan", xmp_frames, (r"xcr:Rotation",), (XMP,)),
     Form("VisualSFM", nvm_frames, (r"^\s*NVM_V3",), (".nvm",)),
-    Form("Pix4D", pix4d_frames, (PIX4D_MARK,), (".txt",)),
+    Form("Pix4D", pix4d_frames, (MARK,), (".txt",)),
 )  # fmt: skip
 # Of OpenDroneMap's folder: the reconstruction has the lenses with it.
 LENSES = "cameras.json"
@@ -209,3 +303,69 @@ def known_beside(folder: Path) -> str:
             if program is not None:
                 return f"{path_end(path)} is {program.what}: {program.advice}"
     return ""
+
+
+# Files of other programs that hold poses which are not read: what each is, and the way there.
+
+METASHAPE = "in Metashape: File, Export, Export Cameras (Agisoft XML), and name that file"
+REALITYSCAN = (
+    "in RealityScan: Alignment, Export, Registration, and there COLMAP or Internal/External camera "
+    "parameters"
+)
+PIX4D = "copy params/NAME_calibrated_camera_parameters.txt from its folder 1_initial"
+NETWORK = (
+    "save its poses as transforms.json or a COLMAP model where it was made (VGGT: demo_colmap.py)"
+)
+
+
+@dataclass(frozen=True)
+class Program:
+    what: str
+    advice: str
+    endings: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()  # of whole files
+    within: tuple[bytes, ...] = ()  # words that all stand in the first kilobytes
+
+
+PROGRAMS = (
+    Program("a project of Metashape", METASHAPE, (".psx", ".psz")),
+    Program("a project of RealityScan", REALITYSCAN, (".rcproj", ".rsproj", ".rcalign")),
+    Program("a project of Pix4D", PIX4D, (".p4d", ".p4m")),
+    Program("a project of 3DF Zephyr",
+            "in Zephyr: Export, Export Cameras, COLMAP or Bundler", (".zep",)),
+    Program("a project of Meshroom",
+            "add its node ConvertSfMFormat (json), run it, and name the sfm.json that it writes",
+            (".mg",)),
+    Program("an Alembic file of cameras (Meshroom)",
+            "export sfm.json with Meshroom's node ConvertSfMFormat", (".abc",)),
+    Program("a project of ContextCapture or iTwin Capture",
+            "there: Export, Block to XML (BlocksExchange)", (".ccm", ".s3c")),
+    Program("COLMAP's data base, which has photos and matches and no poses",
+            "name the model that its mapper makes (sparse/0)", (".db",)),
+    Program("OpenMVG's binary scene",
+            "openMVG_main_ConvertSfM_DataFormat -i sfm_data.bin -o sfm_data.json", (),
+            ("sfm_data.bin",)),
+    Program("Scaniverse's raw data",
+            "descaniverse (scaniverse_to_json) makes JSON of it, name that", (),
+            ("frames.pb", "scan.pb")),
+    Program("Stray Scanner's recording, whose photos are a film",
+            "find the poses of its photos: launch.py poses rgb.mp4 --out CAPTURE", (),
+            ("odometry.csv",)),
+    Program("a table of omega, phi and kappa without lenses",
+            "export one that has them: Metashape's Agisoft XML, Blocks Exchange, or a COLMAP model",
+            within=(b"omega", b"phi", b"kappa")),
+    Program("Pix4D's matrices without lenses", PIX4D, ("_pmatrix.txt",)),
+    Program("a pickle or arrays of a network (VGGT, DUSt3R, MASt3R, VGGSfM)", NETWORK,
+            (".npz", ".npy", ".pkl", ".pt", ".pth")),
+)  # fmt: skip
+
+
+def program_of(path: Path, head: bytes) -> Program | None:
+    """What a file is, by its name and its first kilobytes."""
+    name, lower = path.name.lower(), head.lower()
+    for program in PROGRAMS:
+        named = name.endswith(program.endings) if program.endings else False
+        inside = bool(program.within) and all(word in lower for word in program.within)
+        if name in program.names or (inside if program.within else named):
+            return program
+    return None

@@ -24,7 +24,7 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     checked_size,
     geocentric_up,
 )
-from shapeshift.scene.captures.foreign.xml_tree import (
+from shapeshift.scene.captures.foreign.read_blocks import (
     number_of,
     numbers_in,
     read_xml,

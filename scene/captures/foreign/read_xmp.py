@@ -18,8 +18,8 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     checked_lens,
     world_from,
 )
+from shapeshift.scene.captures.foreign.read_blocks import finite, numbers_in, read_xml
 from shapeshift.scene.captures.foreign.read_realityscan import lens_of
-from shapeshift.scene.captures.foreign.xml_tree import finite, numbers_in, read_xml
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 
 MOST_FILES = 100_000

@@ -26,12 +26,12 @@ from shapeshift.runtime_models.stop_names import (
 )
 from shapeshift.scene.capture_files import is_strange, parts_of
 from shapeshift.scene.captures.capture_rules import spread_stops
-from shapeshift.scene.captures.modalities.name_series import BLEND, HEAT, LIGHT, roles_of
 from shapeshift.scene.captures.modalities.said_modalities import (
     PhotoGroup,
     settling_line,
     shared_folders,
 )
+from shapeshift.scene.captures.modalities.two_sorts import BLEND, HEAT, LIGHT, roles_of
 
 # Sorts of photos, HEAT and LIGHT, are names of STOP_KINDS; "": not known.
 SAYS = {HEAT: "heat", LIGHT: "visible light"}

@@ -12,7 +12,7 @@ from PIL import Image
 
 import shapeshift as ss
 from shapeshift.app import cli
-from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
+from shapeshift.runtime_models.splats.layers.layer_list import LIST
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
 from shapeshift.scene.change.similarity import Similarity, rotation_of

@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 from shapeshift.app import cli
 from shapeshift.app.charts import chart, decode_chart
 from shapeshift.app.charts.chart_measure import ChartRow, Pricing
-from shapeshift.app.charts.chart_picture import draw_chart, family, family_of, name_points
+from shapeshift.app.charts.chart_picture import (
+    draw_chart,
+    family,
+    family_of,
+    name_points,
+    pareto_front,
+)
 from shapeshift.app.charts.chart_rows import RowsFile
 from shapeshift.app.charts.chart_scene import (
     QUICK,
@@ -25,7 +31,6 @@ from shapeshift.app.charts.chart_scene import (
 )
 from shapeshift.app.charts.chart_settings import EXACT, SETTINGS, settings_of
 from shapeshift.app.charts.comparison import MOST_DB
-from shapeshift.app.charts.pareto import pareto_front
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.package.write_package import write_package

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from shapeshift.app.cluster.here import Here
-from shapeshift.app.cluster.run_task import TaskFailed
+from shapeshift.app.cluster.run_task import Here, TaskFailed
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.command_line import parse
 from shapeshift.app.errors import UsageError
@@ -21,8 +20,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.checkpoint import checkpoint_path
 from shapeshift.training.fit.ablation import COMPONENTS
-from shapeshift.training.fit.fit import Fit
-from shapeshift.training.fit.read_settings import read_settings
+from shapeshift.training.fit.fit import Fit, read_settings
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 
@@ -135,7 +133,7 @@ def test_a_training_that_is_interrupted_goes_on_to_the_same_bytes(balls, tmp_pat
         return True
 
     with monkeypatch.context() as patch:
-        patch.setattr("shapeshift.app.training.trials.run_trial.train", stopped)
+        patch.setattr("shapeshift.app.training.trials.run_trials.train", stopped)
         assert run(Options(balls, cut, only=file, device="cpu")) == INTERRUPTED
     assert not cut.exists() and checkpoint_path(cut).exists()
     other = settings_file(tmp_path, seed=1)

@@ -8,9 +8,14 @@ import pytest
 
 from shapeshift.app.cluster.certificates import read_certificates, require_dask, write_certificates
 from shapeshift.app.cluster.command import Options, run
-from shapeshift.app.cluster.open_cluster import open_cluster
-from shapeshift.app.cluster.place import ClusterPlace, is_loopback, read_address, read_place
-from shapeshift.app.cluster.slurm import job_options, read_jobs, slurm_cluster
+from shapeshift.app.cluster.dask_cluster import job_options, read_jobs, slurm_cluster
+from shapeshift.app.cluster.open_cluster import (
+    ClusterPlace,
+    is_loopback,
+    open_cluster,
+    read_address,
+    read_place,
+)
 from shapeshift.app.errors import UsageError
 
 

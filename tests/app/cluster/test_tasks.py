@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from shapeshift.app.cluster import digests
 from shapeshift.app.cluster import run_task as running
+from shapeshift.app.cluster import task as digests
 from shapeshift.app.cluster.open_cluster import open_cluster
 from shapeshift.app.cluster.run_task import TaskFailed, TaskStopped, progress_words, run_task
 from shapeshift.app.cluster.task import Task

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from shapeshift.app.cluster.words import words_for
+from shapeshift.app.cluster.task import words_for
 from shapeshift.app.command_line import parse
 from shapeshift.app.film.film import Options as FilmOptions
 from shapeshift.app.training.fit import Options as FitOptions

@@ -9,13 +9,15 @@ import pytest
 from PIL import Image
 
 from shapeshift.app.commands.compare import Options, choose_views, run
-from shapeshift.app.commands.compare_sheet import amplification, difference_picture, sheet
-from shapeshift.app.commands.compare_sides import (
+from shapeshift.app.commands.compared import (
     PictureSide,
     SceneSide,
+    amplification,
+    difference_picture,
     match_pictures,
     open_side,
     pictures_in,
+    sheet,
     split_stop,
 )
 from shapeshift.app.document import Document

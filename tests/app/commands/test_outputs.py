@@ -7,8 +7,7 @@ import pytest
 from PIL import Image
 
 from shapeshift.app import cli
-from shapeshift.app.commands.outputs import as_steps, choose_unit, summary
-from shapeshift.app.commands.png16 import write_png16
+from shapeshift.app.commands.outputs import as_steps, choose_unit, summary, write_png16
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view

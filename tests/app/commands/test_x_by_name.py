@@ -145,7 +145,7 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
     if command == "compare":
         done = run(command, f"{package}@Thermic", package)
     elif command == "vr":
-        from shapeshift.app.headset.open_xr import open_xr
+        from shapeshift.app.headset.scene_shelf import open_xr
         from shapeshift.app.opening import ReadingOptions
 
         with pytest.raises(UsageError, match=r"'Thermic' is no x of this scene"):
@@ -161,7 +161,7 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
 def test_the_viewer_and_the_headset_start_there(package, objects):
     from shapeshift.app.editor.state.files.open_scene import opened_scene
     from shapeshift.app.editor.state.files.opened import read_files
-    from shapeshift.app.headset.open_xr import open_xr
+    from shapeshift.app.headset.scene_shelf import open_xr
     from shapeshift.app.opening import ReadingOptions
     from shapeshift.runtime_models.read_scene import read_model
     from shapeshift.scene.cameras.camera_list import CameraReading

@@ -4,7 +4,7 @@ import pytest
 from pytest import approx
 
 from shapeshift.app.editor.panels import scale_bar
-from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
+from shapeshift.renderer.debug.debug_map import nice_ticks, tick_text
 
 
 @pytest.mark.parametrize(

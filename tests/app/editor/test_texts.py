@@ -8,9 +8,8 @@ from collections import Counter
 import pytest
 from PIL import ImageFont
 
-from shapeshift.app.editor.panels import keys_sheet
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.texts import deeds, fonts, table
+from shapeshift.app.editor.texts import fonts, table
 from shapeshift.app.editor.texts.fonts import (
     font_files,
     has_letters,
@@ -19,6 +18,7 @@ from shapeshift.app.editor.texts.fonts import (
     why_not,
 )
 from shapeshift.app.editor.texts.table import all_languages, said, use_language
+from shapeshift.app.editor.window import shell
 from tests.support.desktop.overlay_texts import (
     KEY_TABLES,
     deeds_in_source,
@@ -63,24 +63,24 @@ def test_no_item_of_the_panel_goes_past_the_tables():
 
 def test_what_edits_are_called_is_in_the_tables():
     """Of those that are named in the call itself; {word} {name} stands for two of them."""
-    known = {text.replace("{name}", "{}").replace("{count}", "{}") for text in deeds.TEMPLATES}
+    known = {text.replace("{name}", "{}").replace("{count}", "{}") for text in table.TEMPLATES}
     found = deeds_in_source()
     assert {"delete {}", "add a section", "key of a stop", "hide {} anchors"} <= found
-    assert found - known - {*deeds.DEEDS} == {"{} {}", "{} {} anchors"}
+    assert found - known - {*table.DEEDS} == {"{} {}", "{} {} anchors"}
 
 
 def test_an_edit_is_called_by_the_language_in_use():
     use_language("de")
-    assert deeds.said_deed("delete my cube") == "my cube l\u00f6schen"
-    assert deeds.said_deed("hide 1,204 anchors") == "1,204 Anker verbergen"
-    assert deeds.said_deed("hide 12 monkeys") == "12 monkeys verbergen"
-    assert deeds.said_deed("exposure of the scene") == "Belichtung von der Szene"
-    assert deeds.said_deed("move the floor") == said("move the floor") != "move the floor"
-    assert deeds.said_deed("add {odd}") == "{odd} hinzuf\u00fcgen"
-    assert deeds.said_deed("what nobody knows") == "what nobody knows"
+    assert table.said_deed("delete my cube") == "my cube l\u00f6schen"
+    assert table.said_deed("hide 1,204 anchors") == "1,204 Anker verbergen"
+    assert table.said_deed("hide 12 monkeys") == "12 monkeys verbergen"
+    assert table.said_deed("exposure of the scene") == "Belichtung von der Szene"
+    assert table.said_deed("move the floor") == said("move the floor") != "move the floor"
+    assert table.said_deed("add {odd}") == "{odd} hinzuf\u00fcgen"
+    assert table.said_deed("what nobody knows") == "what nobody knows"
     use_language(table.ENGLISH)
     for text in ("delete my cube", "exposure of the scene", "move the floor", "crop 3 anchors"):
-        assert deeds.said_deed(text) == text
+        assert table.said_deed(text) == text
 
 
 @pytest.mark.parametrize("code", OTHERS)
@@ -129,13 +129,13 @@ def test_every_word_of_the_sheets_keys_fits_beside_what_it_does(code):
     should be in Japanese only.
     """
     use_language(code)
-    groups = [*keys_sheet.GROUPS.values()]
+    groups = [*shell.GROUPS.values()]
     for name in KEY_TABLES:
         rows = importlib.import_module(f"shapeshift.app.editor.window.{name}").KEYS
         groups += rows.values() if isinstance(rows, dict) else [rows]
-    keys = {keys_sheet.key_text(key) for rows in groups for key, _ in rows}
+    keys = {shell.key_text(key) for rows in groups for key, _ in rows}
     assert len(keys) > 60
-    room = keys_sheet.KEY_PART * 0.94 * keys_sheet.COLUMN - 4
+    room = shell.KEY_PART * 0.94 * shell.COLUMN - 4
     words = {word: width_px(word) for key in keys for word in key.split() if word.isascii()}
     assert not {word: round(px) for word, px in words.items() if px > room}
 
@@ -143,11 +143,11 @@ def test_every_word_of_the_sheets_keys_fits_beside_what_it_does(code):
 def test_keys_are_named_as_a_keyboard_of_the_language_has_them():
     use_language("de")
     names = ("Ctrl+O", "Delete", "Space", "Shift+left, right", "W A S D Q E", "F1")
-    assert [keys_sheet.key_text(name) for name in names] == [
+    assert [shell.key_text(name) for name in names] == [
         "Strg+O", "Entf", "Leertaste", "Umschalt+links, rechts", "W A S D Q E", "F1",
     ]  # fmt: skip
     use_language(table.ENGLISH)
-    assert [keys_sheet.key_text(name) for name in names] == list(names)
+    assert [shell.key_text(name) for name in names] == list(names)
 
 
 def test_what_no_table_has_is_said_as_it_is():

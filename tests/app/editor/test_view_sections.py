@@ -11,7 +11,7 @@ from shapeshift.app.paths import DEMO, TOUCH
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.document.edits import MOST_SECTIONS
-from shapeshift.scene.sections.read_section import read_section
+from shapeshift.scene.sections.section_texts import read_section
 
 
 def opened(path):

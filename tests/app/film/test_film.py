@@ -12,8 +12,11 @@ import pytest
 from PIL import Image
 
 from shapeshift.app import cli
+from shapeshift.app.document import Document
 from shapeshift.app.drawing import open_renderer
 from shapeshift.app.film.draw_film import averaged
+from shapeshift.app.film.film_plan import circle_around
+from shapeshift.app.paths import DEMO
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.cameras.camera_list import CameraList
@@ -72,6 +75,17 @@ def test_a_film_is_its_frames(drawn):
     assert len(set(frames.values())) == 6
     for path in drawn.glob("*.png"):
         assert Image.open(path).size == SIZE and np.asarray(Image.open(path)).std() > 5
+
+
+def test_a_circle_has_the_side_and_the_height_of_the_first_look():
+    document = Document.of(read_model(DEMO))
+    centre, _ = document.bounds()
+    way = document.view(SIZE).world_from_eye.position - centre
+    seen = [circle_around(document, SIZE).view(part, SIZE).world_from_eye for part in (0.0, 0.4)]
+    first, later = (pose.position - centre for pose in seen)
+    assert way[1] > 0.1 * np.linalg.norm(way)  # from above
+    np.testing.assert_allclose(first / np.linalg.norm(first), way / np.linalg.norm(way), atol=1e-6)
+    assert later[1] == pytest.approx(first[1]) and np.linalg.norm(later - first) > first[1]
 
 
 def test_the_same_film_has_the_same_bytes(scene, cameras, drawn, tmp_path):

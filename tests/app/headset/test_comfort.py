@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 
 from shapeshift.app.headset.eyes import quad_of
-from shapeshift.app.headset.fitting import Fitting
 from shapeshift.app.headset.panel_picture import PanelPicture
 from shapeshift.app.headset.worn_settings import FILE, KeptSettings, WornSettings, read_settings
+from shapeshift.app.headset.xr_user import Fitting
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.drawn import Drawn, PanelQuad
 from shapeshift.vr.frame import LOST, Area
 from shapeshift.vr.hints import hint_lines
-from shapeshift.vr.locomotion.height import HIGHEST_M, LOWEST_M, lift_of, lifted
 from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel, move
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.locomotion.play_space import HIGHEST_M, LOWEST_M, PlaySpace, lift_of, lifted
 from shapeshift.vr.one_hand import alone, shared_stick
-from shapeshift.vr.openxr.spaces import EYE_HEIGHT_M
+from shapeshift.vr.openxr.room import EYE_HEIGHT_M
 from shapeshift.vr.panel.carried import OPENS_S, Palm
 from tests.support.vr.vr_frames import at, frame, hand
 from tests.support.vr.vr_panel import Wearer

@@ -12,7 +12,7 @@ from shapeshift.app.cli import main
 from shapeshift.app.document import DARK
 from shapeshift.app.headset import headset
 from shapeshift.app.headset.headset import DEMO, NO_HEADSET, Options, interrupting
-from shapeshift.app.headset.open_xr import open_xr
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.vr.openxr.instance import Lost, NoHeadset
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.headset.session import headset_link
-from shapeshift.app.headset.session.comeback import PATIENCE_S, Comeback
-from shapeshift.app.headset.session.headset_link import HeadsetLink
+from shapeshift.app.headset.session.headset_link import PATIENCE_S, Comeback, HeadsetLink
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import LOST, Frame
 from shapeshift.vr.locomotion.play_space import PlaySpace

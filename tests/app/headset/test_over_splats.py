@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.app.headset.over.over_splats import OverSplats
 from shapeshift.app.headset.panel_picture import PANEL
-from shapeshift.app.headset.wearing import Wearing
+from shapeshift.app.headset.worn_settings import Wearing
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.frame import LOST, SIDES
 from shapeshift.vr.glove import CUFF, LIT

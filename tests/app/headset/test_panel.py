@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.state.film.style_work import put_in_place
-from shapeshift.app.headset.open_xr import open_xr
+from shapeshift.app.film.window.style_work import put_in_place
 from shapeshift.app.headset.pacing import QUALITIES
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.headset.sections.room_section import HOW, SURE_S
 from shapeshift.app.headset.wrist_menu import CLICK, SETTLE_FRAMES, TICK
 from shapeshift.app.opening import ReadingOptions

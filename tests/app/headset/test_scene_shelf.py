@@ -10,10 +10,9 @@ from PIL import Image
 
 from shapeshift.app.editor.state.user.recent import RecentFiles
 from shapeshift.app.headset import scene_shelf
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.save_start import save_start
-from shapeshift.app.headset.scene_shelf import PICTURE_AFTER, SceneShelf
-from shapeshift.app.headset.shutter import Shutter
+from shapeshift.app.headset.scene_shelf import PICTURE_AFTER, SceneShelf, open_xr
+from shapeshift.app.headset.session.recorder import Shutter
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import DEMO, TOUCH
 from shapeshift.scene.pose import look_at

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.app.headset.over import table_shadows
-from shapeshift.app.headset.over.table_shadows import RESTS_S, TableShadows
+from shapeshift.app.headset.over import over_splats
+from shapeshift.app.headset.over.over_splats import RESTS_S, TableShadows
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.scene import Scene, SceneObject
@@ -80,8 +80,8 @@ def test_what_only_goes_along_its_plane_is_not_worked_out_again(renderer, ctx, m
         asked.append(given)
         return made(*given)
 
-    made = table_shadows.shadow_on
-    monkeypatch.setattr(table_shadows, "shadow_on", counted)
+    made = over_splats.shadow_on
+    monkeypatch.setattr(over_splats, "shadow_on", counted)
     shadows = TableShadows(ctx)
     settle(shadows, renderer, a_scene(0.0))
     assert len(asked) == 1

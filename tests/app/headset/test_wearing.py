@@ -9,8 +9,8 @@ import pytest
 from shapeshift.app.document import DARK
 from shapeshift.app.headset.headset import DEMO, Options
 from shapeshift.app.headset.headset_report import Report
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.pacing import Pacing
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.headset.worn_settings import KeptSettings
 from shapeshift.app.headset.xr_app import LONGEST_STEP_S, XrApp
 from shapeshift.renderer.settings import FrameStats, RenderSettings
@@ -18,7 +18,7 @@ from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
 from shapeshift.vr.floor import REST
 from shapeshift.vr.frame import LOST, SIDES, Frame
-from shapeshift.vr.openxr.life import Life
+from shapeshift.vr.openxr.events import Life
 from shapeshift.vr.pace import FramePace
 
 PERIOD = 1 / 90

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.state.track import shown_stop, shown_words
-from shapeshift.app.headset.notices import BEGINS_S, BELOW, QUIET_S, SHOWN_S, Late, late_card
+from shapeshift.app.headset.over.over_splats import (
+    BEGINS_S,
+    BELOW,
+    QUIET_S,
+    SHOWN_S,
+    Late,
+    late_card,
+)
 from shapeshift.app.headset.sections.room_section import SIZES, next_scale, size_text
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import StopWeights

@@ -15,7 +15,7 @@ from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
+from shapeshift.runtime_models.splats.layers.layer_list import LIST
 from tests.support.band_model import band_model
 from tests.support.scene.warm_wall import celsius_at, wall_view, write_wall
 

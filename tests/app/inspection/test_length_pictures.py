@@ -25,3 +25,9 @@ def test_points_and_lines_are_where_they_are_seen_and_the_rest_stays():
     both = with_lengths(picture, view, [*shown, (LengthMark("L2", "distance", behind), "0.400 m")])
     np.testing.assert_array_equal(both, drawn)
     assert with_lengths(picture, view, []) is picture
+    square = np.array([(-0.2, 0.1, 0), (0.2, 0.1, 0), (0.2, -0.1, 0), (-0.2, -0.1, 0)])
+    for kind, closed in (("area", True), ("polyline", False)):
+        drawn = with_lengths(picture, view, [(LengthMark("A1", kind, square), "")])
+        middle = square[[0, 3]].mean(axis=0)
+        ((column, row),), _ = ValuePicture(view, nothing, nothing).pixel_of(middle[None])
+        assert (drawn[int(row), int(column)].min() > 0.9) == closed  # from the last to the first

@@ -13,7 +13,7 @@ from shapeshift.app.inspection.draw_values import draw_values, measured_scene
 from shapeshift.renderer.colors.palette import PALETTES as COLORS
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
+from shapeshift.runtime_models.splats.layers.layer_list import LIST
 from shapeshift.runtime_models.stop import (
     LONGEST_UNIT,
     MOST_DIGITS,

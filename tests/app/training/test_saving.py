@@ -19,11 +19,10 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.calibration import outlier_views
 from shapeshift.training.calibration.outlier_views import failed_modalities
 from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
-from shapeshift.training.photos import load_photos
+from shapeshift.training.photos import FEW, load_photos, validate_views
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from shapeshift.training.view_checks import FEW, validate_views
 
 STEPS = 12
 

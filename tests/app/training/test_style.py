@@ -74,7 +74,7 @@ def test_the_same_seed_gives_the_same_bytes(scene, tmp_path):
     ("--keep", "half:0,0,0:1,0,0"), ("--region", "box:0.3,0,0:0.2,1,1", "label:pump"),
 ])  # fmt: skip
 def test_a_region_alone_changes(scene, tmp_path, words):
-    from shapeshift.app.training.style_region import anchors_inside
+    from shapeshift.app.training.style_options import anchors_inside
 
     assert style(scene, "--shape", "points", "--out", tmp_path / "a.shift", *words) == 0
     before, after = read_package(scene), read_package(tmp_path / "a.shift")
@@ -95,7 +95,7 @@ def test_a_region_alone_changes(scene, tmp_path, words):
 
 
 def test_a_painted_region_is_read_from_a_scene_file(scene, tmp_path):
-    from shapeshift.app.training.style_region import anchors_inside
+    from shapeshift.app.training.style_options import anchors_inside
 
     weights = [1] * 30 + [0] * 170
     row = f'{{"kind": "painted", "x": 0.5, "weight": {weights}}}'
@@ -111,7 +111,7 @@ def test_pictures_of_any_program_colour_a_stop(scene, tmp_path, device, capsys):
     """Red pictures make a red stop; views and pictures meet by name, and by order."""
     from shapeshift.scene.cameras.camera_list import CameraList
     from shapeshift.scene.cameras.write_cameras import write_cameras
-    from shapeshift.training.styles.style_views import dome_views
+    from shapeshift.training.styles.train_stop import dome_views
 
     model = read_package(scene)
     names = ("left", "right", "above")

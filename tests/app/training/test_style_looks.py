@@ -7,12 +7,11 @@ import pytest
 from PIL import Image
 
 from shapeshift.app import cli
-from shapeshift.app.training.style_region import anchors_inside
+from shapeshift.app.training.style_options import anchors_inside
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.training.style_features.made_styles import MADE_STYLES
-from shapeshift.training.style_features.named_styles import NAMED_STYLES, find_style
+from shapeshift.training.style_features.named_styles import MADE_STYLES, NAMED_STYLES, find_style
 from shapeshift.training.styles.style_rules import RULES
 from tests.support.new_stops import framed_model
 from tests.support.training.clip_files import write_clip

@@ -16,7 +16,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.training.evaluate import Options as EvalOptions
 from shapeshift.app.training.evaluate import run as evaluate
 from shapeshift.app.training.table import Options, command_line, run, train_options
-from shapeshift.app.training.table_rows import (
+from shapeshift.app.training.table_parts import (
     MEAN,
     NAMES,
     TableRow,

@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.completion.anchor_looks import AnchorLooks
-from shapeshift.decomposition.completion.plane import Plane, fit_plane, support_plane
-from shapeshift.decomposition.completion.plane_cells import CELL
-from shapeshift.decomposition.completion.stamp import LEAST_LEFT, find_stamp
+from shapeshift.decomposition.completion.complete import LEAST_LEFT, find_stamp
+from shapeshift.decomposition.completion.plane import (
+    CELL,
+    AnchorLooks,
+    Plane,
+    fit_plane,
+    support_plane,
+)
 
 STEP = 0.01  # metres between anchors
 THING, OTHER = 1, 2

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.masks.random_walk import conjugate_gradients
+from shapeshift.decomposition.masks.anchor_walk import conjugate_gradients
 
 
 @pytest.mark.parametrize("count", [1, 2, 17, 60])

@@ -9,9 +9,9 @@ import pytest
 pytest.importorskip("onnxruntime")
 
 from shapeshift.decomposition.masks.clip_words import ClipWords, read_words
+from shapeshift.decomposition.masks.sam import Square
 from shapeshift.decomposition.masks.sam_files import open_segmenter
 from shapeshift.decomposition.masks.segmenter import Prompt
-from shapeshift.decomposition.masks.square import Square
 from shapeshift.runtime_models.model import BadFile
 from tests.support.decomposition.sam_stand_ins import (
     SURE,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.masks.view_prompts import CLICKS, prompts_of
+from shapeshift.decomposition.label_photos import CLICKS, prompts_of
 
 
 def test_a_box_about_it_and_clicks_deep_inside():

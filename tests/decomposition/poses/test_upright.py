@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.poses.upright import COLMAP_UP, find_up, length_between, similarity
+from shapeshift.decomposition.poses.find_poses import COLMAP_UP, find_up, length_between, similarity
 from tests.support.scene.textured_room import camera
 
 

@@ -3,16 +3,21 @@
 import numpy as np
 import pytest
 
+from shapeshift.decomposition.assemble import (
+    SNAP,
+    choose_proxy,
+    distinct,
+    is_within,
+    pressed,
+    slab,
+    without_diagonals,
+)
 from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.partition import LabelledView
-from shapeshift.decomposition.proxies.choose import choose_proxy
-from shapeshift.decomposition.proxies.ground import distinct, is_within, slab, without_diagonals
 from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
-from shapeshift.decomposition.proxies.standing import SNAP, pressed
 from shapeshift.scene.colliders.collider import Collider, box_around
-from shapeshift.scene.colliders.collider_wrap import volume
+from shapeshift.scene.colliders.collider_wrap import is_watertight, volume
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
-from shapeshift.scene.colliders.stitch_mesh import is_watertight
 from shapeshift.scene.pose import View, look_at, perspective
 from tools.decomposition.surface_scores import score_surfaces, surface_of
 

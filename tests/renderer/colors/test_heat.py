@@ -29,7 +29,7 @@ from shapeshift.renderer.colors.palette import (
 )
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.tiles.heads import ModelHeads
+from shapeshift.renderer.tiles.slot import ModelHeads
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.scene import Scene, SceneObject

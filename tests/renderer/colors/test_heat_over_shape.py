@@ -6,7 +6,7 @@ import pytest
 from shapeshift.renderer.colors.heat_over_shape import SIGMA, blur_weights, heat_over_shape
 from shapeshift.renderer.colors.palette import LUMINANCE
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.heat_over_shape import HeatOverShape
+from shapeshift.renderer.gl.over_picture import HeatOverShape
 
 SIZES = [(1, 1), (5, 1), (1, 7), (40, 30), (64, 480)]  # width, height
 

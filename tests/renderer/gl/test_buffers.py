@@ -9,7 +9,7 @@ from shapeshift.renderer.gl.buffers import Arena, fitting_splats
 from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu, groups_for
 from shapeshift.renderer.gl.project import Projector
-from shapeshift.renderer.gl.sort import Sorter
+from shapeshift.renderer.gl.sort_check import Sorter
 from shapeshift.renderer.gl.splat import Splatter
 from shapeshift.renderer.limits import TooLarge
 from shapeshift.renderer.settings import RenderSettings

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.debug.classify import classify
 from shapeshift.renderer.debug.debug import (
     REASON_COLORS,
     debug_legend,
     object_color,
     object_poses,
 )
-from shapeshift.renderer.debug.debug_map import fit, heading
+from shapeshift.renderer.debug.debug_map import classify, fit, heading
 from shapeshift.renderer.reference.reference import gate_object
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, EDGES, RenderSettings

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.renderer.gl.lines import Lines, Wire
+from shapeshift.renderer.gl.over_picture import Lines, Wire
 from shapeshift.scene.pose import Pose, View
 
 SIZE = (64, 48)

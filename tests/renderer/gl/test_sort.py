@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
-from shapeshift.renderer.gl.sort import Sorter, quantize, stable_order
+from shapeshift.renderer.gl.sort_check import Sorter, quantize, stable_order
 from tests.support.renderer.gl_models import read
 
 BLOCK = layout.WORKGROUP

@@ -5,8 +5,7 @@ import pytest
 
 from shapeshift.renderer.gl import shader, sort_check
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.gl.sort import Sorter
-from shapeshift.renderer.gl.sort_check import FAILED, checked_sorter, first_wrong
+from shapeshift.renderer.gl.sort_check import FAILED, Sorter, checked_sorter, first_wrong
 from shapeshift.renderer.renderer import Renderer
 from tests.support.renderer.gl_models import make_layers, make_view
 from tests.support.renderer.renderers import EITHER_ON_GL

@@ -12,7 +12,7 @@ from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.resolve import Resolve
-from shapeshift.renderer.gl.sort import Sorter
+from shapeshift.renderer.gl.sort_check import Sorter
 from shapeshift.renderer.gl.splat import Splatter
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.fovea.fovea import COARSE, SEAM, SHARP
+from shapeshift.rasterizer.fovea.foveate import COARSE, SEAM, SHARP
 from shapeshift.rasterizer.project import TILE
 from shapeshift.renderer.foveation import RADIUS_DEGREES, fovea_of, foveas_of
 from shapeshift.renderer.gl import target

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.project import TILE
-from shapeshift.renderer.hidden import hidden_pixels, hidden_tiles
+from shapeshift.renderer.foveation import hidden_pixels, hidden_tiles
 from shapeshift.scene.pose import HiddenMesh, View
 from shapeshift.scene.scene import IDENTITY
 from tests.support.renderer.eye_scenes import SCENES, eyes

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.debug.classify import classify
 from shapeshift.renderer.debug.debug import object_poses
+from shapeshift.renderer.debug.debug_map import classify
 from shapeshift.renderer.reference.reference import gate_object, reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import describe, read_model

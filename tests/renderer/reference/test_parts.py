@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shapeshift.renderer.debug.classify import classify
+from shapeshift.renderer.debug.debug_map import classify
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at, perspective

@@ -202,7 +202,7 @@ def test_beyond_a_plane_is_the_picture_of_the_other_stop(renderer):
 
 
 def test_two_stops_come_from_one_sort_where_both_are_cut_alike(renderer):
-    from shapeshift.renderer.colors.two_looks import same_shape
+    from shapeshift.renderer.colors.decode_colors import same_shape
     from tests.support.models import without_control
 
     model = without_control(NETWORKS, "offset", "scale", "rotation", "opacity")

@@ -5,8 +5,15 @@ import heapq
 import numpy as np
 import pytest
 
-from shapeshift.renderer.streaming.choose import NOT_DRAWN, choose, joined, steps_of
-from shapeshift.renderer.streaming.choose_tree import choose_in_tree, choose_nodes, joined_trees
+from shapeshift.renderer.streaming.choose import (
+    NOT_DRAWN,
+    choose,
+    choose_in_tree,
+    choose_nodes,
+    joined,
+    joined_trees,
+    steps_of,
+)
 from shapeshift.runtime_models.leaf_levels import LeafLevels
 from shapeshift.runtime_models.splats.lod.parents import NodeTree
 

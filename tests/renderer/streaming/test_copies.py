@@ -14,7 +14,7 @@ from shapeshift.runtime_models.splats.lod.parents import with_parents
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject, Tint
-from shapeshift.scene.sections.read_section import read_section
+from shapeshift.scene.sections.section_texts import read_section
 from tests.support.splat_scenes import random_layers, shell
 from tests.support.streamed_scenes import open_levels, scene_of, view_at, write_levels
 

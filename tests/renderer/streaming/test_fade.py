@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.streaming.fade import PARTS, parts_of
+from shapeshift.renderer.streaming.changing import PARTS, parts_of
 from tests.support.splat_scenes import shell
 from tests.support.streamed_scenes import open_levels, rest, scene_of, view_at, write_levels
 

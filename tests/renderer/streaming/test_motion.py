@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.streaming import stream as module
-from shapeshift.renderer.streaming.ahead import STEPS, views_ahead
+from shapeshift.renderer.streaming.in_sight import STEPS, views_ahead
 from shapeshift.renderer.streaming.stream import Stream
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.metrics import psnr

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from shapeshift.renderer.streaming.sources import Sources
+from shapeshift.renderer.streaming.fetch import Sources
 from shapeshift.runtime_models.leaf_levels import LeafLevels
 
 

@@ -14,7 +14,7 @@ from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Tint
-from shapeshift.scene.sections.read_section import read_section
+from shapeshift.scene.sections.section_texts import read_section
 from tests.support.splat_scenes import random_layers, shell
 from tests.support.streamed_scenes import (
     open_levels,
@@ -106,8 +106,7 @@ def test_what_a_wall_hides_gets_its_floor_alone(tiles, wall):
 def test_pixels_of_leaves_add_up_to_the_coverage(tiles, wall):
     """From outside: sums over the look's leaves are the coverage of the same picture."""
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.renderer.streaming.seen import PART, CoarseLook
-    from shapeshift.renderer.streaming.sight import look_view
+    from shapeshift.renderer.streaming.in_sight import PART, CoarseLook, look_view
 
     model, view = open_levels(wall, ALL), view_at((0, 0, 7))
     look = CoarseLook(open_device(), [model], np.array([0, len(model.leaves.part)]))

@@ -8,9 +8,8 @@ import pytest
 
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.streaming import stream as stream_module
+from shapeshift.renderer.streaming.changing import PARTS, comes_finer, patient, related, swapped
 from shapeshift.renderer.streaming.choose import NOT_DRAWN
-from shapeshift.renderer.streaming.fade import PARTS
-from shapeshift.renderer.streaming.swap import comes_finer, patient, related, swapped
 from shapeshift.runtime_models.splats.lod.parents import NodeTree
 from shapeshift.scene.pose import Pose
 from tests.support.splat_scenes import shell

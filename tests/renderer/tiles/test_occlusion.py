@@ -14,7 +14,8 @@ from shapeshift.rasterizer.project_arena import project_arena
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.tiles import culling, occlusion
+from shapeshift.renderer.tiles import arena as culling
+from shapeshift.renderer.tiles import occlusion
 from shapeshift.renderer.tiles.inputs import bin_view, camera_of
 from shapeshift.renderer.tiles.occlusion import moved, widest
 from shapeshift.runtime_models.model import SplatLayers, Stop

@@ -14,7 +14,7 @@ from shapeshift.rasterizer.decode.decode_heads import (
     WIDTH,
 )
 from shapeshift.rasterizer.pack import pack
-from shapeshift.renderer.tiles.heads import ModelHeads, uncovered
+from shapeshift.renderer.tiles.slot import ModelHeads, uncovered
 from shapeshift.runtime_models.evaluate import Evaluator, directions
 from shapeshift.runtime_models.model import HEADS, AnchorModel, Mlp
 from shapeshift.runtime_models.rotation import covariance, normalize, product, rotation_matrices

@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models import network_sessions
+from shapeshift.runtime_models import session
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
@@ -103,7 +103,7 @@ def test_a_section_that_comes_and_goes_while_x_moves(both, fixed):
 
 def test_no_session_opens_where_the_kernel_runs(both, monkeypatch):
     opened = []
-    monkeypatch.setattr(network_sessions, "open_session", lambda *made: opened.append(made))
+    monkeypatch.setattr(session, "open_session", lambda *made: opened.append(made))
     both[0].update(alone(random_model(20), x=0.3))
     both[0].draw([VIEW])
     assert both[0].image().any() and not opened

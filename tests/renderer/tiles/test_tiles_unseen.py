@@ -8,7 +8,7 @@ import pytest
 from shapeshift.rasterizer.clusters.clusters import CLUSTER, bound_clusters
 from shapeshift.rasterizer.project_arena import Limits, clusters_unseen, project_arena
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.tiles import culling
+from shapeshift.renderer.tiles import arena as culling
 from shapeshift.renderer.tiles.inputs import camera_of
 from shapeshift.scene.pose import HiddenMesh, Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject

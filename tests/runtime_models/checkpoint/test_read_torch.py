@@ -182,7 +182,9 @@ def test_setstate_is_never_looked_for(tmp_path):
     state = b"}(" + made.text("__setstate__") + made.text("os.system") + made.text("w") + weight
     body = b"c__torch__.A\nB\n)\x81" + state + b"ub"
     path = tmp_path / "a.pt"
-    path.write_bytes(made.archive(made.program(body), {"0": np.float32([1, 2]).tobytes()}))
+    path.write_bytes(
+        made.archive(made.program(body), {"0": np.array([1, 2], np.float32).tobytes()})
+    )
     found = read_tensors(path)
     assert list(found) == ["w"]
     assert found["w"].tolist() == [1, 2]

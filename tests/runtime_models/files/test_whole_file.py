@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.files import whole_file
-from shapeshift.runtime_models.files.swap_folders import swap
 from shapeshift.runtime_models.files.whole_file import (
     PART,
     make_folders,
     open_lines,
+    swap,
     whole_folder,
     write_whole,
 )

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import sph_harm_y
 
 from shapeshift.runtime_models.bake import bake
-from shapeshift.runtime_models.colors.color_slope import color_slope
+from shapeshift.runtime_models.colors.color_bounds import color_slope
 from shapeshift.runtime_models.colors.light_harmonics import (
     COEFFICIENTS,
     WIDTHS,

@@ -21,7 +21,7 @@ from tests.support.models import make_random_model
 
 PLAIN = make_random_model()
 MUG, MOTOR = ObjectLabel(2, "mug"), ObjectLabel(254, "a “motor”")
-LABELS = np.resize(np.uint8([0, 2, 254, 2, 0, 0]), len(PLAIN.anchors))
+LABELS = np.resize(np.array([0, 2, 254, 2, 0, 0], np.uint8), len(PLAIN.anchors))
 LABELLED = replace(PLAIN, labels=LABELS, objects=(MUG, MOTOR))
 
 

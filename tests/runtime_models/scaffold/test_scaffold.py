@@ -98,7 +98,10 @@ def test_levels_are_drawn_by_the_rule_of_the_run(tmp_path, rule, any_gs):
 
 def test_levels_at_the_cell_and_at_distance_zero():
     octree = Octree(
-        np.float32([0, 1, 2, 3]), np.zeros(4, np.float32), np.zeros((4, 3), np.float32), 8.0
+        np.array([0, 1, 2, 3], np.float32),
+        np.zeros(4, np.float32),
+        np.zeros((4, 3), np.float32),
+        8.0,
     )
     for away, levels in ((0, 4), (1, 4), (1.5, 3), (2, 3), (4, 2), (8, 1), (1e9, 1)):
         drawn, part = drawn_anchors(octree, np.array([away, 0, 0]))
@@ -262,7 +265,7 @@ def test_the_evaluator_keeps_one_look(tmp_path):
 
 
 def test_at_the_anchor_itself_there_is_no_direction():
-    view = views_of(np.float32([[1, 2, 3], [1, 2, 4]]), np.array([1.0, 2, 3]))
+    view = views_of(np.array([[1, 2, 3], [1, 2, 4]], np.float32), np.array([1.0, 2, 3]))
     assert view.tolist() == [[0, 0, 0, 0], [0, 0, 1, 1]]
 
 

@@ -151,7 +151,7 @@ def in_order(splats: PlainSplats) -> PlainSplats:
 def picture(splats: PlainSplats) -> np.ndarray:
     """(72, 96, 4) by the slow oracle."""
     arrays = [getattr(splats, name) for name in ("means", "scales", "wxyz", "opacity", "sh")]
-    arrays[0] = arrays[0] + np.float32(splats.origin)
+    arrays[0] = arrays[0] + np.array(splats.origin, np.float32)
     layer = np.zeros(len(arrays[0]), np.int32)
     scene = alone(SplatLayers(*arrays, layer, (Stop("only", 0.0),)))
     return reference_image(scene, front_view((96, 72)))

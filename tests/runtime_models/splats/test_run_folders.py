@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.checkpoint.run_settings import settings_beside
+from shapeshift.runtime_models.checkpoint.read_checkpoint import settings_beside
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.splats.formats import read_plain, read_raw

@@ -125,7 +125,7 @@ def test_a_room_with_a_ceiling_like_its_floor_is_a_guess(tmp_path):
 def test_cameras_beside_it_decide(tmp_path, version, axes, form):
     """They stand in the world of the PLY: three metres away, looking at the blob's side of it."""
     want = blob(600)
-    want.means[:] = want.means * 0.2 + np.float32([0, 2, 1])
+    want.means[:] = want.means * 0.2 + np.array([0, 2, 1], np.float32)
     in_ply = want.means * (1, -1, -1)
     eyes = in_ply.mean(axis=0) + np.array([[3, 0, 0], [0, 0, 3], [-3, 0.5, 0], [0, -0.5, -3]])
     rows = []

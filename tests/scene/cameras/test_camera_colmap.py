@@ -10,7 +10,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import CameraList, data_from_ours
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.cameras.write_cameras import COLMAP_FORMS, write_cameras
-from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
+from shapeshift.scene.captures.colmap.colmap_files import read_colmap_points
 from tests.support.scene.camera_files import HALF, NAMES, cameras, views
 
 

@@ -14,8 +14,8 @@ from shapeshift.runtime_models.splats.layers.read_layers import layer_files, rea
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import spread_stops, upright_rotation
 from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.point_clouds import read_points
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import View, look_at
 from tests.support.scene.captures import (

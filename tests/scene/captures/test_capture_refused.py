@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.point_clouds import read_points
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.scene.captures.read_points import read_points
 from tests.support.scene.captures import CLOUD, save_image, simple, write_transforms
 
 

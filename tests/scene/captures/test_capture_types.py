@@ -12,8 +12,8 @@ pytest.importorskip("hypothesis")  # of the fuzzer, whose judge of sentences is 
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.point_clouds import read_points
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.scene.captures.read_points import read_points
 from tests.support.hostile.fuzz_mutations import SPECIAL_VALUES, places_of
 from tests.support.hostile.fuzz_run import check_sentence, watched
 from tests.support.scene.captures import CLOUD, whole, write_transforms
@@ -205,4 +205,4 @@ def test_ply_colours_as_numbers_of_0_to_1_and_in_big_endian(tmp_path, order):
     (tmp_path / "a.ply").write_bytes(header.encode() + rows.tobytes())
     points, colors = read_points(tmp_path / "a.ply")
     np.testing.assert_array_equal(points, [[x, 0, 0] for x in range(5)])
-    np.testing.assert_array_equal(colors, np.tile(np.float32([0.25, 0, 1]), (5, 1)))
+    np.testing.assert_array_equal(colors, np.tile(np.array([0.25, 0, 1], np.float32), (5, 1)))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.colmap_cameras import camera_pose
 from shapeshift.scene.cameras.read_cameras import read_camera_list
-from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
 from shapeshift.scene.captures.capture_rules import rigid
-from shapeshift.scene.captures.colmap.colmap_points import read_colmap_points
+from shapeshift.scene.captures.colmap.colmap_files import read_colmap_points
 from shapeshift.scene.captures.colmap_tables import read_tables
 from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.scene.captures import colmap_model

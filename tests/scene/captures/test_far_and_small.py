@@ -9,7 +9,7 @@ from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.cameras.read_transforms_cameras import read_transforms_cameras
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View
-from shapeshift.training.first_anchors.point_sources import cloud_points
+from shapeshift.training.first_anchors.initial import cloud_points
 from shapeshift.training.first_anchors.views import common_box, distance_of
 from tests.support.scene.captures import CLOUD, projected, simple, write_transforms
 

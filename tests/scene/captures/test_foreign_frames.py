@@ -10,7 +10,7 @@ from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.cameras.read_transforms_cameras import read_transforms_cameras
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.undistort import pixels_of
-from shapeshift.training.first_anchors.point_sources import cloud_points
+from shapeshift.training.first_anchors.initial import cloud_points
 from tests.support.scene.captures import CLOUD, simple, write_transforms
 
 

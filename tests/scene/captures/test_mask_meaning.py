@@ -7,8 +7,7 @@ from PIL import Image
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
-from shapeshift.training.photos import load_photos
-from shapeshift.training.view_checks import validate_views
+from shapeshift.training.photos import load_photos, validate_views
 from tests.support.scene.captures import colmap_model, simple, write_transforms
 from tools.synthetic.strangers import make_stranger
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.app.commands.outputs import as_steps
-from shapeshift.app.commands.png16 import write_png16
+from shapeshift.app.commands.outputs import as_steps, write_png16
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.normal_photo import load_normals, refuse_other_axes
 from shapeshift.scene.captures.read_capture import read_capture
@@ -69,7 +68,7 @@ def test_what_render_writes_is_a_normal_map(tmp_path):
 def test_axes_of_opencv(tmp_path, at_top):
     normals = some_normals()
     frames, rest = simple(tmp_path, 2)
-    np.save(tmp_path / "n.npy", normals * np.float32([1, -1, -1]))
+    np.save(tmp_path / "n.npy", normals * np.array([1, -1, -1], np.float32))
     frames[0]["normal_path"] = "n.npy"
     said = {"normal_convention": "opencv"}
     frames[0] |= {} if at_top else said
@@ -78,7 +77,7 @@ def test_axes_of_opencv(tmp_path, at_top):
     np.save(tmp_path / "n.npy", normals)
     usual = replace(capture.photos[0], normal_axes="opengl")
     got = load_normals(usual)
-    np.save(tmp_path / "n.npy", normals * np.float32([1, -1, -1]))
+    np.save(tmp_path / "n.npy", normals * np.array([1, -1, -1], np.float32))
     np.testing.assert_array_equal(load_normals(capture.photos[0]), got)
 
 
@@ -168,7 +167,10 @@ def test_broken_files_and_files_that_are_not_there(tmp_path):
 
 def test_a_capture_that_was_written_names_them(tmp_path):
     capture = capture_of(
-        tmp_path, "n.npy", some_normals() * np.float32([1, -1, -1]), normal_convention="opencv"
+        tmp_path,
+        "n.npy",
+        some_normals() * np.array([1, -1, -1], np.float32),
+        normal_convention="opencv",
     )
     (tmp_path / "transforms.json").unlink()
     write_capture(capture)

@@ -5,19 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.scene.change.cells import (
+from shapeshift.scene.change.places import (
     LEAST_VIEWS,
+    ChangeSettings,
     SurfaceCells,
     cells_of,
-    lab_of,
-    means,
-    medians,
-)
-from shapeshift.scene.change.places import (
-    ChangeSettings,
     color_distance,
     find_places,
     inside_any,
+    lab_of,
+    means,
+    medians,
     shape_misfit,
 )
 from shapeshift.scene.change.seen_pair import SeenPair, SeenSide, edge_pixels, samples_of

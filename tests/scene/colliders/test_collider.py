@@ -126,7 +126,7 @@ def test_far_floaters_haze_and_damage_change_little():
     odd = Cloud(
         np.vstack([rng.normal(0, 50, (n, 3)), np.zeros((3, 3))]).astype(np.float32),
         np.vstack([np.full((n, 3), 0.01), np.full((3, 3), 5)]).astype(np.float32),
-        np.tile(np.float32([1, 0, 0, 0]), (n + 3, 1)),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (n + 3, 1)),
         np.full(n + 3, 0.9, np.float32),
     )
     odd.means[0] = np.nan
@@ -141,9 +141,9 @@ def test_long_splats_that_stand_out_alone_leave_no_spikes():
     """Captures have them below, where nothing was seen; a thing would stand on them."""
     cloud = splatted(shapes()["sphere"])
     needles = Cloud(
-        np.float32([[0, -0.1, 0], [0.07, -0.07, 0], [0, 0, 0.1]]),
-        np.tile(np.float32([0.002, 0.06, 0.002]), (3, 1)),
-        np.float32([[1, 0, 0, 0], [0.924, 0, 0, 0.383], [0.707, 0.707, 0, 0]]),
+        np.array([[0, -0.1, 0], [0.07, -0.07, 0], [0, 0, 0.1]], np.float32),
+        np.tile(np.array([0.002, 0.06, 0.002], np.float32), (3, 1)),
+        np.array([[1, 0, 0, 0], [0.924, 0, 0, 0.383], [0.707, 0.707, 0, 0]], np.float32),
         np.full(3, 0.9, np.float32),
     )
     both = [np.concatenate(pair) for pair in zip(cloud.columns, needles.columns, strict=True)]
@@ -193,7 +193,7 @@ def test_few_and_flat_splats_have_a_collider(soon, count, kind):
     rng = np.random.default_rng(count)
     means = rng.random((count, 3)).astype(np.float32) * 0.1
     means[:, {"point": [0, 1, 2], "line": [1, 2], "plane": [1], "cloud": []}[kind]] = 0.5
-    wxyz = np.tile(np.float32([1, 0, 0, 0]), (count, 1))
+    wxyz = np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1))
     scales = np.full((count, 3), (0.0, 1e-30, 0.003)[count % 3], np.float32)
     made = collider_of_splats(means, scales, wxyz, np.ones(count, np.float32), FRESH)
     check_hulls(made)

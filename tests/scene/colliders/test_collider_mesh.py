@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from shapeshift.scene.colliders.collider_wrap import is_closed, is_watertight, stitch
 from shapeshift.scene.colliders.marching_tetrahedra import find_surface
-from shapeshift.scene.colliders.stitch_mesh import is_closed, is_watertight, stitch
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh, sample_faces, separate
 
 

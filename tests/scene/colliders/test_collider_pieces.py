@@ -16,8 +16,7 @@ from shapeshift.scene.colliders.collider import (
     parts_volume,
 )
 from shapeshift.scene.colliders.collider_pieces import hull_faces, read_pieces, write_collider
-from shapeshift.scene.colliders.collider_wrap import volume
-from shapeshift.scene.colliders.stitch_mesh import is_watertight
+from shapeshift.scene.colliders.collider_wrap import is_watertight, volume
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from tests.support.scene.collider_shapes import shapes, solid

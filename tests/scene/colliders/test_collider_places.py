@@ -14,11 +14,10 @@ from shapeshift.scene.colliders.collider import (
     collider_of_splats,
     mesh_of_splats,
 )
-from shapeshift.scene.colliders.collider_wrap import volume
+from shapeshift.scene.colliders.collider_wrap import is_watertight, volume
 from shapeshift.scene.colliders.convex_parts import run_coacd
-from shapeshift.scene.colliders.stitch_mesh import is_watertight
 from shapeshift.scene.world.physics import Physics
-from shapeshift.scene.world.physics_rules import engine
+from shapeshift.scene.world.physics_shapes import engine
 from tests.support.scene.collider_shapes import Cloud, refined, splatted
 from tests.support.scene.physics_things import at, box, run
 

@@ -47,12 +47,12 @@ def test_equal_rows_are_joined_as_numpy_joins_them():
     """Its unique() of axis 0, and 0, 1, many rows; -0, denormals and 0 side by side."""
     draw = np.random.default_rng(0)
     for count in (0, 1, 400):
-        rows = draw.choice(np.float32([-2, -1e-45, 0, 1e-45, 3]), (count, 3))
+        rows = draw.choice(np.array([-2, -1e-45, 0, 1e-45, 3], np.float32), (count, 3))
         found, same = unique_rows(rows)
         wanted, rank = np.unique(rows, axis=0, return_inverse=True)
         np.testing.assert_array_equal(found, wanted, strict=True)
         np.testing.assert_array_equal(same, rank.reshape(-1))
-    corners = np.float32([(0, 0, 0), (-0.0, 0, 0), (1, 0, 0), (9, 9, 9), (0, 1, 0)])
+    corners = np.array([(0, 0, 0), (-0.0, 0, 0), (1, 0, 0), (9, 9, 9), (0, 1, 0)], np.float32)
     mesh = joined(corners, np.array([(0, 2, 4), (1, 0, 2), (1, 4, 2)]), "a")
     assert mesh.vertices.tolist() == [[0, 0, 0], [0, 1, 0], [1, 0, 0]]  # none of no face
     assert mesh.faces.tolist() == [[0, 2, 1], [0, 1, 2]]

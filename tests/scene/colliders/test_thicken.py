@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from shapeshift.scene.colliders.thicken import THICKNESS, thickened
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.world.physics import Physics
+from shapeshift.scene.world.physics_shapes import THICKNESS, thickened
 from tests.support.scene.physics_things import at, box, run, sheet
 
 BOX_FACES = np.array(

@@ -47,7 +47,7 @@ SELECTORS = (
     Lens(position=(0, 0, 3), wxyz=(1, 0, 0, 0), half_angle=0.3, x=0.25),
     Lens(position=(0, 0, 3), wxyz=(HALF, HALF, 0, 0), tangents=(-1, 1, -0.5, 0.6), x=0.25),
     Sphere(centre=(0, 0, 0), radius=0.2, x=BLEND),
-    Painted(np.float32([0, 0.1, 1]), 0.75),
+    Painted(np.array([0, 0.1, 1], np.float32), 0.75),
 )
 REACTIONS = (
     Reaction(on="collision", to="next", least_impulse_n_s=0.4, seconds=THIRD, ease="slow end"),
@@ -331,7 +331,7 @@ def test_anything_anywhere_is_a_scene_or_one_sentence(path):
 
 def write_layer(path: Path, count: int = 4) -> None:
     rng = np.random.default_rng(count)
-    wxyz = np.tile(np.float32([1, 0, 0, 0]), (count, 1))
+    wxyz = np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1))
     scales = np.full((count, 3), 0.01, np.float32)
     means = rng.normal(size=(count, 3)).astype(np.float32) * 0.1
     splats = PlainSplats(means, scales, wxyz, np.full(count, 0.9, np.float32),

@@ -19,8 +19,10 @@ from tests.support.models import make_random_model
 WHOLE = make_random_model(anchors=60)
 WHOLE = replace(
     WHOLE,
-    anchors=(WHOLE.anchors + np.resize(np.float32([[0, 0, 0], [3, 0, 0], [0, 0, 5]]), (60, 3))),
-    labels=np.resize(np.uint8([0, 1, 2]), 60),
+    anchors=(
+        WHOLE.anchors + np.resize(np.array([[0, 0, 0], [3, 0, 0], [0, 0, 5]], np.float32), (60, 3))
+    ),
+    labels=np.resize(np.array([0, 1, 2], np.uint8), 60),
     objects=(ObjectLabel(1, "mug"), ObjectLabel(2, "cup")),
 )
 MUG = {"name": "mug", "model": "room.shift", "part": "mug"}

@@ -13,7 +13,6 @@ from shapeshift.scene.document.scene_file import SceneFile, SceneItem, scene_of
 from shapeshift.scene.document.write_scene_file import write_scene_file
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.sections.cut import inside_of
-from shapeshift.scene.sections.read_section import read_section
 from shapeshift.scene.sections.section import (
     BoxShape,
     PlaneShape,
@@ -23,6 +22,7 @@ from shapeshift.scene.sections.section import (
     held_by,
     moved_shape,
 )
+from shapeshift.scene.sections.section_texts import read_section
 from tests.support.splat_scenes import random_layers
 
 TURN = Pose(np.array([0.3, -0.2, 0.5]), np.array([0.5, -0.5, 0.5, 0.5]))

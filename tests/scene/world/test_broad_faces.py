@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.scene.world.broad_faces import MOST_CORNERS, SLOPE, with_firm_faces
 from shapeshift.scene.world.physics import Physics
+from shapeshift.scene.world.physics_shapes import MOST_CORNERS, SLOPE, with_firm_faces
 from tests.support.scene.physics_things import at, box, run
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")

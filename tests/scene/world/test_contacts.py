@@ -70,6 +70,16 @@ def test_in_a_tower_each_pair_bears_what_stands_on_it(hulls):
         assert np.mean(told[pair]) == pytest.approx(above * weight, rel=0.03)
 
 
+def test_what_falls_and_comes_to_rest_has_had_all_of_its_weight_as_impulses():
+    """Momentum is lost and gained by weight and contacts alone: their sum is m g t + m v."""
+    physics = Physics(floor_y=0)
+    body = physics.add_body([box(0.05, 0.05, 0.05)], at(0, 0.1, 0), 0.4)
+    told = sum(c.impulse_n_s for _ in range(18) for c in physics.step())  # it lands after 0.1 s
+    kept = 0.4 * physics.velocity(body)[0][1]
+    # Soft contacts give a little back, and sizes are told: 1.5 % more.
+    assert told == pytest.approx(0.4 * 9.81 * 18 / 90 + kept, rel=0.03)
+
+
 def test_a_table_that_is_put_elsewhere_carries_there():
     physics = Physics()
     top = table(physics, "slab")

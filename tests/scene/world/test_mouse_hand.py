@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose, View, look_at, perspective
-from shapeshift.scene.world.mouse_hand import (
+from shapeshift.scene.world.grab import (
     NOTCH,
     MouseHand,
     hand_at,

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.scene.colliders.thicken import THICKNESS
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.grab import hand_velocity, turn_between
 from shapeshift.scene.world.physics import FLOOR, Physics
+from shapeshift.scene.world.physics_shapes import THICKNESS
 from tests.support.scene.physics_things import at, box, cup, run, sheet, table
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")

@@ -8,7 +8,7 @@ from shapeshift.app.cluster.task import Task
 # Instead of the program, under the same watch: the first word is a script.
 STAND_IN = (
     "import sys; sys.path[:0] = {paths!r}; "
-    "from shapeshift.app.cluster.child import watch_parent; watch_parent(); "
+    "from shapeshift.app.cluster.run_task import watch_parent; watch_parent(); "
     "exec(open(sys.argv[1]).read())"
 )
 COUNT = """

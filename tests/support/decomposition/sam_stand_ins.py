@@ -39,8 +39,10 @@ def disc(side: int, low: int, radius: float) -> tuple[list, dict]:
         h.make_node("Sub", ["limit", "r2"], ["disc"]),
     ]  # fmt: skip
     return nodes, {
-        "grid": np.stack([x, y])[None], "one": np.int64([1]), "zero": np.int64([0]),
-        "limit": np.full((1, 1, 1, 1), radius**2, np.float32), "to": np.int64([1, 2, 1, 1]),
+        "grid": np.stack([x, y])[None],
+        "one": np.array([1], np.int64), "zero": np.array([0], np.int64),
+        "limit": np.full((1, 1, 1, 1), radius**2, np.float32),
+        "to": np.array([1, 2, 1, 1], np.int64),
     }  # fmt: skip
 
 
@@ -65,17 +67,17 @@ def write_sam(folder: Path, kind: str, side: int = 256, spoil: str = "") -> floa
         h.make_node("Identity", ["disc"], [out]),
         h.make_node("Identity", ["sure"], ["iou_predictions"]),
     ]  # fmt: skip
-    constants["sure"] = np.float32([[SURE]])
+    constants["sure"] = np.array([[SURE]], np.float32)
     shapes, sure = [1, 1, low, low], [1, 1]
     if spoil == "nan":
         nodes.append(h.make_node("Mul", ["scaled", "nan"], ["masks"]))
         constants["nan"] = np.float32(np.nan)
     elif spoil == "rank":
         nodes.append(h.make_node("Reshape", ["scaled", "flat"], ["masks"]))
-        constants["flat"], shapes = np.int64([-1]), [low * low]
+        constants["flat"], shapes = np.array([-1], np.int64), [low * low]
     elif spoil == "scores":
         nodes.append(h.make_node("Identity", ["scaled"], ["masks"]))
-        constants["sure"], sure = np.float32([[SURE, 0.2]]), [1, 2]
+        constants["sure"], sure = np.array([[SURE, 0.2]], np.float32), [1, 2]
     named = "answers" if spoil == "names" else "masks"
     if spoil == "names":
         nodes.append(h.make_node("Identity", ["scaled"], ["answers"]))
@@ -97,14 +99,14 @@ def write_transformers(folder: Path, third: bool, boxes: bool) -> None:
     if boxes:
         names = [f"image_embeddings.{i}" for i in range(3)]
     sizes = [low >> i for i in range(len(names))] if boxes else [low // 4] * 2
-    ends = {f"end{i}": np.int64([n, n]) for i, n in enumerate(sizes)}
+    ends = {f"end{i}": np.array([n, n], np.int64) for i, n in enumerate(sizes)}
     write(
         folder / "vision_encoder.onnx",
         [h.make_node("Slice", ["pixel_values", "start", f"end{i}", "axes"], [name])
          for i, name in enumerate(names)],
         [info("pixel_values", T.FLOAT, [1, 3, "h", "w"])],
         [info(name, T.FLOAT, [1, 3, n, n]) for name, n in zip(names, sizes, strict=True)],
-        ends | {"start": np.int64([0, 0]), "axes": np.int64([2, 3])},
+        ends | {"start": np.array([0, 0], np.int64), "axes": np.array([2, 3], np.int64)},
     )  # fmt: skip
     nodes, constants = disc(side, low, radius)
     entry = "box" if boxes else "input_points"
@@ -114,12 +116,12 @@ def write_transformers(folder: Path, third: bool, boxes: bool) -> None:
         h.make_node("Unsqueeze", ["disc", "one"], ["pred_masks"]),
         h.make_node("Identity", ["sure"], ["iou_scores"]),
     ]  # fmt: skip
-    constants["sure"] = np.float32([[[SURE]]])
+    constants["sure"] = np.array([[[SURE]]], np.float32)
     inputs = [info(n, T.FLOAT, [1, 3, s, s]) for n, s in zip(names, sizes, strict=True)]
     if boxes:
         inputs.append(info("input_boxes", T.FLOAT, [1, "b", 4]))
         nodes.insert(0, h.make_node("Reshape", ["input_boxes", "corners"], ["box"]))
-        constants["corners"] = np.int64([1, 1, 2, 2])
+        constants["corners"] = np.array([1, 1, 2, 2], np.int64)
     inputs.append(info("input_points", T.FLOAT, [1, 1, "n", 2]))
     inputs.append(info("input_labels", T.INT64, [1, 1, "n"]))
     outputs = [
@@ -154,7 +156,11 @@ def write_sam3(folder: Path, raw: bool = True, room: int | None = None) -> None:
         h.make_node("Slice", ["language_features", "one", "two", "one"], ["token"]),
         h.make_node("Div", ["token", "hundred"], ["score"]),
     ]  # fmt: skip
-    constants |= {"two": np.int64([2]), "axis": np.int64([2]), "hundred": np.float32(100)}
+    constants |= {
+        "two": np.array([2], np.int64),
+        "axis": np.array([2], np.int64),
+        "hundred": np.float32(100),
+    }
     inputs = [
         info("original_height", T.INT64, []), info("original_width", T.INT64, []),
         *(info(n, T.UINT8, [3, side, side]) for n in names if raw or "fpn" in n),
@@ -168,7 +174,7 @@ def write_sam3(folder: Path, raw: bool = True, room: int | None = None) -> None:
             h.make_node("Identity", ["high"], ["presence_logit_dec"]),
             h.make_node("Identity", ["disc"], ["pred_masks"]),
         ]
-        constants |= {"logits": np.int64([1, 1, 1]), "high": np.float32([[80]])}
+        constants |= {"logits": np.array([1, 1, 1], np.int64), "high": np.array([[80]], np.float32)}
         outputs = [
             info("pred_logits", T.FLOAT, [1, 1, 1]), info("presence_logit_dec", T.FLOAT, [1, 1]),
             info("pred_masks", T.FLOAT, [1, 1, low, low]),
@@ -179,7 +185,7 @@ def write_sam3(folder: Path, raw: bool = True, room: int | None = None) -> None:
             h.make_node("Reshape", ["score", "logits"], ["scores"]),
             h.make_node("Identity", ["nowhere"], ["boxes"]),
         ]
-        constants |= {"logits": np.int64([1]), "nought": np.float32(0),
+        constants |= {"logits": np.array([1], np.int64), "nought": np.float32(0),
                       "nowhere": np.zeros((1, 4), np.float32)}  # fmt: skip
         outputs = [
             info("boxes", T.FLOAT, [1, 4]), info("scores", T.FLOAT, [1]),

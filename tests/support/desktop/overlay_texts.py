@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from shapeshift.app.editor.texts import deeds
+from shapeshift.app.editor.texts import table as deeds
 from shapeshift.renderer.debug.debug import REASON_TEXTS
 
 ROOT = Path(__file__).resolve().parents[3]

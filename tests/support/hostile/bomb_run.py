@@ -65,8 +65,8 @@ def readers() -> dict:
     assert all((laspy, lazrs, onnx, pycolmap, PIL, scipy, trimesh, zstandard))
     from shapeshift.runtime_models.read_scene import read_model
     from shapeshift.scene.cameras.read_cameras import read_camera_list
+    from shapeshift.scene.captures.point_clouds import read_points
     from shapeshift.scene.captures.read_capture import read_capture
-    from shapeshift.scene.captures.read_points import read_points
     from shapeshift.scene.colliders.read_mesh import read_mesh
     from shapeshift.scene.document.read_scene_file import read_scene_file
 

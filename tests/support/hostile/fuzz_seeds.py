@@ -10,7 +10,7 @@ import numpy as np
 
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
-from shapeshift.scene.selectors.read_selector import read_selector
+from shapeshift.scene.selectors.selector_texts import read_selector
 from tests.support.hostile.fuzz_format_seeds import format_seeds
 from tests.support.hostile.fuzz_run import Seed
 from tests.support.models import make_random_model
@@ -121,7 +121,7 @@ def archive_seeds(folder: Path) -> list[Seed]:
 
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     write_package(model, folder / "package.shift")
-    labels, mug = np.uint8([0, 1, 0, 1, 1, 0]), ObjectLabel(1, "mug")
+    labels, mug = np.array([0, 1, 0, 1, 1, 0], np.uint8), ObjectLabel(1, "mug")
     write_package(replace(model, labels=labels, objects=(mug,)), folder / "package")
     write_package(model, folder / "bytes.shift", "uint8")
     seeds = [
@@ -171,8 +171,8 @@ def write_some_levels(folder: Path) -> Path:
 
 
 def torch_seeds(folder: Path) -> list[Seed]:
+    from shapeshift.runtime_models.splats.formats import read_classifier
     from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-    from shapeshift.runtime_models.splats.read_labels import read_classifier
     from tests.support.splats.scaffold_scenes import random_raw, write_run
     from tests.support.splats.torch_files import write_tensors
 
@@ -201,7 +201,7 @@ def torch_seeds(folder: Path) -> list[Seed]:
 def thermal_seeds(folder: Path) -> list[Seed]:
     """A pair, a list of stops, and ThermalGaussian's two sets of harmonics in one PLY."""
     from shapeshift.runtime_models.model import Stop
-    from shapeshift.runtime_models.splats.layers.write_layer_list import write_layer_list
+    from shapeshift.runtime_models.splats.layers.layer_list import write_layer_list
     from shapeshift.runtime_models.splats.ply.write_ply import write_ply
     from tests.support.splats.layer_folders import with_thermal_harmonics
 
@@ -248,8 +248,8 @@ def picture_seeds() -> list[Seed]:
 
 def capture_seeds(folder: Path) -> list[Seed]:
     """Captures with their photos and points, as training and eval read them, and parts of them."""
+    from shapeshift.scene.captures.point_clouds import read_points
     from shapeshift.scene.captures.read_capture import read_capture
-    from shapeshift.scene.captures.read_points import read_points
     from tests.support.scene.captures import simple, whole, write_transforms
 
     seeds = []

@@ -48,7 +48,7 @@ def thermal(folder: Path) -> Iterator[DoorSeed]:
 def points(folder: Path) -> Iterator[DoorSeed]:
     import laspy
 
-    from shapeshift.scene.captures.read_las import read_las
+    from shapeshift.scene.captures.point_clouds import read_las
 
     for ending in ("las", "laz"):
         file = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
@@ -121,7 +121,7 @@ def video(folder: Path) -> Iterator[DoorSeed]:
 
 
 def network(folder: Path) -> Iterator[DoorSeed]:
-    from shapeshift.decomposition.masks.sam_network import Network
+    from shapeshift.decomposition.masks.sam import Network
     from tests.support.decomposition.sam_stand_ins import write_sam
 
     write_sam(folder, "sam", 32)

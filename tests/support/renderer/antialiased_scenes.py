@@ -50,7 +50,7 @@ def mixed(count: int = 3000) -> Scene:
 def flat(count: int) -> SplatLayers:
     """Needles, discs and balls, some of no extent at all."""
     rng = np.random.default_rng(8)
-    sizes = np.float32([0, 1e-12, 0.003, 0.05, 0.3])
+    sizes = np.array([0, 1e-12, 0.003, 0.05, 0.3], np.float32)
     return replace(thin(count, 7), scales=rng.choice(sizes, (count, 3)))
 
 

@@ -33,7 +33,7 @@ KINDS = (
 def beside(value: float) -> list[float]:
     """A threshold and the floats just below and above it."""
     exact = np.float32(value)
-    ends = np.float32([-np.inf, np.inf])
+    ends = np.array([-np.inf, np.inf], np.float32)
     return [float(exact), *(float(np.nextafter(exact, end)) for end in ends)]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop
-from shapeshift.runtime_models.splats.layers.write_layer_list import write_layer_list
+from shapeshift.runtime_models.splats.layers.layer_list import write_layer_list
 from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.scene.change.similarity import Similarity

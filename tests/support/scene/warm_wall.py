@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop
-from shapeshift.runtime_models.splats.layers.write_layer_list import write_layer_list
+from shapeshift.runtime_models.splats.layers.layer_list import write_layer_list
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.scene.inspection.value_picture import ValuePicture, world_points
 from shapeshift.scene.pose import View, look_at, perspective

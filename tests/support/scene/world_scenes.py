@@ -93,7 +93,7 @@ class Points:
 
 def model() -> SplatLayers:
     ones = np.ones((2, 3), np.float32)
-    wxyz = np.tile(np.float32([1, 0, 0, 0]), (2, 1))
+    wxyz = np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1))
     arrays = (ones * 0, ones, wxyz, np.ones(2, np.float32), ones[:, None])
     return SplatLayers(*arrays, np.zeros(2, np.int32), (Stop("only", 0.0),))
 

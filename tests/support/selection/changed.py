@@ -1,13 +1,16 @@
 """pytest --changed [REVISION]: the tests that a change reaches, nearest first, within --minutes."""
 
+import signal
 import time
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 
 from tests.support.selection.reaching import Reached, changed_files, reached_tests, used_files
 
-LOAD_WITHIN, BEGIN_WITHIN = 0.4, 0.7  # of the minutes: later no file is loaded, no test begun
+# Of the minutes: later no file is loaded, no test is begun, and what still runs is broken off.
+LOAD_WITHIN, BEGIN_WITHIN, END_WITHIN = 0.4, 0.7, 0.92
 AT_LEAST = 0.2  # of the minutes that tests have once they are loaded, however slow a machine is
 LOADED = 600  # tests a minute: of more the last would not begin, and loading them takes its time
 SHOWN = 3  # changed files that the line names
@@ -36,6 +39,8 @@ class Changed:
         self.seconds = 60 * self.minutes
         self.load_until = began + LOAD_WITHIN * self.seconds
         self.until = began + BEGIN_WITHIN * self.seconds
+        self.end = began + END_WITHIN * self.seconds
+        self.running = False  # what a test does, not what is done about it
         self.left: list[pytest.Item] = []
         self.loaded = self.unread = 0  # tests, files
         try:
@@ -83,7 +88,32 @@ class Changed:
         return pytest.CollectReport(collector.nodeid, "passed", None, [])
 
     def pytest_collection_finish(self) -> None:
-        self.until = max(self.until, time.monotonic() + AT_LEAST * self.seconds)
+        now = time.monotonic()
+        self.until = max(self.until, now + AT_LEAST * self.seconds)
+        self.end = max(self.end, self.until)
+        if hasattr(signal, "SIGALRM"):  # not on Windows
+            signal.signal(signal.SIGALRM, self.break_off)
+            signal.setitimer(signal.ITIMER_REAL, self.end - now)
+
+    def break_off(self, *_: object) -> None:
+        """Ends the test that runs, as one that is skipped."""
+        if self.running:
+            pytest.skip("--changed: its time was over")
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_setup(self) -> Generator[None, object, object]:
+        return (yield from self.broken_off())
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self) -> Generator[None, object, object]:
+        return (yield from self.broken_off())
+
+    def broken_off(self) -> Generator[None, object, object]:
+        self.running = True
+        try:
+            return (yield)
+        finally:
+            self.running = False
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
@@ -119,6 +149,8 @@ class Changed:
         )
 
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
+        if hasattr(signal, "SIGALRM"):
+            signal.setitimer(signal.ITIMER_REAL, 0)
         if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and not self.reached:
             session.exitstatus = pytest.ExitCode.OK
 

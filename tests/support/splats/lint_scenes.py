@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.runtime_models.files.blocks import each_block
-from shapeshift.runtime_models.lint.invalid_rows import any_invalid, invalid_in
 from shapeshift.runtime_models.lint.lint import judge
+from shapeshift.runtime_models.splats.operations.activate import any_invalid, invalid_in
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, RawSplats, Reading
 from tests.support.splats.ply_files import some_splats
 

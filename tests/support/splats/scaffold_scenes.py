@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import AnchorModel, Mlp
-from shapeshift.runtime_models.package.write_onnx import write_onnx
+from shapeshift.runtime_models.package.package_files import write_onnx
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, rotate_quaternions
 from shapeshift.scene.pose import Pose, View, look_at, perspective

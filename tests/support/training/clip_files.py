@@ -8,7 +8,7 @@ import json
 
 import numpy as np
 
-from shapeshift.training.style_features.clip_tokens import END, START, WORD_END, byte_letters
+from shapeshift.training.style_features.clip_model import END, START, WORD_END, byte_letters
 from tests.support.training.onnx_files import vision_transformer, write_model
 
 COLORS = {"red": (1, 0.1, 0.1), "lime": (0.1, 1, 0.1), "blue": (0.1, 0.1, 1)}

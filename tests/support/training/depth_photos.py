@@ -3,7 +3,7 @@
 import numpy as np
 
 from shapeshift.training.evaluation.evaluate import evaluate_model
-from shapeshift.training.losses.depth_loss import HOLE
+from shapeshift.training.losses.surface_losses import HOLE
 from shapeshift.training.train import Trainer
 from tests.support.training.situations import SIZE
 

@@ -11,9 +11,9 @@ from shapeshift.app.editor.state.files.edited_file import edited_from_file
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
-from shapeshift.app.headset.open_xr import editor_of
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.panel_picture import PANEL, PanelPicture
+from shapeshift.app.headset.scene_shelf import editor_of
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.runtime_models.model import Stop

@@ -17,7 +17,7 @@ def main(arguments: list[str]) -> int:
 
     import shapeshift  # noqa: F401  makes the folders its subpackages
     from shapeshift.app.cli import main as run
-    from shapeshift.vr.openxr.gaze import Gaze
+    from shapeshift.vr.openxr.tracked import Gaze
 
     way = np.array([math.sin(ASIDE), -math.tan(DOWN), -math.cos(ASIDE)])
 

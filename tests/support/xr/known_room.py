@@ -16,7 +16,7 @@ def main(arguments: list[str]) -> int:
     from shapeshift.app.cli import main as run
     from shapeshift.scene.scene import IDENTITY
     from shapeshift.vr.frame import Area
-    from shapeshift.vr.openxr.bounds import Bounds
+    from shapeshift.vr.openxr.room import Bounds
 
     Bounds.area = lambda self, play, time_ns: Area(IDENTITY, SIZE_M)
     return run(arguments)

@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> int:
 
     import shapeshift  # noqa: F401  makes the folders its subpackages
     from shapeshift.app.cli import main as run
-    from shapeshift.vr.openxr.visibility import VisibilityMasks, read_mask
+    from shapeshift.vr.openxr.view_configuration import VisibilityMasks, read_mask
     from tests.support.xr.remote import EYE_DEGREES
 
     def ask(self) -> None:

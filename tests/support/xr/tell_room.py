@@ -14,11 +14,11 @@ FRAMES = 10
 def main(kind: str) -> None:
     sys.path.insert(0, str(ROOT))
     from shapeshift.renderer.gl.context import open_context
-    from shapeshift.vr.openxr import spaces
+    from shapeshift.vr.openxr import room
     from shapeshift.vr.openxr.instance import Instance
     from shapeshift.vr.openxr.session import Session
 
-    spaces.KINDS = spaces.KINDS[spaces.KINDS.index(kind) :]
+    room.KINDS = room.KINDS[room.KINDS.index(kind) :]
     with (
         open_context("egl") as ctx,
         Instance() as instance,

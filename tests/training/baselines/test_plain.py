@@ -12,17 +12,21 @@ import pytest
 from shapeshift.rasterizer.reference import rotations
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.read_scene import describe, read_model
-from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
-from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name, write_layer_list
+from shapeshift.runtime_models.splats.layers.layer_list import (
+    LIST,
+    layer_name,
+    write_layer_list,
+)
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.training.baselines.plain import PlainTrainer, one_modality
-from shapeshift.training.baselines.plain_density import (
+from shapeshift.training.baselines.plain import (
     AFTER_RESET,
     SMALLER,
+    PlainTrainer,
     apply_densification,
     choose_densification,
     extent_of,
+    one_modality,
     reset_opacity,
     split_splats,
 )

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from shapeshift.app.training.blocks.train_in_blocks import join
-from shapeshift.runtime_models.blocks.block_box import turned
 from shapeshift.runtime_models.blocks.block_model import joined
+from shapeshift.runtime_models.blocks.read_blocks import turned
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import package_files, write_package
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.training.blocks import block_trainer, starts
+from shapeshift.training.blocks import begin_block as block_trainer
+from shapeshift.training.blocks import starts
 from shapeshift.training.blocks.begin_block import begin_block
-from shapeshift.training.blocks.block_start import BlockStart
-from shapeshift.training.blocks.cover import LEAST_SHARE, cover_of
+from shapeshift.training.blocks.block_start import LEAST_SHARE, BlockStart, cover_of
 from shapeshift.training.blocks.cut import Wanted
 from shapeshift.training.blocks.starts import Coarse, CutRules, make_starts, read_cut
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.blocks.block_box import turned
+from shapeshift.runtime_models.blocks.read_blocks import turned
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.training.blocks.cover import context_of
+from shapeshift.training.blocks.block_start import context_of
 from shapeshift.training.blocks.cut import (
     Wanted,
     cut_whole,

@@ -7,12 +7,13 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.density.densify import (
     GRAD2D_THRESHOLD,
     LEAST_STEPS,
+    DensificationStats,
     NewAnchors,
     absent_as_nan,
+    anchor_cap,
     densify_and_prune,
     largest_gradient,
     least_contributing,
@@ -21,7 +22,6 @@ from shapeshift.training.density.densify import (
     resize_optimizer_state,
     transparent_anchors,
 )
-from shapeshift.training.density.density_budget import anchor_cap
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import HeadLayout

@@ -8,8 +8,7 @@ from shapeshift.training.drawing import camera_of, draw_splats
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.step import TrainingStep
-from shapeshift.training.visibility import LOOK, Visibility
+from shapeshift.training.step import LOOK, TrainingStep, Visibility
 from tests.support.renderer.rasterizer_reference import render_reference
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 

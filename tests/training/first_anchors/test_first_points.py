@@ -9,14 +9,13 @@ import pytest
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.las_run import las_points
+from shapeshift.scene.captures.point_clouds import read_las
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.scene.captures.read_las import read_las
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.first_anchors import hull, point_sources
+from shapeshift.training.first_anchors import hull, initial
 from shapeshift.training.first_anchors.first_anchors import first_anchors
-from shapeshift.training.first_anchors.hull import carve, visual_hulls
+from shapeshift.training.first_anchors.hull import carve, choose_voxel, visual_hulls, voxel_centres
 from shapeshift.training.first_anchors.initial import initial_points
-from shapeshift.training.first_anchors.spacing import choose_voxel, voxel_centres
 from shapeshift.training.first_anchors.views import pixel_size
 from shapeshift.training.photos import LoadedPhoto, load_photos
 from shapeshift.training.synthetic.balls import make_balls
@@ -153,16 +152,16 @@ def test_one_of_the_points_in_a_cube_is_left_the_first(seed):
         if key is None or key not in taken:
             kept.append(point)
             taken.add(key)
-    found = point_sources.one_a_cell(points, edge)
+    found = initial.one_a_cell(points, edge)
     assert 100 < len(kept) < 700
     assert np.array_equal(found, np.array(kept))
 
 
 def test_no_point_is_left_of_none_and_all_of_those_that_nobody_sees():
-    assert point_sources.one_a_cell(np.zeros((0, 3)), np.zeros(0)).shape == (0, 3)
+    assert initial.one_a_cell(np.zeros((0, 3)), np.zeros(0)).shape == (0, 3)
     points = np.zeros((5, 3))
-    assert len(point_sources.one_a_cell(points, np.full(5, np.inf))) == 5
-    assert len(point_sources.one_a_cell(points, np.full(5, 1e-30))) == 1
+    assert len(initial.one_a_cell(points, np.full(5, np.inf))) == 5
+    assert len(initial.one_a_cell(points, np.full(5, 1e-30))) == 1
 
 
 def test_without_points_depth_comes_before_the_hull(balls, photos, coarse):
@@ -196,7 +195,7 @@ def test_what_is_not_there_is_said(balls, photos, source, found):
 
 
 def test_many_depths_are_thinned(balls, photos, monkeypatch):
-    monkeypatch.setattr(point_sources, "MOST_POINTS", 500)
+    monkeypatch.setattr(initial, "MOST_POINTS", 500)
     points = initial_points(balls, photos, RNG(0), "depth")[0]
     assert 400 < len(points) < 600
 

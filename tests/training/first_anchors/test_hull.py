@@ -11,11 +11,11 @@ from shapeshift.training.first_anchors.hull import (
     FINEST,
     Silhouette,
     contradicting,
+    median_neighbour,
     uncovered,
     visual_hull,
     visual_hulls,
 )
-from shapeshift.training.first_anchors.spacing import median_neighbour
 from shapeshift.training.first_anchors.views import common_box, pixel_of, pixel_size
 from shapeshift.training.photos import LoadedPhoto
 from tools.synthetic.strangers import KINDS

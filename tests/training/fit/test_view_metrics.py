@@ -10,7 +10,7 @@ from shapeshift.runtime_models.model import Mlp
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.metrics import psnr
-from shapeshift.training.fit.view_metrics import largest_contribution, outline_ious, view_psnr
+from shapeshift.training.fit.fit import largest_contribution, outline_ious, view_psnr
 from shapeshift.training.photos import LoadedPhoto
 from tests.support.models import make_random_model, without_control
 from tests.support.renderer.rasterizer_reference import render_reference

@@ -9,8 +9,8 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.evaluation.vgg_distance import VggDistance
-from shapeshift.training.gradients import check_network as checking
-from shapeshift.training.gradients.check_network import check_network
+from shapeshift.training.gradients import read_network
+from shapeshift.training.gradients.read_network import check_network
 from shapeshift.training.styles.image_network import ImageNetwork
 from tests.support.training.onnx_files import tiny_vgg, vision_transformer, write_model
 from tests.support.training.operator_cases import row
@@ -63,10 +63,10 @@ def test_the_command_says_it_and_ends_with_2(tmp_path):
 
 def test_the_largest_value_is_the_bound_itself(tmp_path, monkeypatch):
     path = added([row("Exp", "x", out="r")], tmp_path / "n.onnx")
-    most = checking.NUMBER_BYTES * 3 * 8 * 8
-    monkeypatch.setattr(checking, "LARGEST_VALUE", most)
+    most = read_network.NUMBER_BYTES * 3 * 8 * 8
+    monkeypatch.setattr(read_network, "LARGEST_VALUE", most)
     check_network(path.read_bytes(), path)
-    monkeypatch.setattr(checking, "LARGEST_VALUE", most - 1)
+    monkeypatch.setattr(read_network, "LARGEST_VALUE", most - 1)
     with pytest.raises(BadFile, match="for a picture of 256x256 pixels"):
         check_network(path.read_bytes(), path)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.tiles.heads import uncovered
+from shapeshift.renderer.tiles.slot import uncovered
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import ControlEncoding, Stop
 from shapeshift.runtime_models.package.feature_codes import EXACT

@@ -7,10 +7,11 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.style_features.clip_model import FILES, ClipModel
-from shapeshift.training.style_features.clip_patches import PatchSettings, patch_matrix
 from shapeshift.training.style_features.clip_pictures import (
     ClipPictureLoss,
+    PatchSettings,
     clip_pictures,
+    patch_matrix,
     picture_direction,
     text_direction,
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.training.style_features.clip_tokens import (
+from shapeshift.training.style_features.clip_model import (
     END,
     MOST_TOKENS,
     START,

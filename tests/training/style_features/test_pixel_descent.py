@@ -5,10 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shapeshift.training.style_features.color_transfer import color_transfer
-from shapeshift.training.style_features.made_styles import MADE_STYLES
+from shapeshift.training.style_features.named_styles import MADE_STYLES
 from shapeshift.training.style_features.nnfm_pictures import nnfm_pictures
-from shapeshift.training.style_features.pixel_descent import DescentSettings, PixelDescent
+from shapeshift.training.style_features.pixel_descent import (
+    DescentSettings,
+    PixelDescent,
+    color_transfer,
+)
 from shapeshift.training.styles.style_pictures import StyleView, Turns
 from tests.support.training.onnx_files import tiny_vgg
 

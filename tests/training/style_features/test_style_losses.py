@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.training.gradients.gradient_session import GradientSession
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
-from shapeshift.training.style_features import style_losses
+from shapeshift.training.style_features import nnfm_pictures
 
 RNG = np.random.default_rng
 CHANNELS, PLACES = 5, 12
@@ -38,11 +38,11 @@ def content(f, wanted):
 
 
 LOSSES = {  # how it is written in ONNX, by numpy, and what it compares with
-    "nnfm": (style_losses.add_nnfm, nnfm, (units(RNG(1).normal(size=(7, CHANNELS))),)),
-    "moments": (style_losses.add_moments, moments,
+    "nnfm": (nnfm_pictures.add_nnfm, nnfm, (units(RNG(1).normal(size=(7, CHANNELS))),)),
+    "moments": (nnfm_pictures.add_moments, moments,
                 (RNG(1).normal(size=(CHANNELS, 1)), RNG(2).random((CHANNELS, 1)))),
-    "gram": (style_losses.add_gram, gram, (RNG(1).normal(size=(CHANNELS, CHANNELS)),)),
-    "content": (style_losses.add_content, content, (RNG(1).normal(size=(CHANNELS, PLACES)),)),
+    "gram": (nnfm_pictures.add_gram, gram, (RNG(1).normal(size=(CHANNELS, CHANNELS)),)),
+    "content": (nnfm_pictures.add_content, content, (RNG(1).normal(size=(CHANNELS, PLACES)),)),
 }  # fmt: skip
 
 
@@ -76,9 +76,9 @@ def test_losses_and_gradients_against_numpy(name):
 def test_losses_of_the_style_itself_are_nothing(name):
     features = np.abs(RNG(3).normal(size=(CHANNELS, PLACES))).astype(np.float32)
     wanted = {
-        "nnfm": (style_losses.unit_rows(features),),
-        "moments": style_losses.moments_of(features),
-        "gram": (style_losses.gram_of(features),),
+        "nnfm": (nnfm_pictures.unit_rows(features),),
+        "moments": nnfm_pictures.moments_of(features),
+        "gram": (nnfm_pictures.gram_of(features),),
         "content": (features,),
     }[name]
     loss, gradient = in_onnx(LOSSES[name][0], wanted, features)

@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.training.style_features.nnfm_pictures import VggPictureLoss, covered_part
+from shapeshift.training.style_features.nnfm_pictures import (
+    StyleTerms,
+    VggPictureLoss,
+    VggStyle,
+    covered_part,
+)
 from shapeshift.training.style_features.vgg_features import vgg_layers
-from shapeshift.training.style_features.vgg_style import StyleTerms, VggStyle
 from shapeshift.training.styles.style_pictures import StyleView
 from tests.support.training.onnx_files import tiny_vgg, vision_transformer, write_model
 
@@ -79,7 +83,7 @@ def test_a_picture_is_in_its_own_style(vgg):
 
 
 def test_the_same_seed_picks_the_same_features(vgg, monkeypatch):
-    monkeypatch.setattr("shapeshift.training.style_features.vgg_style.MOST_STYLE_FEATURES", 5)
+    monkeypatch.setattr("shapeshift.training.style_features.nnfm_pictures.MOST_STYLE_FEATURES", 5)
     first, again, other = (VggStyle(vgg, [picture(1)], seed=s)(picture(2))[0] for s in (0, 0, 1))
     assert first == again != other
 

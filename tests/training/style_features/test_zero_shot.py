@@ -26,7 +26,7 @@ from shapeshift.training.style_features.zero_shot import (
     style_features,
     styled_colors,
 )
-from shapeshift.training.styles.style_views import dome_views
+from shapeshift.training.styles.train_stop import dome_views
 from tests.support.new_stops import framed_model
 from tests.support.training.onnx_files import tiny_vgg
 

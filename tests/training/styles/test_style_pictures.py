@@ -12,8 +12,7 @@ from shapeshift.training.styles.carried_pictures import CarriedPictures, colors_
 from shapeshift.training.styles.image_network import ImageNetwork, encode_style, resized
 from shapeshift.training.styles.picture_files import PictureFiles, files_for, read_picture
 from shapeshift.training.styles.style_pictures import StyleView, Turns
-from shapeshift.training.styles.style_views import dome_views, resized_views
-from shapeshift.training.styles.train_stop import turns
+from shapeshift.training.styles.train_stop import dome_views, resized_views, turns
 from tests.support.new_stops import framed_model
 
 PICTURE = np.random.default_rng(0).uniform(size=(24, 32, 3)).astype(np.float32)

@@ -9,7 +9,7 @@ from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, BadFile, Splats
 from shapeshift.runtime_models.rotation import normalize, rotation_matrices
 from shapeshift.runtime_models.stops.insert_stop import insert_stop
-from shapeshift.training.styles.fit_rule import (
+from shapeshift.training.styles.add_style import (
     RuleSettings,
     blended,
     raw_outputs,
@@ -114,7 +114,7 @@ def test_the_same_asked_twice_gives_the_same_numbers():
 def test_raw_outputs_of_what_is_shown_are_the_networks_own():
     """The way back through the activations and frames, against the networks themselves."""
     from shapeshift.training.heads.networks import HeadLayout
-    from shapeshift.training.styles.source_outputs import SourceOutputs
+    from shapeshift.training.styles.stop_trainer import SourceOutputs
 
     model = framed_model(30)
     outputs = SourceOutputs(model, "RGB", HeadLayout(3, control=1))

@@ -8,7 +8,7 @@ from PIL import Image
 
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.photos import LoadedPhoto, load_photos
-from shapeshift.training.supervision.still_picture import (
+from shapeshift.training.supervision.still_background import (
     FEWEST,
     LEAST_TOLERANCE,
     STILL,

@@ -9,11 +9,10 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
-from shapeshift.scene.change.read_change import read_change
-from shapeshift.scene.change.similarity import Similarity
+from shapeshift.scene.change.similarity import Similarity, read_change
 from shapeshift.scene.pose import Pose, View, look_at, perspective
-from shapeshift.scene.sections.read_section import read_box
 from shapeshift.scene.sections.section import BoxShape
+from shapeshift.scene.sections.section_texts import read_box
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.update.begin_update import capture_for, counts_of
 from shapeshift.training.update.regions import STEP, UpdateRegion, cut_photo, moved_capture

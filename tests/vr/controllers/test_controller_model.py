@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.controllers.labels import AWAY_M, labelled
-from shapeshift.vr.controllers.model import HOW_FAR, KEY, controller
+from shapeshift.vr.controllers.model import AWAY_M, HOW_FAR, KEY, controller, labelled
 from shapeshift.vr.frame import LOST, SIDES, Hand
 from shapeshift.vr.glove import LIT
 from shapeshift.vr.hints import hint_rows
 from shapeshift.vr.locomotion.locomotion import RULES, Rules
-from shapeshift.vr.openxr.bindings import PROFILES
+from shapeshift.vr.openxr.hands import PROFILES
 from tests.support.vr.vr_hands import HEAD, hand_at
 
 GRIP = (0.1, 1.3, -0.4)

@@ -12,14 +12,15 @@ from shapeshift.vr.locomotion.locomotion import (
     LONGEST_S,
     RISES_S,
     RULES,
+    Arc,
     Comfort,
     Rules,
     Travel,
+    level_ground,
     move,
+    throw_arc,
 )
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.locomotion.stance import underfoot
-from shapeshift.vr.locomotion.teleport import Arc, level_ground, throw_arc
+from shapeshift.vr.locomotion.play_space import PlaySpace, underfoot
 from tests.support.vr.vr_frames import LOST, at, frame, hand, tilted, yawed
 
 HZ = 90

@@ -7,8 +7,7 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.locomotion.locomotion import LONGEST_S, RULES, Rules, Travel, move
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.locomotion.stance import FAR_M, LEAST_SCALE, MOST_SCALE
+from shapeshift.vr.locomotion.play_space import FAR_M, LEAST_SCALE, MOST_SCALE, PlaySpace
 from tests.support.vr.vr_frames import LOST, frame, hand, yawed
 
 START = PlaySpace(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.locomotion.stance import (
+from shapeshift.vr.locomotion.play_space import (
     FAR_M,
     LEAST_SCALE,
     MOST_SCALE,
+    PlaySpace,
     heading,
     moved,
     pinned,

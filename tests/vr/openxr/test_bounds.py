@@ -5,8 +5,7 @@ from types import SimpleNamespace as Thing
 import numpy as np
 import pytest
 
-from shapeshift.vr.openxr.bounds import LEAST_M, Bounds
-from shapeshift.vr.openxr.spaces import Space
+from shapeshift.vr.openxr.room import LEAST_M, Bounds, Space
 
 xr = pytest.importorskip("xr", reason="pyopenxr is not installed", exc_type=ImportError)
 KNOWN = int(xr.SpaceLocationFlags.POSITION_VALID_BIT) | int(

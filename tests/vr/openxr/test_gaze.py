@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.openxr.gaze import PATH, PROFILE, Gaze, tangents_along
 from shapeshift.vr.openxr.instance import EYE_GAZE
+from shapeshift.vr.openxr.tracked import PATH, PROFILE, Gaze, tangents_along
 
 UPRIGHT = Thing(x=0.0, y=0.0, z=0.0, w=1.0)
 

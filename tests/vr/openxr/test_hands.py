@@ -10,17 +10,20 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import LOST, SIDES
-from shapeshift.vr.openxr.bindings import (
+from shapeshift.vr.openxr.hands import (
     CLICKS,
     HAPTIC,
     NUMBERS,
     PLANES,
     POSES,
     PROFILES,
+    Hands,
+    checked,
     paths,
+    pose_of,
     pressed_pad,
+    within,
 )
-from shapeshift.vr.openxr.hands import Hands, checked, pose_of, within
 
 # What each controller has, from the OpenXR specification 1.0, section 6.4.
 HAS = {

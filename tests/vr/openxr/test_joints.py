@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.vr.frame import LOST, SIDES
 from shapeshift.vr.openxr.instance import HAND_TRACKING
-from shapeshift.vr.openxr.joints import LARGEST_M, HandTrackers
+from shapeshift.vr.openxr.tracked import LARGEST_M, HandTrackers
 from tests.support.vr.vr_hands import HEAD
 
 xr = pytest.importorskip("xr", reason="pyopenxr is not installed", exc_type=ImportError)

@@ -9,8 +9,7 @@ import pytest
 
 from shapeshift.vr.frame import view_names
 from shapeshift.vr.openxr.instance import QUAD_VIEWS, VISIBILITY_MASK
-from shapeshift.vr.openxr.view_configuration import choose_views
-from shapeshift.vr.openxr.visibility import VisibilityMasks
+from shapeshift.vr.openxr.view_configuration import VisibilityMasks, choose_views
 from tests.support.xr.masked_eyes import answer, frame_mesh
 
 STEREO, FOUR = 2, 1000037000  # XrViewConfigurationType

@@ -5,7 +5,7 @@ import ctypes
 import numpy as np
 import pytest
 
-from shapeshift.vr.openxr.visibility import MOST, read_mask
+from shapeshift.vr.openxr.view_configuration import MOST, read_mask
 from tests.support.xr.masked_eyes import answer, frame_mesh
 
 xr = pytest.importorskip("xr", reason="pyopenxr is not installed", exc_type=ImportError)

@@ -11,10 +11,10 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import IDENTITY
+from shapeshift.vr.openxr.events import BEGIN, END, Life
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset, load
-from shapeshift.vr.openxr.life import BEGIN, END, Life
+from shapeshift.vr.openxr.room import KINDS, choose_kind, moved_by
 from shapeshift.vr.openxr.session import choose_blend, eye_size, known_part, tangents_of
-from shapeshift.vr.openxr.spaces import KINDS, choose_kind, moved_by
 from shapeshift.vr.pace import RECOVER, SETTLED, FramePace
 
 PERIOD = 1 / 90

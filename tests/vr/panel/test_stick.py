@@ -5,7 +5,7 @@ import math
 import pytest
 
 from shapeshift.runtime_models.model import Stop
-from shapeshift.vr.panel.stick import (
+from shapeshift.vr.panel.carried import (
     DEAD,
     MIDDLE,
     MOVES,

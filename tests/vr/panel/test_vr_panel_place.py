@@ -9,7 +9,16 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import LOST, Hand
 from shapeshift.vr.glove import fingertip, glove
-from shapeshift.vr.panel.carried import Carried, carry, left_over
+from shapeshift.vr.panel.carried import (
+    MIDDLE,
+    MOVES,
+    RESTS,
+    SCROLLS,
+    SLIDES,
+    Carried,
+    carry,
+    left_over,
+)
 from shapeshift.vr.panel.plane import (
     ABOVE_M,
     ASIDE,
@@ -21,7 +30,6 @@ from shapeshift.vr.panel.plane import (
     hang,
     ray_place,
 )
-from shapeshift.vr.panel.stick import MIDDLE, MOVES, RESTS, SCROLLS, SLIDES
 from tests.support.vr.vr_hands import HEAD, OPEN, PLANE, a_frame, hand_at, moved
 
 LEFT = hand_at((-0.15, 1.15, -0.45))
@@ -208,13 +216,15 @@ def test_what_was_pressed_elsewhere_presses_nothing_here():
     assert carried.pointing.pressing
 
 
-@pytest.mark.parametrize("away", [-0.5, RAY_M + 0.2])
-def test_a_ray_from_behind_or_too_far_does_not_point(away):
+@pytest.mark.parametrize(
+    ("away", "to"), [(-0.5, 0.0), (-0.5, -1.0), (0.5, 1.0), (RAY_M + 0.2, 0.0)]
+)
+def test_a_ray_from_behind_or_away_or_too_far_does_not_point(away, to):
     carried = settled()
     normal = carried.play_from_panel.matrix()[:3, 2]
-    place = spot(carried) + normal * away
+    place, target = (spot(carried) + normal * metres for metres in (away, to))
     for trigger in (0.0, 1.0):
-        carried, _ = step(carried, hand_at(place, spot(carried), trigger=trigger))
+        carried, _ = step(carried, hand_at(place, target, trigger=trigger))
     assert carried.pointing.at is None and not carried.on_panel
 
 

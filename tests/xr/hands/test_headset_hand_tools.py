@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from shapeshift.app.headset.in_hand.probe import along_ray
+from shapeshift.app.inspection.window.probe import along_ray
 from shapeshift.app.paths import DEMO
 from shapeshift.training.synthetic.tracer import photograph, trace
 from shapeshift.training.synthetic.workshop import COLD, HOT, place, radiance

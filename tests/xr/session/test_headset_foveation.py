@@ -8,7 +8,7 @@ from PIL import Image
 
 from shapeshift.renderer.foveation import fovea_of
 from shapeshift.scene.pose import View
-from shapeshift.vr.openxr.gaze import tangents_along
+from shapeshift.vr.openxr.tracked import tangents_along
 from tests.support.xr import gazing_eyes
 from tests.support.xr.person import SIZE, Person, pose_of
 from tests.support.xr.validation import complaints, switched_on

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from shapeshift.app.headset.headset import Options
-from shapeshift.app.headset.open_xr import open_xr
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.metrics import psnr

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.renderer.hidden import hidden_pixels
+from shapeshift.renderer.foveation import hidden_pixels
 from shapeshift.scene.pose import HiddenMesh, View
 from tests.support.xr.masked_eyes import PART, frame_mesh
 from tests.support.xr.person import SIZE, Person, pose_of

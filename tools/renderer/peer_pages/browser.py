@@ -142,10 +142,10 @@ def start_chromium(program: str, profile: str, display: str, address: str) -> su
         "--ignore-gpu-blocklist", "--disable-extensions", "--window-size=1400,900",
         "--disable-background-timer-throttling", f"--user-data-dir={profile}",
     ]  # fmt: skip
-    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
+    none = subprocess.DEVNULL
     environment = os.environ | {"DISPLAY": display}
     return subprocess.Popen(
-        [program, *flags, address], env=environment, stderr=subprocess.DEVNULL, **quiet
+        [program, *flags, address], env=environment, stderr=none, stdin=none, stdout=none
     )
 
 

@@ -7,8 +7,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from gausscam.backends.webgpu import Pipeline, pick_variant
-from gausscam.core.assets import GaussianCloud
+from gausscam.backends.webgpu import (  # pyright: ignore[reportMissingImports]  # a peer
+    Pipeline,
+    pick_variant,
+)
+from gausscam.core.assets import GaussianCloud  # pyright: ignore[reportMissingImports]
 
 DEGREE_0 = 3  # of its SH columns: it draws no more
 

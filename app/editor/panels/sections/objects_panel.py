@@ -19,8 +19,7 @@ from shapeshift.app.editor.state.editor_state import HANDLES, EditorState
 from shapeshift.app.editor.state.files.saving import Saving
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.object_edits import ObjectEdits
-from shapeshift.app.editor.texts.deeds import said_deed
-from shapeshift.app.editor.texts.table import said
+from shapeshift.app.editor.texts.table import said, said_deed
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneItem
 from shapeshift.scene.four_views import FOUR_VIEWS, has_objects

@@ -1,12 +1,13 @@
-"""Draws what ImGui wants drawn, and keeps the textures that it asks for: its fonts grow as letters
-are needed, and the renderer uploads what is new (ImGui calls this RendererHasTextures).
-"""
+"""Pictures in a panel: arrays on the GPU that ImGui can draw."""
 
 import ctypes
 
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
+
+# Draws what ImGui wants drawn, and keeps the textures that it asks for: its fonts grow as letters
+# are needed, and the renderer uploads what is new (ImGui calls this RendererHasTextures).
 
 VERTEX_SHADER = """
 #version 330
@@ -157,3 +158,36 @@ def scissor(
     """GL's of a clip rectangle in logical pixels: left, below, width, height in pixels."""
     left, top, right, low = (side * scale[i % 2] for i, side in enumerate(clip))
     return int(left), int(height - low), int(right - left), int(low - top)
+
+
+class Textures:
+    """Those of one ImGui context; each is uploaded once and kept until its name has another."""
+
+    def __init__(self, ctx: moderngl.Context, overlay: OverlayRenderer) -> None:
+        self._ctx, self._overlay = ctx, overlay
+        self._kept: dict[str, tuple[np.ndarray, moderngl.Texture]] = {}
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def reference(self, name: str, picture: np.ndarray) -> imgui.ImTextureRef:
+        """What ImGui draws a picture by, (H, W, 3) or, with alpha, (H, W, 4) uint8; `name` has one
+        at a time.
+        """
+        kept = self._kept.get(name)
+        if kept is not None and kept[0] is picture:
+            return imgui.ImTextureRef(kept[1].glo)
+        if kept is not None:
+            self._overlay.remove_texture(kept[1])
+            kept[1].release()
+        height, width, channels = picture.shape
+        texture = self._ctx.texture((width, height), channels, picture.tobytes(), alignment=1)
+        self._overlay.register_texture(texture)
+        self._kept[name] = (picture, texture)
+        return imgui.ImTextureRef(texture.glo)
+
+    def release(self) -> None:
+        for _, texture in self._kept.values():
+            self._overlay.remove_texture(texture)
+            texture.release()
+        self._kept.clear()

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from shapeshift.app.editor.state.files.opened import Source
-from shapeshift.app.editor.state.film.timeline import Timeline
 from shapeshift.app.editor.state.parts.piece import Piece
 from shapeshift.app.editor.state.regions import Regions
+from shapeshift.app.film.window.timeline import Timeline
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.model import Model, Stop
 from shapeshift.runtime_models.shapes import four, three

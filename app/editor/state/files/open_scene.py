@@ -5,7 +5,7 @@ from pathlib import Path
 
 from shapeshift.app.camera_files import camera_reading, in_scene
 from shapeshift.app.document import file_at, placed
-from shapeshift.app.editor.state.camera.first_look import FirstLook
+from shapeshift.app.editor.state.camera.framed import FirstLook
 from shapeshift.app.editor.state.files.edited_file import (
     EditedFile,
     edited_from_file,

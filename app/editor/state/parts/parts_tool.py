@@ -8,7 +8,7 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.parts.cutting import delete_rows, hide_rows, make_object
 from shapeshift.app.editor.state.parts.finder import Finder, Found, Query, in_box
-from shapeshift.app.editor.state.parts.lit import Lighting, same, same_look
+from shapeshift.app.editor.state.parts.parts_lit import Lighting, same, same_look
 from shapeshift.app.editor.state.parts.selecting import ALL, Selecting
 from shapeshift.app.editor.state.regions import brushed
 from shapeshift.app.editor.texts.table import said

@@ -7,10 +7,20 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer
-from shapeshift.app.editor.window.overlay.kept_overlay import KeptOverlay
+from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer, scissor, write
+from shapeshift.app.editor.window.overlay.triangles import (
+    INDEX,
+    DrawList,
+    boxes_of,
+    changed_boxes,
+    read_lists,
+    tiles_of,
+)
+from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import MakeBytes
+from shapeshift.renderer.gl.window.layered import Layered, PixelBox, WindowBytes
 
 
 class Presented:
@@ -116,3 +126,167 @@ class Presented:
 
     def release(self) -> None:
         self.renderer.shutdown()
+
+
+# The overlay on software GL: a layer of its own, in which only what has changed is drawn anew.
+#
+# There a pixel that is drawn costs more than all that comes before it: at 1280x720 the overlay
+# takes 3 ms of processor time, and it seldom changes in more than a button.
+
+MOST_UNREAD = 64  # boxes: more are read as the whole layer
+OVER = (  # colours as ImGui has them; alpha as what they hide, so that the layer is premultiplied
+    moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA,
+)  # fmt: skip
+
+
+class KeptOverlay(OverlayRenderer):
+    """Draws ImGui into a layer and lays that over the window's picture."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._lists: tuple[DrawList, ...] = ()
+        self._anew = True  # nothing of the layer holds
+        super().__init__(ctx)
+        self._gpu = Gpu(ctx)
+        self._layer, self._layered = WindowBytes(self._gpu), Layered(self._gpu)
+        self._bytes: np.ndarray | None = None  # the layer once more, as WindowOverlay has it
+        self._unread: list[PixelBox] = []  # where it differs from that
+        self._tiles: np.ndarray | None = None  # that the overlay covers
+        self._covered: list[PixelBox] = []  # these, as few boxes
+
+    @property
+    def works(self) -> bool:
+        """Whether this context has what it needs."""
+        return self._layered.works
+
+    def forget(self) -> None:
+        """Nothing of the layer holds: it is drawn whole next time."""
+        self._anew = True
+
+    def register_texture(self, texture: moderngl.Texture) -> None:
+        """A number of a texture that is gone may come back as another picture."""
+        self._anew = True
+        super().register_texture(texture)
+
+    def keep_picture(self, window: moderngl.Framebuffer) -> None:
+        """The window has the picture, and nothing over it yet."""
+        self._layered.keep(window)
+
+    def keep_bytes(self, pixels: np.ndarray) -> None:
+        """The same of a picture that the window does not have yet."""
+        self._layered.keep_bytes(pixels)
+
+    def show_bytes(self, pixels: np.ndarray, window: moderngl.Framebuffer) -> None:
+        """Puts a picture that is made as bytes into the window."""
+        self._layered.show_bytes(pixels, window)
+
+    def show_picture(self, window: moderngl.Framebuffer) -> bool:
+        """Puts the picture that was kept into the window; False where there is none."""
+        return self._layered.show_picture(window)
+
+    def lay_over(
+        self, data: imgui.ImDrawData, window: moderngl.Framebuffer, picture_kept: bool
+    ) -> bool:
+        """The overlay of now over what the window has; True where it differs from the last one.
+
+        picture_kept: that is the kept picture and nothing else.
+        """
+        boxes = self._update_layer(data, window.viewport[2:])
+        if picture_kept:
+            self._layered.lay_over_picture(window, self._texture, self._covered, boxes)
+        else:
+            self._layered.lay_over_window(window, self._texture, self._covered)
+        return len(boxes) > 0
+
+    def lay_over_bytes(
+        self, data: imgui.ImDrawData, window: moderngl.Framebuffer, make: MakeBytes
+    ) -> None:
+        """The overlay of now over a picture that is made as bytes and that no window has yet: both
+        are laid together before GL has them, and all that it does is to copy.
+        """
+        self._update_layer(data, window.viewport[2:])
+        if self._bytes is None:
+            width, height = self._layer.size
+            self._bytes = np.empty((height, width, 4), np.uint8)
+        for left, top, right, low in self._unread:
+            self._bytes[top:low, left:right] = self._layer.read_box((left, top, right, low))
+        self._unread = []
+        boxes = np.array(self._covered, np.int32).reshape(-1, 4)
+        self._layered.show_bytes(make(overlay=WindowOverlay(self._bytes, boxes)), window)
+
+    @property
+    def _texture(self) -> moderngl.Texture:
+        (texture,) = self._layer.framebuffer.color_attachments
+        return texture
+
+    def _update_layer(self, data: imgui.ImDrawData, size: tuple[int, int]) -> list[PixelBox]:
+        """Boxes of the layer that were drawn anew."""
+        if self._layer.size != size:
+            self._layer.lay_out(size)
+            self._anew, self._bytes = True, None
+        self.update_textures()
+        lists = read_lists(data, self._lists)
+        if self._anew:
+            boxes = [(0, 0, *size)]
+        else:
+            boxes = boxes_of(tiles_of(changed_boxes(self._lists, lists), size), size)
+        if boxes:
+            self.draw_boxes(lists, boxes)
+            whole = self._anew or len(self._unread) + len(boxes) > MOST_UNREAD
+            self._unread = [(0, 0, *size)] if whole else [*self._unread, *boxes]
+            tiles = np.logical_or.reduce([each.tiles(size) for each in lists])
+            if self._tiles is None or not np.array_equal(tiles, self._tiles):
+                self._tiles, self._covered = tiles, boxes_of(tiles, size) if lists else []
+        self._lists, self._anew = lists, False
+        return boxes
+
+    def draw_boxes(self, lists: tuple[DrawList, ...], boxes: list[PixelBox]) -> None:
+        """What of the triangles lies in these boxes, on nothing."""
+        layer, ctx = self._layer.framebuffer, self.ctx
+        width, height = layer.size
+        with self._gpu.drawing_into(layer):
+            for left, top, right, low in boxes:
+                layer.clear(viewport=(left, height - low, right - left, low - top))
+            ctx.enable_only(moderngl.BLEND)
+            ctx.blend_equation, ctx.blend_func = moderngl.FUNC_ADD, OVER
+            for each in lists:
+                self._look_at((2 * each.scale[0] / width, 2 * each.scale[1] / height))
+                self._draw_list(each, boxes, height)
+            layer.scissor = None
+
+    def _draw_list(self, drawn: DrawList, boxes: list[PixelBox], height: int) -> None:
+        jobs: list[tuple[PixelBox, int, np.ndarray]] = []  # a box, a command, its triangles there
+        for box in boxes:
+            left, top, right, low = box
+            of = drawn.boxes
+            meets = (of[:, 0] <= right) & (of[:, 2] >= left) & (of[:, 1] <= low)
+            meets &= (of[:, 3] >= top) & (of[:, 0] <= of[:, 2])
+            (places,) = np.nonzero(meets)
+            commands = drawn.of_command[places]
+            jobs += [(box, c, places[commands == c]) for c in np.unique(commands).tolist()]
+        if not jobs:
+            return
+        indices = drawn.corners[np.concatenate([places for _, _, places in jobs])]
+        write(self._vertex_buffer, drawn.vertices)
+        write(self._index_buffer, np.ascontiguousarray(indices, INDEX).tobytes())
+        first = 0
+        for box, command, places in jobs:
+            clip, texture, _ = drawn.commands[command]
+            self.textures[texture].use(0)
+            self.ctx.scissor = within(scissor(clip, drawn.scale, height), box, height)
+            self._vertices.render(moderngl.TRIANGLES, vertices=3 * len(places), first=first)
+            first += 3 * len(places)
+
+    def shutdown(self) -> None:
+        self._layer.release()
+        self._layered.release()
+        self._gpu.release()
+        super().shutdown()
+
+
+def within(
+    clip: tuple[int, int, int, int], box: PixelBox, height: int
+) -> tuple[int, int, int, int]:
+    """What of GL's scissor lies in a box."""
+    left, below = max(clip[0], box[0]), max(clip[1], height - box[3])
+    right, above = min(clip[0] + clip[2], box[2]), min(clip[1] + clip[3], height - box[1])
+    return left, below, max(right - left, 0), max(above - below, 0)

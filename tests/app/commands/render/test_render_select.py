@@ -10,7 +10,7 @@ from shapeshift.runtime_models.stop_weights import StopBlend
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.control import Sweep, control_of, snap
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.selectors.read_selector import read_selector
+from shapeshift.scene.selectors.selector_texts import read_selector
 from tests.support.models import STOPS, random_package
 
 TINY = ["--size", "40x30", "--context", "none", "--camera", "front"]

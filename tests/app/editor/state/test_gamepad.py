@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from shapeshift.app.editor.state.camera.camera import FAST
-from shapeshift.app.editor.state.camera.gamepad import (
+from shapeshift.app.editor.window.devices.input_devices import (
     BUTTONS,
     DEAD,
     REST,

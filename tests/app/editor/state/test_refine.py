@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import shapeshift.app.editor.state.files.refine as refine
+import shapeshift.app.streaming.refine as refine
+from shapeshift.app.editor.desktop import attach_refiner
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.quality_controller import QualityController
 from shapeshift.app.editor.window.hooks import Hooks
-from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.streaming.refine import Refiner
 from shapeshift.runtime_models.model import BadFile
 from tests.support.splat_scenes import one_splat
 from tests.support.splats.sog_scenes import COUNTS, write_streamed

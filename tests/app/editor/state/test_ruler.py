@@ -2,7 +2,7 @@
 
 import pytest
 
-from shapeshift.app.editor.state.ruler import parse_length
+from shapeshift.app.inspection.window.ruler import parse_length
 
 
 @pytest.mark.parametrize(

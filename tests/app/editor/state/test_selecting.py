@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.path import Path as Outline
 
-from shapeshift.app.editor.state.parts.anchor_numbers import (
+from shapeshift.app.editor.state.parts.finder import in_box
+from shapeshift.app.editor.state.parts.parts_lit import (
     BINS,
     BRIGHTNESS,
     DISTANCE,
@@ -18,9 +19,7 @@ from shapeshift.app.editor.state.parts.anchor_numbers import (
     histogram_of,
     oklab,
 )
-from shapeshift.app.editor.state.parts.choosing import in_lasso, in_sphere, polygon_mask
-from shapeshift.app.editor.state.parts.finder import in_box
-from shapeshift.app.editor.state.parts.floaters import floaters
+from shapeshift.app.editor.state.parts.selecting import floaters, in_lasso, in_sphere, polygon_mask
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.scene.pose import Pose

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.state.camera.camera import EditorCamera, Push
-from shapeshift.app.editor.state.camera.space_mouse import (
+from shapeshift.app.editor.window.devices.space_mice import (
     DEAD,
     DOLLY,
     TURN,
     CapInput,
     CapState,
     cap_input,
+    cap_of_axes,
     share,
 )
-from shapeshift.app.editor.window.devices.space_mice import cap_of_axes
 from shapeshift.scene.pose import View, look_at
 
 REST = CapState()

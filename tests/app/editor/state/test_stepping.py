@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.state.camera.camera import EditorCamera, Push
-from shapeshift.app.editor.state.camera.stepping import (
+from shapeshift.app.editor.state.camera.viewpoint import (
     FLIGHT_S,
     Steps,
     between,

@@ -9,8 +9,8 @@ import pytest
 
 from shapeshift.app.editor.state.arrange import undo
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.film import style_work
-from shapeshift.app.editor.state.film.style_work import SHAPES, StyleWork
+from shapeshift.app.film.window import style_work
+from shapeshift.app.film.window.style_work import SHAPES, StyleWork
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.read_scene import read_model

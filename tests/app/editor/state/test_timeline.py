@@ -10,11 +10,10 @@ import pytest
 from shapeshift.app.editor.state.arrange import redo, undo
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.film.gallery import SIZE, Gallery, thinned
-from shapeshift.app.editor.state.film.preview import Preview
-from shapeshift.app.editor.state.film.program_child import ProgramChild
-from shapeshift.app.editor.state.film.rendering import Rendering
-from shapeshift.app.editor.state.film.timeline import CAMERA, STOP, Timeline
+from shapeshift.app.film.window.films import Preview
+from shapeshift.app.film.window.gallery import SIZE, Gallery, thinned
+from shapeshift.app.film.window.rendering import ProgramChild, Rendering
+from shapeshift.app.film.window.timeline import CAMERA, STOP, Timeline
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.framing import orbit_path

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.state.messages import LONGEST, MOST_PROBLEMS, NOTE_S, Messages
-from shapeshift.app.editor.state.split_state import SplitState, name_of
+from shapeshift.app.editor.state.shown_scene import SplitState, name_of
 from shapeshift.app.editor.state.track import Grip, Track, half_ways, next_stop, read_x, stepped
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.scene.control import SNAP, Shift

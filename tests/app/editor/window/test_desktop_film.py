@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.panels import panel
-from shapeshift.app.editor.state.film.timeline import CAMERA, STOP
 from shapeshift.app.editor.window.window import Drop
+from shapeshift.app.film.window.timeline import CAMERA, STOP
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.film.film_file import read_film_file
 from tests.support.desktop.desktop_stand import run_frames

@@ -10,7 +10,7 @@ import pytest
 from shapeshift.app.editor.state.camera.framed import SETTLED_S
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window import monitor
-from shapeshift.app.editor.window.split import splitting
+from shapeshift.app.editor.window.two_pictures import splitting
 from shapeshift.app.editor.window.window import Drag
 from shapeshift.renderer.renderer import Renderer
 from tests.support.desktop.desktop_stand import run_frames
@@ -190,11 +190,11 @@ def test_settings_that_cannot_be_kept_are_said_once(any_size, display, tmp_path)
 def test_no_slider_of_the_panel_lies_over_its_number(any_size, monkeypatch):
     """The line of text ends above the bar with the knob."""
     from shapeshift.app.editor.panels import panel
-    from shapeshift.app.editor.panels.sections import performance_panel, quality_panel
+    from shapeshift.app.editor.panels.sections import plain_sections, quality_panel
     from shapeshift.app.editor.panels.widgets import panel_rows
 
     monkeypatch.setattr(panel, "section", lambda *_, **__: True)
-    for module in (performance_panel, quality_panel):
+    for module in (plain_sections, quality_panel):
         monkeypatch.setattr(module, "subsection", lambda *_, **__: True)
     lines: list[float] = []
     labels, plain = [], panel_rows.imgui.text_unformatted

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.app.editor.desktop import Options, Viewer
+from shapeshift.app.editor.desktop import Options, Viewer, attach_refiner
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
-from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.scene_objects import scene_of
-from shapeshift.app.editor.window.levels import attach_refiner
+from shapeshift.app.streaming.refine import Refiner
 from shapeshift.renderer.renderer import Renderer
 from tests.support.desktop.desktop_stand import run_frames, start, until_opened
 from tests.support.splats.sog_scenes import random_sog, rewrite, write_folder, write_streamed

@@ -4,14 +4,9 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.panels import panel
-from shapeshift.app.editor.panels.keys_sheet import GROUPS, spread
-from shapeshift.app.editor.panels.sections import (
-    appearance_panel,
-    named_views_panel,
-    performance_panel,
-    quality_panel,
-)
-from shapeshift.app.editor.panels.widgets.path_box import can_browse
+from shapeshift.app.editor.panels.sections import camera_panel, plain_sections, quality_panel
+from shapeshift.app.editor.panels.widgets.boxes import can_browse
+from shapeshift.app.editor.window.shell import GROUPS, spread
 from shapeshift.app.paths import TOUCH
 from tests.support.desktop.desktop_stand import run_frames, until_opened
 from tests.support.desktop.objects_stand import names
@@ -29,7 +24,7 @@ def unfolded(monkeypatch):
         return True
 
     monkeypatch.setattr(panel, "section", opened)
-    for module in (appearance_panel, named_views_panel, performance_panel, quality_panel):
+    for module in (plain_sections, camera_panel, plain_sections, quality_panel):
         monkeypatch.setattr(module, "subsection", opened)
     return seen
 
@@ -115,18 +110,18 @@ def test_every_key_that_does_something_stands_on_the_sheet(viewer):
     import inspect
     import re
 
-    from shapeshift.app.editor.window import hands, objects, shell, split, touch, two_pictures
+    from shapeshift.app.editor.window import hands, objects, shell, touch, two_pictures
     from shapeshift.app.editor.window import window as window_module
 
     told = " ".join(key for rows in GROUPS.values() for key, _ in rows)
-    more = (touch.KEYS, objects.KEYS, split.KEYS)
+    more = (touch.KEYS, objects.KEYS, two_pictures.KEYS)
     told += " " + " ".join(key for rows in more for key, _ in rows)
     names = {
         "SPACE": "Space", "TAB": "Tab", "ESCAPE": "Esc", "DELETE": "Delete", "COMMA": ",",
         "PERIOD": ".", "LEFT": "left", "RIGHT": "right", "KP_1": "numpad 1", "KP_3": "3",
         "KP_7": "7", "KP_5": "numpad 5", "1": "1", "9": "9",
     }  # fmt: skip
-    parts = (hands, objects, shell, split, touch, two_pictures)
+    parts = (hands, objects, shell, two_pictures, touch, two_pictures)
     source = "".join(inspect.getsource(part) for part in parts)
     found = set(re.findall(r"glfw\.KEY_(\w+)", source))
     found -= {"LEFT_SHIFT", "RIGHT_SHIFT", "LEFT_CONTROL", "RIGHT_CONTROL"}

@@ -2,16 +2,16 @@
 
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.sections.look_panel import draw_look
 from shapeshift.app.editor.panels.sections.objects_panel import draw_object_list
+from shapeshift.app.editor.panels.sections.plain_sections import draw_look
 from shapeshift.app.editor.panels.sections.stops_panel import draw_stops
 from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.panels.slider import draw_slider
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.headset import DEMO, Options
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.panel_picture import UI_SCALE, PanelPicture
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.vr.panel.plane import NOBODY
 from tests.support.desktop.widgets import Widgets
 

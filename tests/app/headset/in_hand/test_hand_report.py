@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shapeshift.app.headset.headset import Options
-from shapeshift.app.headset.in_hand.probe import REPORT_PX, Probe
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.panel_picture import PanelPicture
+from shapeshift.app.headset.scene_shelf import open_xr
+from shapeshift.app.inspection.window.probe import REPORT_PX, Probe
 from shapeshift.app.paths import DEMO
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.state.arrange import undo
-from shapeshift.app.headset.in_hand.held_shapes import REACH_M
+from shapeshift.app.headset.in_hand.hand_tools import REACH_M
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.sections.section import BoxShape, PlaneShape, moved_shape
 from shapeshift.vr.frame import LOST, SIDES

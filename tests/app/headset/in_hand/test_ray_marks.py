@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.state.inspecting import Inspecting
 from shapeshift.app.headset.headset import Options
-from shapeshift.app.headset.in_hand.probe import Probe
-from shapeshift.app.headset.in_hand.ray_marks import LENGTHS, POINTS_EVERY_S
 from shapeshift.app.headset.in_hand.tools_drawn import with_tools, words
-from shapeshift.app.headset.open_xr import open_xr
+from shapeshift.app.headset.scene_shelf import open_xr
+from shapeshift.app.inspection.window.inspecting import Inspecting
+from shapeshift.app.inspection.window.probe import Probe
+from shapeshift.app.inspection.window.ray_marks import LENGTHS, POINTS_EVERY_S
 from shapeshift.app.paths import DEMO
 from shapeshift.renderer.colors.palette import ALL_VALUES
 from shapeshift.runtime_models.model import BadFile

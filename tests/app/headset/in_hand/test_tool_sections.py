@@ -9,10 +9,10 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.texts.table import ENGLISH, said, use_language
 from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.in_hand.finger_brush import FIRST_M
-from shapeshift.app.headset.in_hand.ray_marks import LENGTHS
-from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
+from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.headset.xr_user import XrState
+from shapeshift.app.inspection.window.ray_marks import LENGTHS
 from shapeshift.app.paths import DEMO
 from shapeshift.renderer.colors.palette import ALL_VALUES
 from shapeshift.scene.document.read_scene_file import read_scene_file

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.colors.false_colors import Heat, Shade, mixed_colors, split_colors
-from shapeshift.renderer.colors.heat import Heater
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.gl import shader
 from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.decode import Heater
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.scene import Scene, SceneObject

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.splats.plain_splats import RawSplats
-from shapeshift.runtime_models.splats.read_labels import (
+from shapeshift.runtime_models.splats.formats import (
     CLASSIFIER,
     most_likely,
     read_classifier,
     with_labels,
 )
+from shapeshift.runtime_models.splats.plain_splats import RawSplats
 from tests.support.splats.torch_files import write_tensors
 
 

@@ -34,7 +34,7 @@ def test_a_colour_and_a_thermal_cloud_become_two_stops(tmp_path, color, thermal)
         ("RGB", 0.0, "rgb"), ("Thermal", 1.0, "thermal"),
     ]  # fmt: skip
     assert model.mode == "exclusive" and np.bincount(model.layer).tolist() == [3, 5]
-    np.testing.assert_array_equal(model.weights(0.25), np.float32([0.75, 0.25]))
+    np.testing.assert_array_equal(model.weights(0.25), np.array([0.75, 0.25], np.float32))
     alone = read_plain(tmp_path / thermal)
     np.testing.assert_array_equal(model.means[3:], alone.means)
     np.testing.assert_array_equal(model.sh[3:], alone.sh)

@@ -5,8 +5,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.splats.lod.leaves import Leaves, Tree, cut_leaves
-from shapeshift.runtime_models.splats.lod.levels import count_levels, make_levels
 from shapeshift.runtime_models.splats.operations.merge_pairs import (
     COLOR,
     merging_losses,
@@ -14,6 +12,13 @@ from shapeshift.runtime_models.splats.operations.merge_pairs import (
     pair_costs,
 )
 from shapeshift.runtime_models.splats.operations.moment_matching import merge_groups, shown_area
+from shapeshift.runtime_models.splats.sog.write_streamed import (
+    Leaves,
+    Tree,
+    count_levels,
+    cut_leaves,
+    make_levels,
+)
 from tests.support.splat_scenes import random_layers, shell
 
 
@@ -36,7 +41,7 @@ def test_leaves_hold_every_splat_once_and_none_too_many(count):
 
 def test_leaves_are_apart():
     """The two halves at the top do not overlap along the side that was cut: the longest."""
-    means = random_layers(1000).means * np.float32([1, 5, 1])
+    means = random_layers(1000).means * np.array([1, 5, 1], np.float32)
     leaves = cut_leaves(means, 64)
     half = np.isin(leaves.of_splat, flattened(leaves.tree[0]))
     assert means[half, 1].max() <= means[~half, 1].min()

@@ -13,12 +13,12 @@ from scipy.spatial import cKDTree
 from shapeshift.runtime_models.files import memory
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.splats.lod import levels as module_levels
 from shapeshift.runtime_models.splats.operations.decimate import decimate
 from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.sog import sh_palette
 from shapeshift.runtime_models.splats.sog import write_streamed as module
+from shapeshift.runtime_models.splats.sog import write_streamed as module_levels
 from shapeshift.runtime_models.splats.sog.read_streamed import levels, read_level, read_tree
 from shapeshift.runtime_models.splats.sog.sh_palette import LEAST_WEIGHT, make_palette
 from shapeshift.runtime_models.splats.sog.write_sog import (
@@ -102,7 +102,7 @@ def test_progress_is_of_the_time_that_each_piece_takes(coefficients):
 
 
 def test_numbers_of_a_codebook_are_short_and_exact():
-    book = np.float32([-1e30, -0.1, -0.0, 1e-38, 1 / 3, 0.1, 1.0, 16777217, 3.4e38])
+    book = np.array([-1e30, -0.1, -0.0, 1e-38, 1 / 3, 0.1, 1.0, 16777217, 3.4e38], np.float32)
     book = np.concatenate([book, np.random.default_rng(0).normal(size=2000).astype(np.float32)])
     text = json.dumps(shortest(book))
     assert np.float32(json.loads(text)).tobytes() == book.tobytes()

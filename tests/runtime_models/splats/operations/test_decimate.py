@@ -12,7 +12,11 @@ from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splat_motion import SplatMotion
-from shapeshift.runtime_models.splats.operations.decimate import MERGING, decimate
+from shapeshift.runtime_models.splats.operations.decimate import (
+    MERGING,
+    decimate,
+    prune_by_importance,
+)
 from shapeshift.runtime_models.splats.operations.merge_pairs import (
     AT_ONCE,
     COLOR,
@@ -28,7 +32,6 @@ from shapeshift.runtime_models.splats.operations.merge_pairs import (
     pair_groups,
 )
 from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
-from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.support.renderer.rasterizer_reference import render_reference
@@ -120,8 +123,9 @@ def test_crossed_needles_are_not_cheap():
     """1 to 30,000: float32 knows nothing of their areas, and never says that merging is free."""
     layers = at_places(np.zeros((2, 3)))
     layers = replace(
-        layers, scales=np.float32([[3, 1e-4, 1e-4]] * 2), opacity=np.float32([0.5, 0.5]),
-        wxyz=np.float32([[1, 0, 0, 0], [0.6, 0.2, 0.6, 0.48989795]]),
+        layers, scales=np.array([[3, 1e-4, 1e-4]] * 2, np.float32),
+        opacity=np.array([0.5, 0.5], np.float32),
+        wxyz=np.array([[1, 0, 0, 0], [0.6, 0.2, 0.6, 0.48989795]], np.float32),
     )  # fmt: skip
     mixture = mixture_of(layers)
     (cost,) = pair_costs(mixture[:, :1], mixture[:, 1:])

@@ -100,7 +100,7 @@ def test_what_is_shown_is_kept_up_to_an_opacity_of_one():
     assert 0 < full.sum() < len(full)
     np.testing.assert_allclose(after[~full], before[~full], rtol=1e-5)
     assert (after[full] <= before[full] * (1 + 1e-5)).all()
-    two = replace(random_layers(2), opacity=np.float32([0.9, 0.9]))
+    two = replace(random_layers(2), opacity=np.array([0.9, 0.9], np.float32))
     two = two.with_rows([0, 0])  # one over the other: 1.8 of one area
     (one,) = merge(two, np.zeros(2, int)).opacity
     assert one == 1
@@ -110,7 +110,7 @@ def test_what_is_shown_is_kept_up_to_an_opacity_of_one():
 
 def test_equal_splats_keep_place_shape_and_colour():
     """Of opacity 0.3 each, three of them have 0.9 together."""
-    one = replace(random_layers(1, seed=3), opacity=np.float32([0.3]))
+    one = replace(random_layers(1, seed=3), opacity=np.array([0.3], np.float32))
     merged = merge(one.with_rows([0, 0, 0]), np.zeros(3, int))
     np.testing.assert_allclose(covariances(merged), covariances(one), rtol=1e-5, atol=1e-12)
     np.testing.assert_allclose(merged.opacity, 0.9, rtol=1e-6)
@@ -122,7 +122,8 @@ def test_who_is_alone_keeps_every_bit_and_columns_are_of_who_shows_most():
     layers = random_layers(6, layers=2)
     layers = replace(
         layers, labels=np.arange(6, dtype=np.int32), extra={"own": np.arange(6, dtype=np.uint8)},
-        opacity=np.float32([0.1, 0.1, 0.9, 0.1, 0.1, 0.1]), scales=np.full((6, 3), 0.1, np.float32),
+        opacity=np.array([0.1, 0.1, 0.9, 0.1, 0.1, 0.1], np.float32),
+        scales=np.full((6, 3), 0.1, np.float32),
         antialiased=True, origin=(1e6, 0.0, 5.0),
     )  # fmt: skip
     merged = merge(layers, np.array([5, 1, 5, 3, 1, 5]))
@@ -161,11 +162,11 @@ def test_what_shows_nothing_or_reaches_far_stays_finite():
     for name, value in (("scales", huge), ("scales", none), ("opacity", none), ("means", huge)):
         odd = replace(layers, **{name: np.full_like(getattr(layers, name), value)})
         assert merge(odd, np.arange(8) // 2).splat_count == 4
-    ends = replace(layers.with_rows([0, 1]), means=np.float32([[-3e38] * 3, [3e38] * 3]))
+    ends = replace(layers.with_rows([0, 1]), means=np.array([[-3e38] * 3, [3e38] * 3], np.float32))
     assert merge(ends, np.zeros(2, int)).splat_count == 1
     unseen = replace(layers, opacity=np.zeros(8, np.float32))
     middle = merge(unseen, np.arange(8) // 2)
     np.testing.assert_allclose(middle.means, layers.means.reshape(4, 2, 3).mean(1), rtol=1e-5)
     assert (middle.opacity == 0).all()
-    needles = replace(layers, scales=np.float32([[10, 1e-5, 1e-5]] * 8))
+    needles = replace(layers, scales=np.array([[10, 1e-5, 1e-5]] * 8, np.float32))
     assert (merge(needles, np.arange(8) // 2).scales.max(axis=1) > 5).all()

@@ -8,7 +8,7 @@ import pytest
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.layers.read_layers import join_layers
-from shapeshift.runtime_models.splats.operations.prune_by_importance import (
+from shapeshift.runtime_models.splats.operations.decimate import (
     certain_ones,
     evenly,
     largest,
@@ -134,7 +134,9 @@ def test_parts_share_the_first_origin_and_all_columns():
     layers = join_layers(parts, (Stop("a", 0.0), Stop("b", 1.0)), "", ["a", "b"])
     assert parts == [] and layers.origin == (1e6, 0.0, 0.0) and layers.antialiased
     np.testing.assert_array_equal(layers.means[:3], a.means)
-    np.testing.assert_allclose(layers.means[3:], b.means + np.float32([10, 5, 0]), atol=1e-6)
+    np.testing.assert_allclose(
+        layers.means[3:], b.means + np.array([10, 5, 0], np.float32), atol=1e-6
+    )
     assert layers.means.dtype == np.float32 and layers.extra["b"].dtype == np.uint8
     assert layers.extra["a"].tolist() == [0, 1, 2, 0, 0, 0, 0]
     assert layers.extra["b"].tolist() == [0, 0, 0, 0, 1, 2, 3]

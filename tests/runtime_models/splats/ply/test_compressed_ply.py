@@ -9,7 +9,7 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.formats import format_of, read_plain
-from shapeshift.runtime_models.splats.operations.morton import morton_order
+from shapeshift.runtime_models.splats.operations.merge_pairs import morton_order
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.ply.read_compressed_ply import (
     from_smallest_three,

@@ -8,9 +8,13 @@ import pytest
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import format_of
-from shapeshift.runtime_models.splats.operations.knn_distance import knn_distance, nearest_distances
 from shapeshift.runtime_models.splats.plain_splats import Reading
-from shapeshift.runtime_models.splats.ply.read_points_ply import SIGMA, read_raw_points_ply
+from shapeshift.runtime_models.splats.ply.read_points_ply import (
+    SIGMA,
+    knn_distance,
+    nearest_distances,
+    read_raw_points_ply,
+)
 
 C0 = 0.28209479177387814
 TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "u2": "ushort", "i4": "int"}

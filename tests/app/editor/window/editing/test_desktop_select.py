@@ -11,7 +11,7 @@ import pytest
 
 from shapeshift.app.editor.state.files.exporting import PACKAGE
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source
-from shapeshift.app.editor.state.parts.anchor_numbers import BINS, SIZE
+from shapeshift.app.editor.state.parts.parts_lit import BINS, SIZE
 from shapeshift.app.editor.state.parts.selecting import COLOR, LASSO, SPHERE, THING
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package

@@ -8,7 +8,7 @@ import pytest
 from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.panels import panel
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.window.split import splitting
+from shapeshift.app.editor.window.two_pictures import splitting
 from shapeshift.renderer.colors.heat_over_shape import heat_over_shape
 from shapeshift.renderer.renderer import Renderer
 from tests.support.desktop.desktop_stand import ball, run_frames

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.panels import panel
-from shapeshift.app.editor.panels.sections import appearance_panel, named_views_panel
-from shapeshift.app.editor.state.camera.gamepad import REST, PadState
+from shapeshift.app.editor.panels.sections import camera_panel, plain_sections
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source
+from shapeshift.app.editor.window.devices.input_devices import REST, PadState
 from shapeshift.scene.appearance import NEUTRAL, Sky
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from tests.support.desktop.desktop_stand import ball, run_frames
@@ -31,7 +31,7 @@ def widgets(viewer, monkeypatch, request):
     """With one section alone, so that nothing has to be scrolled to."""
     wanted = "Look" if "look" in request.node.name or "chosen" in request.node.name else "Camera"
     monkeypatch.setattr(panel, "section", lambda name, *_, **__: name == wanted)
-    for module in (appearance_panel, named_views_panel):
+    for module in (plain_sections, camera_panel):
         monkeypatch.setattr(module, "subsection", lambda *_: True)
     found = Widgets(monkeypatch)
     run_frames(viewer, 3)

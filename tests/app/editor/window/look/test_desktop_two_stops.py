@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.window.split import splitting
+from shapeshift.app.editor.window.two_pictures import splitting
 from shapeshift.app.editor.window.window import KeyDown
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile

@@ -7,12 +7,11 @@ import glfw
 import numpy as np
 import pytest
 
-from shapeshift.app.commands.compare_sides import SceneSide
+from shapeshift.app.commands.compared import SceneSide
 from shapeshift.app.document import Document
-from shapeshift.app.editor.desktop import Options, Viewer
+from shapeshift.app.editor.desktop import KEYS, Options, Viewer, Wipe
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.window.window import Drag, KeyDown, Press, Release
-from shapeshift.app.editor.window.wipe import KEYS, Wipe
 from shapeshift.renderer.renderer import Renderer
 from tests.support.desktop.desktop_stand import ball, run_frames
 

@@ -1,1 +1,0 @@
-"""Sections in the window."""

@@ -1,1 +1,0 @@
-"""GL passes of debug pictures: overdraw, edges of splats."""
