@@ -204,7 +204,7 @@ def progress_after(seconds: float) -> Iterator:
     def progress(what: str, part: float) -> None:
         nonlocal bar, task
         words.text = f"{what}, {part:.0%}"
-        if bar is None:
+        if bar is None or task is None:
             if time.monotonic() - began < seconds:
                 return
             bar = progress_bar()

@@ -76,7 +76,7 @@ def change_rows(change: SceneChange, names: tuple[str, str], origin: np.ndarray)
 
 def csv_text(change: SceneChange, origin: np.ndarray) -> str:
     text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer: csv.DictWriter[str] = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(place_row(place, origin) for place in change.places)
     return text.getvalue()

@@ -169,7 +169,8 @@ def drawn_views(options: Options, views: list, a, b) -> Iterator[Compared]:
         if files is None:
             with Renderer(ctx, renderer.backends["drawing"].split()[0]) as other:
                 draw_b = artist(other, b, background)
-                others = moved(views, a.subject.origin - b.subject.origin)
+                shift = a.subject.origin - b.subject.origin  # pyright: ignore[reportAttributeAccessIssue]
+                others = moved(views, shift)
                 for i, (view, same) in enumerate(zip(views, others, strict=True)):
                     yield Compared(f"{i:04d}", draw_a(view), draw_b(same))
             return

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.model import (
@@ -20,7 +21,9 @@ from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 ONLY = (Stop("only", 0.0),)
 
 
-def splats(means, scales, opacity=0.8, color=(1.0, 0.5, 0.2), wxyz=(1, 0, 0, 0)) -> SplatLayers:
+def splats(
+    means, scales, opacity: ArrayLike = 0.8, color=(1.0, 0.5, 0.2), wxyz=(1, 0, 0, 0)
+) -> SplatLayers:
     """Plain splats; what is given once holds for all of them.  color: display sRGB."""
     means = np.asarray(means, np.float32).reshape(-1, 3)
     count = len(means)

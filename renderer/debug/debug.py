@@ -150,8 +150,8 @@ def debug_image(
     antialiased = tuple(is_antialiased(obj.model) for obj in scene.objects)
     reason, pixel, depth = classify(points, poses, view, settings, antialiased)
     numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
-    reasons: tuple[str, ...] = ("drawn", *CULL_REASONS)
-    facts = dict(zip(reasons, map(float, numbers), strict=True))
+    reasons = ("drawn", *CULL_REASONS)
+    facts: dict[str, float] = dict(zip(reasons, map(float, numbers), strict=True))
     colors = np.asarray([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)], np.float32)
     if settings.debug == "birdseye":
         picture, metres = birdseye(points, poses, reason, colors, view, settings)

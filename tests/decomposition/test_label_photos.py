@@ -150,7 +150,7 @@ def test_without_a_network_the_walk_labels_anchors(photos, specs):
     assert set(masks) == {spec.label for spec in specs.objects}
     from shapeshift.decomposition.masks.anchor_walk import nodes_of
 
-    nodes = nodes_of(demo().model, np.float32([0, 0.6, 1.8]))
+    nodes = nodes_of(demo().model, np.array([0, 0.6, 1.8], np.float32))
     true = labels_of_places(nodes.means)[0]
     for spec in specs.objects:
         one, other = labels[nodes.rows] == spec.label, true == spec.label
@@ -167,7 +167,7 @@ def test_with_true_masks_the_walk_is_nearly_the_truth(photos, specs, tmp_path):
     labels, _ = walk_objects(demo(), photos, ObjectSpecs(tmp_path, tuple(objects)))
     from shapeshift.decomposition.masks.anchor_walk import nodes_of
 
-    nodes = nodes_of(demo().model, np.float32([0, 0.6, 1.8]))
+    nodes = nodes_of(demo().model, np.array([0, 0.6, 1.8], np.float32))
     true = labels_of_places(nodes.means)[0]
     found = []
     for spec in specs.objects:

@@ -80,7 +80,7 @@ def test_plain_splats_are_counted_one_by_one(device):
     rng = np.random.default_rng(0)
     model = SplatLayers(
         rng.normal(size=(30, 3)).astype(np.float32), np.full((30, 3), 0.1, np.float32),
-        np.tile(np.float32([1, 0, 0, 0]), (30, 1)), np.full(30, 0.8, np.float32),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (30, 1)), np.full(30, 0.8, np.float32),
         np.zeros((30, 1, 3), np.float32), np.zeros(30, np.int32), (Stop("RGB", 0.0),),
     )  # fmt: skip
     shown = ShownAnchors(device, model)

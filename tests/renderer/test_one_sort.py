@@ -107,7 +107,7 @@ def test_both_eyes_share_it(renderer):
 def test_splats_of_one_depth_keep_the_order_of_the_objects(renderer):
     """A tie goes to the earlier object, as to the earlier splat of one cloud, in all back ends."""
     cloud = random_layers(400, coefficients=1)
-    flat = replace(cloud, means=cloud.means * np.float32([1, 1, 0]))
+    flat = replace(cloud, means=cloud.means * np.array([1, 1, 0], np.float32))
     view = straight_view()
     one, other = cut(flat, 0, 200), cut(flat, 200, 400)
     for parts in ([one, other], [other, one]):

@@ -168,7 +168,7 @@ def test_nothing_in_front_is_a_clean_image(renderer, scene):
     np.testing.assert_array_equal(image, 0)
     renderer.settings = RenderSettings(background=(0.1, 0.2, 0.3))
     np.testing.assert_array_equal(
-        renderer.resolved(), np.broadcast_to(np.float32([0.1, 0.2, 0.3]), (16, 32, 3))
+        renderer.resolved(), np.broadcast_to(np.array([0.1, 0.2, 0.3], np.float32), (16, 32, 3))
     )
 
 

@@ -200,7 +200,7 @@ def test_eval_knows_where_the_zeros_of_scene_and_capture_lie(device, balls, zero
     for away in ((0, 0, 0), (1.0, -0.5, 2.0), (-1000.0, 0.0, 1000.0)):
         moved = replace(
             wall,
-            means=(wall.means - np.float32(away)).astype(np.float32),
+            means=(wall.means - np.array(away, np.float32)).astype(np.float32),
             origin=tuple(np.add(zero, away).tolist()),
         )
         found = evaluate_model(device, moved, capture)["RGB"]
@@ -216,7 +216,7 @@ def wall_of(capture: Capture) -> SplatLayers:
     return SplatLayers(
         capture.points,
         np.full((count, 3), 0.01, np.float32),
-        np.tile(np.float32([1, 0, 0, 0]), (count, 1)),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)),
         ones * np.float32(0.99),
         np.zeros((count, 1, 3), np.float32),
         np.arange(count, dtype=np.int32) % 2,

@@ -159,15 +159,17 @@ def test_edges_creases_and_what_is_not_known_pull_nothing(device):
         ([front] * 4, [np.nan, 0.9, np.nan, 0.9], 3),
     )
     for normals, through, known in cases:
-        frame = RasterFrame(None, device.upload(np.float32([through])), None)
-        drawn = DepthFrame(frame, None, device.upload(np.float32([[1, 2, 3, 4]])))
+        frame = RasterFrame(None, device.upload(np.array([through], np.float32)), None)
+        drawn = DepthFrame(frame, None, device.upload(np.array([[1, 2, 3, 4]], np.float32)))
         target = loss.target(np.array([normals], np.int8), view)
         assert target.known == known
         for grad in loss.compare(drawn, target, 1.0):
             assert not device.download(grad).any()
         assert loss.value() == 0
-    half = RasterFrame(None, device.upload(np.float32([[0.5] * 4])), None)  # exactly half counts
-    drawn = DepthFrame(half, None, device.upload(np.float32([[1, 2, 3, 4]])))
+    half = RasterFrame(
+        None, device.upload(np.array([[0.5] * 4], np.float32)), None
+    )  # exactly half counts
+    drawn = DepthFrame(half, None, device.upload(np.array([[1, 2, 3, 4]], np.float32)))
     target = loss.target(np.array([[front] * 4], np.int8), view)
     assert device.download(loss.compare(drawn, target, 1.0)[0]).all() and loss.value() > 0.1
 

@@ -150,7 +150,8 @@ def draw_together(device: Device, parts: list[AnchorModel], view: View) -> np.nd
         device.upload(np.concatenate(each).astype(np.float32))
         for each in zip(*columns, strict=True)
     ]
-    projected = project(device, *arrays, Camera(*view.pinhole(), view.size, view.near))
+    camera = Camera(*view.pinhole(), view.size, view.near)
+    projected = project(device, *arrays, camera=camera)
     tiles = bin_tiles(device, projected, view.size)
     return rasterize_rgba(device, projected, tiles, view.size).copy()
 

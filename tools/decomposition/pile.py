@@ -72,7 +72,7 @@ def load_pile(data: Path) -> SplatLayers:
     arrays = [c.astype(f) for c in columns]
     stops = read_model(sorted((data / "cube").glob("*.splat"))[0]).stops
     layer = np.zeros(len(labels), np.int32)
-    return SplatLayers(*arrays, layer, stops, labels=labels.astype(np.int32))
+    return SplatLayers(*arrays, layer=layer, stops=stops, labels=labels.astype(np.int32))
 
 
 def cameras(count: int) -> list[View]:
@@ -103,6 +103,7 @@ def quality_rows(pile: SplatLayers) -> tuple[list[str], np.ndarray]:
     views = [LabelledView(v, 0.0, truth.label_map(v, 0.0)) for v in poses[:VIEWS]]
     tests = [(v, truth.label_map(v, 0.0)) for v in poses[VIEWS:]]
     rows, evidence = [], None
+    assert true is not None
     for number in (VIEWS, 12, 6):
         sums = gather_evidence(device, pile, views[:number], count)
         evidence = sums if evidence is None else evidence

@@ -36,7 +36,7 @@ from shapeshift.decomposition.propagate import Judged, Support, merge, propagate
 from shapeshift.decomposition.score import mean_score, score_maps  # noqa: E402
 from shapeshift.decomposition.shown import ShownAnchors  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
-from shapeshift.runtime_models.model import ObjectLabel  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome  # noqa: E402
@@ -177,7 +177,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    shown = ShownAnchors(open_device("cpu"), read_model(DEMO))
+    model = read_model(DEMO)
+    assert isinstance(model, AnchorModel)
+    shown = ShownAnchors(open_device("cpu"), model)
     every = [(view, label_map(view)) for view in dome(OF, 0.0, SIZE)]
     tests = [(view, label_map(view)) for view in dome(TESTS, 0.17, SIZE)]
     rows = []

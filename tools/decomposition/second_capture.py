@@ -111,14 +111,14 @@ def register(device: Device, cut: Cut, looks: AnchorLooks, photos: list) -> np.n
     """
     random, weight = np.random.default_rng(0), 0.3 * cut.reach
     points = tones(looks, np.flatnonzero(looks.there)), tones(cut.looks, cut.known)
-    few = [p[random.permutation(len(p))[:300]] for p in points]
+    few, others = (p[random.permutation(len(p))[:300]] for p in points)
     centres = [(np.percentile(p[:, :3], 1, 0) + np.percentile(p[:, :3], 99, 0)) / 2 for p in points]
     found = []
     for _ in range(STARTS):
         q = random.standard_normal(4)
         start = Pose(np.zeros(3), q / np.linalg.norm(q)).matrix()
         start[:3, 3] = centres[1] - start[:3, :3] @ centres[0]
-        found.append(icp(*few, start, weight))
+        found.append(icp(few, others, start, weight))
     distinct: list[np.ndarray] = []
     for pose, _ in sorted(found, key=lambda each: each[1]):
         if all(np.trace(pose[:3, :3].T @ each[:3, :3]) < 2.9 for each in distinct):  # 18 degrees

@@ -186,8 +186,9 @@ def rows_of(device: Device, asked: argparse.Namespace, folder: Path) -> Iterator
             word = verdict_of(before, after, agreeing)
             yield row(way, f"{agreeing:.2f}", counts, after, ["", ""], seconds, word)
             begun = time.process_time()
-        second = second_capture(device, cut, folder, asked.seconds, asked.held)
-        for way, iou, parts, *counts, off in by_second_capture(device, cut, *second, asked.held):
+        model, photos = second_capture(device, cut, folder, asked.seconds, asked.held)
+        merged = by_second_capture(device, cut, model, photos, asked.held)
+        for way, iou, parts, *counts, off in merged:
             seconds = time.process_time() - begun
             after, shown = score(device, parts, truth)
             sheet.append(shown)

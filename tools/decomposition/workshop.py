@@ -106,7 +106,7 @@ def speed_rows(device: Device, model: AnchorModel) -> list[str]:
         shown = []
         for v in views:
             camera = Camera(*v.view.pinhole(), SIZE, v.view.near, v.view.widest_tangents())
-            projected = project(device, *splats, camera)
+            projected = project(device, *splats, camera=camera)
             shown.append((projected, bin_tiles(device, projected, SIZE)))
         return shown
 
@@ -114,11 +114,11 @@ def speed_rows(device: Device, model: AnchorModel) -> list[str]:
 
     def weigh() -> None:
         for pair, labels in zip(shown, sixteen, strict=True):
-            evidence.add(*pair, labels)
+            evidence.add(pair[0], pair[1], labels)
 
     def draw() -> None:
         for pair in shown:
-            rasterize_rgba(device, *pair, SIZE)
+            rasterize_rgba(device, pair[0], pair[1], SIZE)
 
     found = {}
     for name, work in (("lists", lists), ("evidence", weigh), ("draw", draw)):

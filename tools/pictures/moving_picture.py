@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -85,7 +86,7 @@ def touch_frames(renderer: ss.Renderer) -> Iterator[Image.Image]:
         picture = to_image(renderer.render(step.scene, view))
         draw_hand(picture, view, acts, step.seconds)
         (x,) = (each.x for each in step.scene.objects if each.name == THROWN)
-        draw_slider(picture, states, float(x))
+        draw_slider(picture, states, float(cast(Any, x)))
         yield picture
 
 
@@ -104,7 +105,7 @@ def to_image(picture: np.ndarray) -> Image.Image:
     return Image.fromarray((np.clip(whole, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
-def draw_slider(picture: Image.Image, stops: dict[str, float], x: float) -> None:
+def draw_slider(picture: Image.Image, stops: dict[str, Any], x: float) -> None:
     """The track with the names of the stops, the nearest one bright, and the knob at x."""
     draw, font = ImageDraw.Draw(picture), ImageFont.load_default(13)
     left, right, y = 70, SIZE[0] - 70, SIZE[1] + BAND - 11

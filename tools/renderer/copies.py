@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import product
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -135,7 +136,9 @@ def measure(
     row |= memory_of(renderer)
     assert stats.streaming is not None
     row["splats"] = stats.streaming.shown
-    row["copies_drawn"] = len(np.unique(renderer.drawing.paged.owner)) - 1  # -1: free pages
+    row["copies_drawn"] = (
+        len(np.unique(cast(Any, renderer.drawing).paged.owner)) - 1
+    )  # -1: free pages
     row["frame_cpu_ms"] = frames(renderer, scene, step, np.zeros(STILL))
     renderer.streaming.converges = False
     walk = WALK_QUADS if name == "quads" else WALK
@@ -156,7 +159,7 @@ def frames(renderer: Renderer, scene: Scene, step: float, parts: np.ndarray) -> 
 
 
 def memory_of(renderer: Renderer) -> dict:
-    drawing = renderer.drawing
+    drawing = cast(Any, renderer.drawing)  # of either kind
     pages = drawing.paged
     if renderer.backends["drawing"].startswith("quads"):
         arena = drawing.arena

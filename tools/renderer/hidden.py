@@ -114,7 +114,8 @@ def made_of(model, case: Case):
         arrays = [np.concatenate([a] * side**2) for a in arrays]
     order = morton_order(means)
     arrays = [np.ascontiguousarray(a[order], np.float32) for a in (means, *arrays)]
-    return SplatLayers(*arrays, np.zeros(len(order), np.int32), (Stop("all", 1.0),))
+    layer = np.zeros(len(order), np.int32)
+    return SplatLayers(*arrays, layer=layer, stops=(Stop("all", 1.0),))
 
 
 def rooms_of(means, arrays: list, walls: int) -> tuple:

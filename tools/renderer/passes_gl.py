@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -202,7 +202,7 @@ class Passes:
 
         def decode(drawing: QuadsDrawing | TilesDrawing) -> None:
             drawing.decode_geometry(0, 0.4)
-            drawing.decode_color(0, 0.4, eye)
+            cast(Any, drawing).decode_color(0, 0.4, eye)
 
         floor = self.least_ms(networks_alone)
         for drawing in (TilesDrawing(), QuadsDrawing(self.gpu, "onnxruntime", "numpy")):

@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -107,7 +108,8 @@ def picture(renderer: Renderer, view: View) -> np.ndarray:
 
 def weight_of(renderer: Renderer, view: View, leaf: int) -> np.ndarray:
     """(H, W) how far each pixel shows a leaf."""
-    drawing, pages = renderer.drawing, renderer.streaming.stream.table.pages_of(np.array([leaf]))
+    drawing = cast(Any, renderer.drawing)  # of tiles, which have pages
+    pages = renderer.streaming.stream.table.pages_of(np.array([leaf]))
     kept = drawing.device.download(drawing.paged.read(pages, drawing._color))
     seen = []
     for value in (0.0, 1.0):

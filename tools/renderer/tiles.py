@@ -166,7 +166,8 @@ def side_by_side(model: SplatLayers, copies: int) -> SplatLayers:
         for a in (model.scales, model.wxyz, model.opacity, model.sh[:, :1])
     ]
     count = copies * model.splat_count
-    return SplatLayers(means, *again, np.zeros(count, np.int32), (Stop("all", 1.0),))
+    layer = np.zeros(count, np.int32)
+    return SplatLayers(means, *again, layer=layer, stops=(Stop("all", 1.0),))
 
 
 def measure(arena: Arena, views: list[View], prototype: Prototype | None) -> Times:

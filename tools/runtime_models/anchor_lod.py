@@ -18,6 +18,7 @@ import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -113,9 +114,9 @@ def rows_of(path: Path, seconds: float) -> list[str]:
                 "baked": baked(model, size),
             }
             for form, other in forms.items():
-                count = other.splat_count if form == "baked" else len(other.anchors)
+                count = other.splat_count if form == "baked" else len(cast(Any, other).anchors)
                 for pixels in (begins, *SIZES_PX):
-                    mine = meter.pictures(other, pixels)
+                    mine = meter.pictures(cast(Any, other), pixels)
                     db = [psnr_of(mine[at], truth[pixels][at]) for at in mine]
                     db.append(own_psnr(mine["stops"], truth[pixels]["stops"]))
                     change = change_of(mine["stops"], truth[pixels]["stops"])

@@ -44,7 +44,7 @@ FAR = 3  # times the distance
 def orbits(model: SplatLayers) -> list[list]:
     """Views from the usual distance and from FAR times as far."""
     target, radius, *rest = frame_points(*model_points(model))
-    return [orbit_path(VIEWS, target, radius * far, *rest, SIZE) for far in (1, FAR)]
+    return [orbit_path(VIEWS, target, radius * far, *rest, size=SIZE) for far in (1, FAR)]
 
 
 def measure(path: Path, renderer) -> list[str]:

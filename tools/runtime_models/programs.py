@@ -256,7 +256,8 @@ def scene() -> PlainSplats:
         means, rng.uniform(0.01, 0.05, (COUNT, 3)),
         wxyz / np.linalg.norm(wxyz, axis=1)[:, None], rng.uniform(0.3, 0.95, COUNT), sh,
     )  # fmt: skip
-    return PlainSplats(*(array.astype(np.float32) for array in arrays))
+    means, scales, wxyz, opacity, sh = (array.astype(np.float32) for array in arrays)
+    return PlainSplats(means, scales, wxyz, opacity, sh)
 
 
 class Likeness:

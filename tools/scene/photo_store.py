@@ -155,7 +155,7 @@ def main() -> None:
         words = [Path(w).name if Path(w) == options.capture else w for w in sys.argv[1:]]
         file.write(f"# python3 tools/scene/photo_store.py {shlex.join(words)}\n# {processor()}, ")
         file.write(f"{os.cpu_count()} cores\n")
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        table: csv.DictWriter[str] = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         for count, sizes in ((FEW, (0, ALL, WINDOW // 10)), (options.photos, (WINDOW, ALL))):
             with tempfile.TemporaryDirectory() as place:

@@ -16,6 +16,7 @@ import sys
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
+from typing import Any, cast
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
@@ -57,7 +58,7 @@ def main() -> int:
             asked_of, of_splats = caps(size, asked)
             asked_of |= {"seed": seed} if seed else {}
             options = Options(
-                folder, out, asked_of, seconds=seconds, methods=methods, vgg=asked.vgg,
+                folder, out, asked_of, seconds=seconds, methods=cast(Any, methods), vgg=asked.vgg,
                 splats=of_splats, cluster=asked.cluster, certificates=asked.certificates,
                 gpus=asked.gpus,
             )  # fmt: skip

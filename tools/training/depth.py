@@ -59,7 +59,7 @@ def main() -> None:
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
         file.write(f"# python3 tools/training/depth.py {' '.join(sys.argv[1:])}\n")
         file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        rows: csv.DictWriter[str] = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         rows.writeheader()
         if options.capture is None:
             make_balls(Path(folder), options.size, depth=True)
@@ -105,7 +105,7 @@ def measured(device, capture: Capture, settings: TrainSettings) -> list[dict]:
     found = {name: (s.psnr_db, s.ssim, s.depth_error) for name, s in scores.items()}
     known = [numbers for numbers in found.values() if numbers[2] is not None]
     if len(known) == len(found):
-        found["mean"] = tuple(np.mean(known, axis=0))
+        found["mean"] = tuple(np.mean(np.array(known, float), axis=0))
     return [
         shared | {
             "modality": name, "psnr_db": f"{psnr:.2f}", "ssim": f"{ssim:.4f}",

@@ -135,6 +135,7 @@ def main() -> None:
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
         file.write(f"# python3 tools/training/points.py {command()}\n")
         file.write(f"# {device.name}, {device.platform}\n")
+        rows: csv.DictWriter[str]
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
         rows.writeheader()
         for name in options.captures:

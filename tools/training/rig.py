@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def main() -> None:
     device, settings, start = open_device("cpu"), TrainSettings(), time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         made = make_workshop(Path(folder)) if asked.capture is None else None
-        capture = made or read_capture(asked.capture)
+        capture = made or read_capture(cast(Path, asked.capture))
         start = time.process_time()
         shape = shape_for(device, capture, settings, MODALITY, asked.steps, quiet)
         took = time.process_time() - start

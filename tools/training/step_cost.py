@@ -17,6 +17,7 @@ import shlex
 import sys
 import time
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def look(trainer: Trainer, photo, some: bool) -> tuple[int, dict[str, float]]:
     trainer.device.queue.finish()
     ms = {name: step.ms.get(name, 0.0) for name in PASSES}
     ms["all"] = 1e3 * (time.process_time() - start)
-    return len(step.gathered["anchors"]), ms
+    return len(cast(Any, step.gathered["anchors"])), ms
 
 
 def measured(trainer: Trainer, looks: int) -> list[dict]:

@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pyopencl
@@ -178,6 +179,7 @@ def brighter(photo: Photo, gain: float, folder: Path) -> Photo:
 
 def dark_tenth(whole: Capture, case: str) -> tuple[Path, list[str]]:
     folder = whole.folder / "dark"
+    new: dict[Path, Photo | None]
     new = {p.path: brighter(p, 0.45, folder) for p in tenth(whole)}
     return changed_photos(whole, case, new)
 
@@ -237,7 +239,7 @@ def at_step(share: float, do: Callable[[Trainer], None], iterations: int) -> Ite
             do(trainer)
         return plain(trainer)
 
-    Trainer.one_step = one_step
+    cast(Any, Trainer).one_step = one_step
     try:
         yield
     finally:

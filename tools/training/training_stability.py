@@ -136,7 +136,9 @@ class Bench:
             out = self.folder / f"untouched-{len(self.untouched)}.shift"
             plain = Case("untouched", case.capture, "", share=case.share)
             _, said = self.run(plain, capture.folder, out)
-            self.untouched[key] = said, self.fits(out, capture)
+            reached = self.fits(out, capture)
+            assert reached is not None
+            self.untouched[key] = said, reached
         return self.untouched[key]
 
     def row(self, case: Case) -> list[str]:

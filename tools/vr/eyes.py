@@ -58,9 +58,9 @@ def eyes_of(document: Document, size: tuple[int, int], near: float = 1.0) -> lis
     first = Pose(centre + near * (first.position - centre), first.wxyz)
     views = []
     for side, (left, right, up, down) in zip((-0.5, 0.5), EYE_DEGREES, strict=True):
-        tangents = [math.tan(math.radians(angle)) for angle in (left, right, down, up)]
+        a, b, c, d = (math.tan(math.radians(angle)) for angle in (left, right, down, up))
         at = first.position + first.matrix()[:3, 0] * side * EYES_APART_M
-        views.append(View(Pose(at, first.wxyz), tuple(tangents), 0.05, 1000.0, size))
+        views.append(View(Pose(at, first.wxyz), (a, b, c, d), 0.05, 1000.0, size))
     return views
 
 

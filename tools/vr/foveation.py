@@ -15,6 +15,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
+from typing import Any, cast
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -96,7 +97,7 @@ def measure(ctx: moderngl.Context | None, name: str, scene: Scene, views: list[V
     shown: dict[str, list[np.ndarray]] = {}
     with Renderer(ctx, "tiles" if ctx is None else "quads") as renderer:
         if ctx is not None:
-            renderer.drawing.foveates = True
+            cast(Any, renderer.drawing).foveates = True
         renderer.update(scene)
         for _ in range(turns + 1):
             for case, changes in CASES.items():
@@ -119,8 +120,9 @@ def measure(ctx: moderngl.Context | None, name: str, scene: Scene, views: list[V
                 np.concatenate([shown[of][i][inside[i] == within] for i in range(len(views))])
                 for of in (case, "all pixels")
             ]
-            same = np.array_equal(*pairs)
-            parts.append("equal" if same else f"{psnr(*pairs):.2f}")
+            one, other = pairs
+            same = np.array_equal(one, other)
+            parts.append("equal" if same else f"{psnr(one, other):.2f}")
         row = f"{head},{case},{ms[case]:.2f},{ms[case] / ms['all pixels']:.3f},{','.join(parts)}"
         rows.append(row.replace("'", '"'))
     return rows

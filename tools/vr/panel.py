@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
+from typing import Any, cast
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -51,7 +52,7 @@ def row(ctx, wearer: Wearer, case: str, hand) -> str:
 
         begun(measured, *given)
 
-    picture.draw = timed
+    cast(Any, picture).draw = timed
     for _ in range(FRAMES):
         ctx.finish()
         start = time.process_time()

@@ -83,7 +83,10 @@ def box_of(view: View, part: float) -> Box:
 def views_of(case: Case, views: list[View]) -> list[View]:
     if not case.wide:
         return views
-    wide = [view.resized(tuple(round(case.wide * side) for side in view.size)) for view in views]
+    wide = [
+        view.resized((round(case.wide * view.size[0]), round(case.wide * view.size[1])))
+        for view in views
+    ]
     boxes = [box_of(view, case.inset) for view in views]
     insets = [
         replace(view.part(box[0], box[1], box[2:]), whole=None)

@@ -25,7 +25,7 @@ def scene_words(state: EditorState) -> list[str]:
     splats = said("{count} splats", count=number(state.scene.splat_count))
     size = sum(source.facts.get("bytes", 0) for source in sources)
     size_words = [bytes_text(size)] if size else []
-    if len(objects) > 1:
+    if len(objects) != 1:
         return [said("{count} objects", count=len(objects)), splats, *size_words]
     facts = sources[0].facts if sources else {}
     degree = facts.get("sh_degree")

@@ -209,7 +209,8 @@ class SectionTool:
             return plane_through(place, handle.normal)
         axis = int(handle.key) % 3
         opposite = np.array(shape.centre) - shape.half[axis] * handle.normal
-        side = max((place - opposite) @ handle.normal, 2 * LEAST_SIDE * self._state.radius)
+        side = (place - opposite) @ handle.normal
+        side = float(max(side, 2 * LEAST_SIDE * self._state.radius))
         half = list(shape.half)
         half[axis] = side / 2
         # The two other axes stay in the middle of what they were.

@@ -180,7 +180,8 @@ def pose_after(obj: SceneObject, before: np.ndarray, after: np.ndarray, pivot: n
 
 def flat(matrix: np.ndarray) -> Matrix16:
     """A (4, 4) as ImGuizmo has it: column by column, float32."""
-    return Matrix16(np.asarray(matrix, np.float32).T.ravel().copy())
+    columns = np.asarray(matrix, np.float32).T.ravel().copy()
+    return Matrix16(columns)  # pyright: ignore[reportArgumentType]  # takes arrays, too
 
 
 def unflat(matrix: Matrix16) -> np.ndarray:

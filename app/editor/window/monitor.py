@@ -5,7 +5,7 @@ from typing import Any
 
 import glfw
 import moderngl
-from moderngl_window.context.glfw import Window as GlfwWindow
+from moderngl_window.context.glfw.window import Window as GlfwWindow
 
 from shapeshift.app.program import program
 from shapeshift.renderer.gl.context import NoContext

@@ -277,7 +277,7 @@ def draw_drag(
     draw = imgui.get_background_draw_list()
     ink, wide = theme.color(theme.TEXT if removes else theme.ACCENT, 0.9), 1.5 * ui_scale
     if drag == LASSO:
-        points = [Vec(*start), *(Vec(x, y) for x, y in way)]
+        points: list[imgui.ImVec2Like] = [Vec(*start), *(Vec(x, y) for x, y in way)]
         draw.add_polyline(points, ink, wide, imgui.ImDrawFlags_.closed)
     elif drag == SPHERE:
         radius = float(np.hypot(way[-1][0] - start[0], way[-1][1] - start[1]))

@@ -307,7 +307,7 @@ def draw_length(
     ink = theme.color(theme.ACCENT if chosen else theme.TEXT)
     ground = theme.color(theme.SURFACE, 0.7)
     draw = imgui.get_background_draw_list()
-    corners = [Vec(*place) for place in pixels.tolist()]
+    corners: list[imgui.ImVec2Like] = [Vec(*place) for place in pixels.tolist()]
     closed = kind == "area" and len(corners) > 2
     if closed:
         draw.add_concave_poly_filled(corners, theme.color(theme.ACCENT, 0.15))

@@ -261,7 +261,7 @@ def test_a_whole_chart_is_what_a_budget_finds(package, tmp_path, monkeypatch):
 def test_scenes_stand_side_by_side():
     """Framed radii touch but do not overlap; the first stays; a shared model is one model."""
     small, large = make_random_model(60, seed=1), make_random_model(60, seed=2)
-    large = replace(large, anchors=large.anchors * 3 + np.float32([50, 2, 1]))
+    large = replace(large, anchors=large.anchors * 3 + np.array([50, 2, 1], np.float32))
     scene = side_by_side([Document.of(m) for m in (small, large, small)], 0.5)
     centres, radii = [], []
     for obj in scene.objects:

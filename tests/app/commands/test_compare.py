@@ -101,7 +101,9 @@ def test_the_same_place_in_the_world_is_compared_whatever_the_zero(tmp_path, cap
     write_ply(near, tmp_path / "a.ply")
     a = open_side(str(tmp_path / "a.ply"), ReadingOptions())
     (model,) = a.subject.models
-    shifted = replace(model, means=model.means - np.float32([3, 0, -2]), origin=(3.0, 0.0, -2.0))
+    shifted = replace(
+        model, means=model.means - np.array([3, 0, -2], np.float32), origin=(3.0, 0.0, -2.0)
+    )
     from shapeshift.app.commands.compare import drawn_views
 
     options = Options("a", "b", size=SMALL)

@@ -142,7 +142,7 @@ def test_far_places_come_back(scenes, tmp_path, monkeypatch):
 def test_an_object_of_a_package_by_name_or_label(tmp_path, label):
     whole = make_random_model(50, k=4)
     objects = (ObjectLabel(1, "mug"), ObjectLabel(2, "cup"))
-    whole = replace(whole, labels=np.resize(np.uint8([0, 1, 2]), 50), objects=objects)
+    whole = replace(whole, labels=np.resize(np.array([0, 1, 2], np.uint8), 50), objects=objects)
     write_package(whole, tmp_path / "room.shift", "float32")
     for out in ("cup.ply", "cup.shift", "all.ply"):
         words = () if out == "all.ply" else ("--label", label)

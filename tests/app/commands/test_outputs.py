@@ -123,13 +123,15 @@ def test_sixteen_bits_come_back(tmp_path, shape):
 
 
 def test_steps_at_their_ends():
-    values = np.float32([np.nan, 0.00001, 0.004, 65.534, 70, np.inf])
+    values = np.array([np.nan, 0.00001, 0.004, 65.534, 70, np.inf], np.float32)
     got = as_steps(values, "depth", 0.001)
     np.testing.assert_array_equal(got, [0, 1, 4, 65534, 65535, 0])
     np.testing.assert_array_equal(
-        as_steps(np.float32([0, 1, 1.5]), "coverage", 1), [0, 65535, 65535]
+        as_steps(np.array([0, 1, 1.5], np.float32), "coverage", 1), [0, 65535, 65535]
     )
-    np.testing.assert_array_equal(as_steps(np.float32([-1, 1, np.nan]), "normal", 1), [0, 65535, 0])
+    np.testing.assert_array_equal(
+        as_steps(np.array([-1, 1, np.nan], np.float32), "normal", 1), [0, 65535, 0]
+    )
 
 
 def test_the_unit_is_the_finest_that_reaches():

@@ -31,8 +31,10 @@ SIZE, VIEWS = (96, 72), 4
 def balls():
     """An anchor model of three balls beside each other, and their labels."""
     plain = make_random_model(anchors=90)
-    of = np.resize(np.uint8([0, 1, 2]), 90)
-    apart = 0.25 * plain.anchors + np.outer(of.astype(np.float32) - 1, np.float32([1, 0, 0]))
+    of = np.resize(np.array([0, 1, 2], np.uint8), 90)
+    apart = 0.25 * plain.anchors + np.outer(
+        of.astype(np.float32) - 1, np.array([1, 0, 0], np.float32)
+    )
     return replace(plain, anchors=apart), of
 
 
@@ -89,7 +91,7 @@ def test_label_maps_become_objects_that_can_be_opened(given, tmp_path, capsys):
     assert (cut.labels == of).mean() > 0.9
     for item in file.items:
         label = int(item.name[-1])
-        there = models[item.name].anchors + np.float64(item.position)
+        there = models[item.name].anchors + np.array(item.position, np.float64)
         assert np.abs(there - cut.anchors[cut.labels == label]).max() < 1e-6
     names = sorted(path.name for path in (tmp_path / "report").iterdir())
     assert names == ["001_object 1.png", "002_object 2.png", "labels.png", "views.png"]
@@ -131,7 +133,7 @@ def test_labels_may_have_any_numbers(given, tmp_path, capsys):
     shutil.copytree(given / "masks", tmp_path / "masks")
     for path in (tmp_path / "masks").rglob("*.png"):
         labels = np.asarray(Image.open(path))
-        write_label_map(np.choose(labels, np.uint8([0, 254, 7])), path)
+        write_label_map(np.choose(labels, np.array([0, 254, 7], np.uint8)), path)
     base = (given / "room.shift", given / "capture", "--masks", tmp_path / "masks")
     assert (
         cli.main(
@@ -141,7 +143,7 @@ def test_labels_may_have_any_numbers(given, tmp_path, capsys):
     )
     assert segment(given, "--out", tmp_path / "near.scene.json") == 0
     far, near = (read_model(tmp_path / f"{name}.shift") for name in ("far", "near"))
-    assert np.array_equal(far.labels, np.choose(near.labels, np.uint8([0, 254, 7])))
+    assert np.array_equal(far.labels, np.choose(near.labels, np.array([0, 254, 7], np.uint8)))
     assert [each.name for each in far.objects] == ["object 7", "object 254"]
 
 
@@ -233,7 +235,7 @@ def test_another_scenes_capture_is_noticed(given, tmp_path, capsys):
     write_package(replace(model, stops=stops), tmp_path / "leg.shift")
     refused(capsys, "belong to no stop of the scene, which has skin, bone",
             (tmp_path / "leg.shift", *words))  # fmt: skip
-    away = replace(model, anchors=model.anchors + np.float32([0, 500, 0]))
+    away = replace(model, anchors=model.anchors + np.array([0, 500, 0], np.float32))
     write_package(away, tmp_path / "far.shift")
     refused(capsys, "none of the photos shows anything of the scene",
             (tmp_path / "far.shift", *words))  # fmt: skip

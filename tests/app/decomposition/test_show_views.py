@@ -20,7 +20,7 @@ from tools.synthetic.labels import LABELS, OBJECTS, label_map, labels_of_places
 WHOLE = make_random_model(anchors=60)
 WHOLE = replace(
     WHOLE,
-    labels=np.resize(np.uint8([0, 1, 3]), 60),
+    labels=np.resize(np.array([0, 1, 3], np.uint8), 60),
     objects=(ObjectLabel(1, "mug"), ObjectLabel(3, "cup")),
 )
 ONE = Scene((SceneObject("room", WHOLE, x=0.3),))

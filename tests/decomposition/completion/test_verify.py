@@ -86,7 +86,8 @@ def test_fills_are_measured_from_their_plane(device, lift):
     count = len(model.anchors)
     # 1e-4 of their size along the normal: means lie within 1e-4 of an offset of the plane.
     frames = AnchorFrames(
-        np.tile(np.float32([1, 1e-4, 1]), (count, 1)), np.tile(np.float32([1, 0, 0, 0]), (count, 1))
+        np.tile(np.array([1, 1e-4, 1], np.float32), (count, 1)),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)),
     )
     places = np.random.default_rng(0).uniform(-0.1, 0.1, (count, 3)) * (1, 0, 1)
     places[:, 1] = 0.5 + lift * side

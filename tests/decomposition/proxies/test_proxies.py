@@ -98,7 +98,9 @@ def test_distances_of_cubes_of_two_sizes():
 def test_faces_between_pieces_are_no_surface():
     left, right = (box_around(np.array([[x, -1, -1], [x + 1, 1, 1.0]])) for x in (-1, 0))
     halves = Collider((left.vertices - [1e-3, 0, 0], right.vertices), left)
-    overlapping = Collider((left.vertices + np.float32([0.1, 0, 0]), right.vertices), left)
+    overlapping = Collider(
+        (left.vertices + np.array([0.1, 0, 0], np.float32), right.vertices), left
+    )
     inner = np.abs(surface_of(overlapping)[:, 0]) < 0.05
     inner &= np.abs(surface_of(overlapping)[:, 1:]).max(1) < 0.99
     assert not inner.any()

@@ -81,7 +81,7 @@ def test_of_several_thermal_stops_each_has_its_own_palette():
 
 
 def test_a_part_with_a_control_of_its_own_has_heat_of_its_own():
-    part = Painted(np.float32([1, 0.5, 0] * 20), 0.5)
+    part = Painted(np.array([1, 0.5, 0] * 20, np.float32), 0.5)
     obj = scene_of(model(), selectors=(part,))
     x = model().blend.between(0.0, 0.5, part.weight)
     found = false_colors(obj, [x])
@@ -230,7 +230,9 @@ def test_a_pure_thermal_stop_is_the_palette_over_the_picture_of_values(renderer)
     values = scene_of(replace(model(), stops=tuple(gray)), x=0.5)
     shown(renderer, values)
     rgba = apply_palette(renderer.image(), "ironbow")
-    np.testing.assert_array_equal(picture, rgba[..., :3] + (1 - rgba[..., 3:]) * np.float32(BEHIND))
+    np.testing.assert_array_equal(
+        picture, rgba[..., :3] + (1 - rgba[..., 3:]) * np.array(BEHIND, np.float32)
+    )
 
 
 def test_a_slider_that_moves_before_a_still_eye_decodes_colours_once(renderer, monkeypatch):

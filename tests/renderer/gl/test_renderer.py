@@ -155,7 +155,7 @@ def test_nothing_in_front_is_a_clean_image(opened, ctx, drawing, scene):
     stats = renderer.draw([AWAY], shown)
     assert stats.drawn == 0 and stats.splats == scene.splat_count == sum(stats.culled.values())
     np.testing.assert_array_equal(renderer.image(), np.zeros((16, 32, 4)))
-    want = np.broadcast_to(np.float32([0.25, 0.5, 0.75]), (16, 32, 3))
+    want = np.broadcast_to(np.array([0.25, 0.5, 0.75], np.float32), (16, 32, 3))
     np.testing.assert_array_equal(renderer.resolved(), want)
     np.testing.assert_array_equal(pixels(shown), want)
 

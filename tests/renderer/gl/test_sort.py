@@ -17,7 +17,9 @@ def patterns(n: int) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(n)
     anything = rng.integers(0, 2**32, n, dtype=np.uint32)
     some_culled = np.where(rng.random(n) < 0.3, np.uint32(layout.CULLED_KEY), anything)
-    depths = rng.choice(np.float32([0.05, 1.0, 1.0000001, 2.5, 1e-40, 3e38]), n).astype(np.float32)
+    depths = rng.choice(np.array([0.05, 1.0, 1.0000001, 2.5, 1e-40, 3e38], np.float32), n).astype(
+        np.float32
+    )
     return {
         "anything": anything,
         "few values": rng.integers(0, 3, n).astype(np.uint32) << np.uint32(8),
@@ -109,7 +111,7 @@ def test_passes_after_the_first_have_what_is_sorted_alone(gpu, bits):
 
 
 def test_quantize_spans_the_range_and_survives_one_depth():
-    keys = np.float32([2.0, 4.0, 3.0]).view(np.uint32)
+    keys = np.array([2.0, 4.0, 3.0], np.float32).view(np.uint32)
     np.testing.assert_array_equal(quantize(keys), [0, 65534, 32767])
     np.testing.assert_array_equal(quantize(keys[:1]), [0])
     culled = np.full(3, layout.CULLED_KEY, np.uint32)

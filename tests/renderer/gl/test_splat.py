@@ -269,7 +269,7 @@ def test_resolve_is_the_numpy_palette_over_the_background(gpu, palette, way, as_
     mixed = rgba if way == "final" else apply_palette(rgba, palette)
     if way == "heat":
         mixed = overlay_heat(rgba, heat, palette)
-    expected = mixed[..., :3] + (1 - mixed[..., 3:]) * np.float32(background)
+    expected = mixed[..., :3] + (1 - mixed[..., 3:]) * np.array(background, np.float32)
     target = gpu.target((20, 12), "f4")
     source = gpu.ctx.texture((20, 12), 4, f32(rgba[::-1]).tobytes(), dtype="f4")
     beside = gpu.ctx.texture((20, 12), 2, f32(heat[::-1]).tobytes(), dtype="f4")

@@ -86,7 +86,7 @@ def test_of_networks_the_splats_are_cut_where_they_are_at_this_x(renderer):
         own = renderer.drawing.splat_points()[0].copy()
         drawn(renderer, replace(obj, x=x))
         now = renderer.drawing.splat_points()[0]
-        outside = own[:, :3] @ np.float32(ACROSS.normal) > np.float32(ACROSS.offset_m)
+        outside = own[:, :3] @ np.array(ACROSS.normal, np.float32) > np.float32(ACROSS.offset_m)
         assert 100 < outside.sum() < len(own) - 100
         assert (now[outside, 3] <= 0).all()
         np.testing.assert_array_equal(now[~outside], own[~outside])

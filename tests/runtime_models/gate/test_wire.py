@@ -12,6 +12,7 @@ import pytest
 
 from shapeshift.runtime_models.gate import gate, wire
 
+MOST = 100  # bytes
 LIES = {  # of a process that its file has taken over: what stands for the value, bytes behind it
     "an array larger than its bytes": ({"@": 0, "of": "<f4", "shape": [1 << 40]}, 0),
     "an array of letters without a size": ({"@": 0, "of": "<U0", "shape": [1 << 40]}, 0),
@@ -20,7 +21,7 @@ LIES = {  # of a process that its file has taken over: what stands for the value
     "an array of arrays": ({"@": 8, "of": "(2,)<f4", "shape": [1]}, 8),
     "sides that are negative": ({"@": 4, "of": "<f4", "shape": [-1, -1]}, 4),
     "sides that are no numbers": ({"@": 4, "of": "<f4", "shape": ["1"]}, 4),
-    "more than was asked for": ({"@": 101}, 101),
+    "more than was asked for": ({"@": MOST + 1}, MOST + 1),
     "more than it said": ({"@": 5}, 4),
     "less than it said": ({"@": 3}, 4),
     "the same twice": ([{"@": 4}, {"@": 4}], 4),
@@ -32,13 +33,22 @@ LIES = {  # of a process that its file has taken over: what stands for the value
 
 @pytest.mark.parametrize("lie", LIES)
 def test_who_lies_about_sizes_is_not_heard(lie):
-    stands, size = LIES[lie]
-    text = stands.encode() if isinstance(stands, str) else json.dumps(stands).encode()
+    assert heard_of(*LIES[lie]) is None
+
+
+def test_as_much_as_was_asked_for_is_heard():
+    assert heard_of({"@": MOST}, MOST) == {"done": b"x" * MOST}
+
+
+def heard_of(stands: object, size: int) -> dict | None:
+    """What a listener makes of an answer with so many bytes behind it, who asked for MOST."""
+    text = stands.encode() if isinstance(stands, str) else json.dumps({"done": stands}).encode()
     pipe = io.BufferedReader(io.BytesIO(wire.HEAD.pack(len(text), size) + text + b"x" * size))
     wanted, answers = gate.queue.SimpleQueue(), gate.queue.SimpleQueue()
-    wanted.put(100)
+    wanted.put(MOST)
+    wanted.put(None)  # and no more
     gate.listen(pipe, wanted, answers)
-    assert answers.get_nowait() is None
+    return answers.get_nowait()
 
 
 def test_arrays_that_went_through_a_pipe_are_held_by_nobody():

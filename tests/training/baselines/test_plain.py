@@ -314,7 +314,9 @@ def test_what_cannot_be_trained_is_refused(device, balls):
 
 def one_splat() -> PlainSplats:
     row = np.zeros((1, 3), np.float32)
-    return PlainSplats(row, row + 0.1, np.float32([[1, 0, 0, 0]]), np.float32([0.5]), row[None])
+    return PlainSplats(
+        row, row + 0.1, np.array([[1, 0, 0, 0]], np.float32), np.array([0.5], np.float32), row[None]
+    )
 
 
 def test_names_of_stops_become_names_of_files():

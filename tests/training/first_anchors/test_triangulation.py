@@ -135,7 +135,10 @@ def test_two_photos_are_enough_and_one_is_not(photos):
 
 
 def test_without_texture_the_run_starts_at_random_and_says_so(photos):
-    blank = [replace(p, rgba=np.tile(np.uint8([90, 90, 90, 255]), (*SIZE, 1))) for p in photos[:3]]
+    blank = [
+        replace(p, rgba=np.tile(np.array([90, 90, 90, 255], np.uint8), (*SIZE, 1)))
+        for p in photos[:3]
+    ]
     said: list[str] = []
     start = initial_points(CAPTURE, blank, RNG(0), report=said.append)
     assert start.origin == "random" and "only 0 points" in start.doubts[0]

@@ -43,7 +43,8 @@ def photo(rgb: tuple = (255, 255, 255), modality: str = "RGB", subject=(10, 30, 
 def noisy(one: LoadedPhoto, levels: int) -> LoadedPhoto:
     more = RNG(1).integers(-levels, levels + 1, one.rgba.shape)
     return replace(
-        one, rgba=np.clip(one.rgba + more, 0, 255).astype(np.uint8) | np.uint8([0, 0, 0, 255])
+        one,
+        rgba=np.clip(one.rgba + more, 0, 255).astype(np.uint8) | np.array([0, 0, 0, 255], np.uint8),
     )
 
 

@@ -125,7 +125,7 @@ def browser_frames(peer: str, folder: Path) -> Answer:
     threading.Thread(target=server.serve_forever, daemon=True).start()
     address = f"http://127.0.0.1:{server.server_address[1]}/page.html?peer={peer}"
     with tempfile.TemporaryDirectory() as profile, Display() as display:
-        browser.append(start_chromium(programs[0], profile, display, address))
+        browser.append(start_chromium(str(programs[0]), profile, display, address))
         in_time = done.wait(PATIENCE_S)
         browser[0].kill()
         browser[0].wait()

@@ -26,7 +26,7 @@ from strangers import begun_rows, draw  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
-from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.settings import Masks, TrainSettings  # noqa: E402
 from shapeshift.training.synthetic.tracer import Place, photograph  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 from tools.synthetic.strangers import (  # noqa: E402
@@ -48,7 +48,7 @@ def truths(name: str, place: Place, views: list) -> list[np.ndarray]:
     return [photograph(view, along)[0] for view in views]
 
 
-def trained(device, folder: Path, masks: str, options, seed: int, made: tuple) -> dict:
+def trained(device, folder: Path, masks: Masks, options, seed: int, made: tuple) -> dict:
     capture = read_capture(folder)
     settings = TrainSettings(iterations=None, seconds=options.seconds, seed=seed, masks=masks)
     run = Trainer(device, capture, settings)

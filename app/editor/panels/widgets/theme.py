@@ -77,7 +77,8 @@ def apply(ui_scale: float, keys: bool = True) -> None:
         style.scrollbar_size, style.grab_min_size = 16, 20
         style.window_rounding = style.child_border_size = 0
     for where, (rgb, alpha) in _colors().items():
-        style.set_color_(where, imgui.ImVec4(*rgb, alpha))
+        red, green, blue = rgb
+        style.set_color_(where, imgui.ImVec4(red, green, blue, alpha))
     style.scale_all_sizes(ui_scale)
     style.font_size_base = FONT_SIZE * ui_scale
 
