@@ -3,6 +3,7 @@
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from unittest.mock import Mock
 
 import pytest
@@ -134,7 +135,7 @@ def checkout(tmp_path) -> Path:
     return tmp_path
 
 
-def config_of(root: Path, **options):
+def config_of(root: Path, **options) -> Any:
     wanted = {"--changed": "HEAD", "--minutes": 1.0} | options
     return SimpleNamespace(
         getoption=wanted.get, args=["tests"], args_source=pytest.Config.ArgsSource.TESTPATHS,
@@ -178,7 +179,7 @@ def test_what_cannot_be_done_is_a_sentence(checkout, options, word):
 def test_after_its_time_no_test_begins_and_what_is_left_is_said(checkout, monkeypatch):
     (checkout / "scene/stand.py").write_text("import os")
     run = changed.Changed(config_of(checkout), checkout, 100.0)
-    item = SimpleNamespace(path=checkout / "tests/scene/test_stand.py")
+    item: Any = SimpleNamespace(path=checkout / "tests/scene/test_stand.py")
     module = Mock(spec=pytest.Module, nodeid="tests/scene/test_typed.py")
     assert run.pytest_make_collect_report(module) is None  # of one file at least
     run.loaded = 1
@@ -192,7 +193,8 @@ def test_after_its_time_no_test_begins_and_what_is_left_is_said(checkout, monkey
     run.loaded = changed.LOADED - 1
     assert run.pytest_make_collect_report(module) is None
     run.pytest_itemcollected()
-    assert run.pytest_make_collect_report(module).result == [] and run.unread == 2
+    report = run.pytest_make_collect_report(module)
+    assert report is not None and report.result == [] and run.unread == 2
     assert run.left == [item]
     assert run.left_out().startswith("--changed: 3 of 4 files, the farthest ones, were left out")
     assert "--changed=HEAD --minutes=10" in run.left_out()

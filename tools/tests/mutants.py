@@ -1,27 +1,29 @@
 """Mutants: faults of one line in the program, and what notices them: docs/bench/mutants.csv.
 
-    python3 tools/tests/mutants.py                     # all that have no row yet
-    python3 tools/tests/mutants.py web/ "snap turn"    # some, by words of their names or files
-    python3 tools/tests/mutants.py --all               # all of them anew
+    python3 tools/tests/mutants.py                             # all that have no row yet
+    python3 tools/tests/mutants.py web/ "snap turn" --again    # by words of their names or files
+    python3 tools/tests/mutants.py --all                       # all of them anew
 
 tools/tests/mutants.csv has them: the text of a line before and after, what that breaks in a word,
 and the test files that are to notice.  Each is put into a copy of the checkout, where these files
-run first, and where they notice nothing, the files that lie nearest by imports.  A row is written
-as soon as it is known, so that an interrupted run goes on where it was.  A text is looked for with
-any white space between its words, in its file or, where that is gone, in all of the same ending.
+run first; where they notice nothing, the files that lie nearest by imports; then what is slow in
+those that are named.  A row is written as soon as it is known, so that an interrupted run goes on
+where it was.  A text is looked for with any white space between its words, in its file or, where
+that is gone, in all of the same ending.
 """
 
 import argparse
 import csv
 import io
 import os
+import platform
 import re
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields
@@ -33,6 +35,7 @@ sys.path[:0] = [str(ROOT)]
 from shapeshift.app.terminal import print_text, say  # noqa: E402
 from shapeshift.runtime_models.files.whole_file import write_whole  # noqa: E402
 from tests.support.selection.reaching import (  # noqa: E402
+    UsedFiles,
     checkout_files,
     reached_tests,
     used_files,
@@ -42,9 +45,11 @@ LIST = Path(__file__).with_name("mutants.csv")
 OUT = ROOT / "docs" / "bench" / "mutants.csv"
 COMMAND = "# python3 tools/tests/mutants.py --all"
 PATIENCE_S = 900.0  # of all tests of a mutant
-FARTHER = 12  # files, the nearest by imports, that run where the named ones notice nothing
-CAUGHT, MISSED, BROKEN = "caught", "missed", "broken"
-FAILED = 1  # the exit code of pytest where a test failed
+NAMED, FARTHER, SLOW = WAYS = "named", "farther", "slow"
+MOST_FARTHER = 8  # files, the nearest by imports, that run where the named ones notice nothing
+LONG = ("tests/slow/", "tests/xr/")
+CAUGHT, MISSED, BROKEN, GONE = "caught", "missed", "broken", "gone"
+FAILED, NOTHING_FAILED = 1, (0, 5)  # exit codes of pytest; 5: no test was chosen
 FAILURE = re.compile(r"^(?:FAILED|ERROR) (\S+?)(?:::| -|$)", re.M)
 OF_THE_COPY = """from pathlib import Path
 
@@ -88,10 +93,10 @@ class Row:
     name: str
     file: str
     breaks: str
-    result: str  # CAUGHT, MISSED or BROKEN
+    result: str  # CAUGHT; MISSED; BROKEN: the tests end otherwise; GONE: there is no such line
     by: str  # the first test that failed
-    way: str  # named, or farther: by imports
-    seconds: str
+    way: str  # NAMED tests, FARTHER ones by imports, or those that are named with --slow
+    cpu_s: str
 
 
 def read_mutants() -> list[Mutant]:
@@ -114,7 +119,8 @@ def write_rows(rows: dict[str, Row], mutants: list[Mutant], path: Path) -> None:
     writer = csv.DictWriter(held, names, lineterminator="\n")
     writer.writeheader()
     writer.writerows(asdict(rows[m.name]) for m in mutants if m.name in rows)
-    write_whole(path, f"{COMMAND}\n{held.getvalue()}".encode())
+    machine = f"# {platform.machine()}, {os.cpu_count()} cores"
+    write_whole(path, f"{COMMAND}\n{machine}\n{held.getvalue()}".encode())
 
 
 @contextmanager
@@ -171,65 +177,92 @@ def check_tests_pass(mutants: list[Mutant], copy: Path) -> None:
         raise ValueError(f"without a fault the tests end with {code}: {said.strip()[-300:]}")
 
 
-def judge(mutant: Mutant, copy: Path, texts: dict[str, str], farther: list[str]) -> Row:
-    """Runs the tests of one mutant; the copy is afterwards as it was."""
-    began = time.monotonic()
+def judge(mutant: Mutant, copy: Path, texts: dict[str, str], way: str, tests: list[str]) -> Row:
+    """Runs tests of one mutant; the copy is afterwards as it was."""
+    began = spent_s()
     file, text = mutant.applied(texts)
-    result, by, way = MISSED, "", "farther"
     try:
         (copy / file).write_text(text, "utf-8")
-        for way, tests in (("named", mutant.tests.split()), ("farther", farther)):  # noqa: B007
-            code, said = in_copy(copy, ["-x", *tests], PATIENCE_S) if tests else (0, "")
-            if code:
-                failed = FAILURE.search(said)
-                result = CAUGHT if code == FAILED else BROKEN
-                by = failed[1] if failed else said.strip()[-200:]
-                break
+        code, said = in_copy(copy, ["-x", *tests], PATIENCE_S) if tests else (0, "")
     finally:
         (copy / file).write_text(texts[file], "utf-8")
-    seconds = f"{time.monotonic() - began:.0f}"
-    return Row(mutant.name, file, mutant.breaks, result, by, way, seconds)
+    failed = FAILURE.search(said)
+    result = {FAILED: CAUGHT, **dict.fromkeys(NOTHING_FAILED, MISSED)}.get(code, BROKEN)
+    by = "" if result == MISSED else failed[1] if failed else said.strip()[-200:]
+    return Row(mutant.name, file, mutant.breaks, result, by, way, f"{spent_s() - began:.0f}")
 
 
-def run(mutants: list[Mutant], everything: list[Mutant], rows: dict[str, Row], out: Path) -> None:
+def spent_s() -> float:
+    """Processor seconds of the processes that have ended."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
+
+
+def run(
+    mutants: list[Mutant], everything: list[Mutant], rows: dict[str, Row], out: Path, checked: bool
+) -> None:
+    """The named tests of all mutants, then what is farther off of those that these have missed.
+
+    checked: the named tests are tried without a fault first.
+    """
     used = used_files(ROOT, (), ROOT / ".pytest_cache" / "imports.json")
     with copied_checkout() as copy:
         check_copy(copy)
-        check_tests_pass(mutants, copy)
+        if checked:
+            check_tests_pass(mutants, copy)
         texts = {
             path: (copy / path).read_text("utf-8")
             for path in checkout_files(ROOT)
-            if not path.startswith(("tests/", "tools/", "docs/")) and is_code(path)
+            if is_code(path) and (copy / path).is_file()
         }
-        for mutant in mutants:
-            file = mutant.applied(texts)[0]
-            near = [each.test for each in reached_tests(used, [file])]
-            named = set(mutant.tests.split())
-            farther = [t for t in near if t not in named and "/slow/" not in t and "/xr/" not in t]
-            row = judge(mutant, copy, texts, farther[:FARTHER])
+        for way, mutant in ((way, mutant) for way in WAYS for mutant in mutants):
+            row = rows.get(mutant.name)
+            if row and (row.result != MISSED or WAYS.index(row.way) >= WAYS.index(way)):
+                continue
+            named = mutant.tests.split()
+            try:
+                file = mutant.applied(texts)[0]
+                tests = farther_tests(used, file, named) if way == FARTHER else named
+                slow = ["--slow", "-m", "slow"] if way == SLOW else []
+                row = judge(mutant, copy, texts, way, [*slow, *tests])
+            except ValueError as why:
+                row = Row(mutant.name, mutant.file, mutant.breaks, GONE, str(why), way, "")
             rows[mutant.name] = row
             write_rows(rows, everything, out)
-            print_text(f"{row.result:7} {row.seconds:>4} s  {row.name}  {row.by}")
+            print_text(f"{row.result:7} {row.cpu_s:>4} s  {row.name}  {row.by}")
+
+
+def farther_tests(used: UsedFiles, file: str, named: list[str]) -> list[str]:
+    """The nearest by imports that are not named; none of those that take long."""
+    near = [each.test for each in reached_tests(used, [file])]
+    return [t for t in near if t not in named and not t.startswith(LONG)][:MOST_FARTHER]
 
 
 def is_code(path: str) -> bool:
+    """Of the program."""
+    if path.startswith(("tests/", "tools/", "docs/", "findings/", "examples/")):
+        return False
     return path.endswith((".py", ".js", ".cl", ".glsl", ".comp", ".vert", ".frag"))
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="words of a name or of a file")
     parser.add_argument("--all", action="store_true", help="all of them anew, their rows go")
+    parser.add_argument("--again", action="store_true", help="those that are named anew")
+    parser.add_argument(
+        "--unchecked", action="store_true", help="the named tests are known to pass without a fault"
+    )
     parser.add_argument("--out", type=Path, default=OUT, help="default: docs/bench/mutants.csv")
     options = parser.parse_args()
     everything = read_mutants()
     rows = {} if options.all else read_rows(options.out)
     chosen = [m for m in everything if m.holds(options.names)]
-    if not options.names:
-        chosen = [m for m in chosen if m.name not in rows]
+    if options.names and options.again:
+        rows = {name: row for name, row in rows.items() if name not in {m.name for m in chosen}}
     try:
         if chosen:
-            run(chosen, everything, rows, options.out)
+            run(chosen, everything, rows, options.out, not options.unchecked)
     except ValueError as why:
         say(str(why))
         return 2

@@ -32,10 +32,10 @@ class Changed:
 
     def __init__(self, config: pytest.Config, root: Path, began: float) -> None:
         """began: when the program started, by time.monotonic().  Raises pytest.UsageError."""
-        self.minutes = config.getoption("--minutes")
+        self.minutes = float(config.getoption("--minutes") or 0)
         if not self.minutes > 0:
             raise pytest.UsageError(f"--minutes is {self.minutes:g}; a number above 0 is wanted.")
-        self.revision = config.getoption("--changed")
+        self.revision = str(config.getoption("--changed"))
         self.seconds = 60 * self.minutes
         self.load_until = began + LOAD_WITHIN * self.seconds
         self.until = began + BEGIN_WITHIN * self.seconds

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, TypeGuard
 
 FORM = 1  # of the facts that are kept
 NAMING = re.compile(r"[\w.][\w./:-]{0,99}")  # a text that may name a file or a module
@@ -25,7 +26,7 @@ LEAVES = {
 }  # most nodes, and they say nothing
 
 
-class Facts(dict):
+class Facts(dict[str, Any]):
     """imports, names, offers, uses, fixtures, lazy: lists of texts, kept as JSON has them."""
 
 
@@ -55,7 +56,7 @@ def read_facts(path: str, text: str) -> Facts:
     except (SyntaxError, ValueError):
         return Facts()
     is_conftest = Path(path).name == "conftest.py"
-    fixtures = {node.name: node for node in tree.body if is_conftest and is_fixture(node)}
+    fixtures = {node.name: node for node in tree.body if is_fixture(node) and is_conftest}
     others = [node for node in tree.body if getattr(node, "name", "") not in fixtures]
     found = said_in(others)
     found["fixtures"] = {
@@ -66,7 +67,11 @@ def read_facts(path: str, text: str) -> Facts:
     return found
 
 
-def is_fixture(node: ast.AST) -> bool:
+def is_text(node: ast.AST) -> TypeGuard[ast.Constant]:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def is_fixture(node: ast.AST) -> TypeGuard[ast.FunctionDef]:
     return isinstance(node, ast.FunctionDef) and any(
         "fixture" in ast.unparse(each) for each in node.decorator_list
     )
@@ -93,8 +98,7 @@ def said_in(body: list) -> Facts:
             found["uses"] |= {a.arg for a in (*node.args.args, *node.args.kwonlyargs)}
         elif isinstance(node, ast.Call):
             asked = getattr(node.func, "attr", "") in ("getfixturevalue", "usefixtures")
-            texts = [a.value for a in node.args if asked and isinstance(a, ast.Constant)]
-            found["uses"] |= set(texts)
+            found["uses"] |= {str(a.value) for a in node.args if asked and is_text(a)}
         elif isinstance(node, ast.List | ast.Tuple):
             found["imports"] |= set(started_modules(node))
     found["offers"] |= {name for alias, name in attributes if alias in aliases}

@@ -185,7 +185,7 @@ def reached_tests(used: UsedFiles, changed: Iterable[str]) -> list[Reached]:
             folder = path.removesuffix(CONFTEST)
             users[path] |= {p for p in used.facts if is_test(p) and p.startswith(folder)}
     ways: dict[str, tuple[str, ...]] = {}
-    waiting = deque((path,) for path in wanted)
+    waiting: deque[tuple[str, ...]] = deque((path,) for path in wanted)
     while waiting:
         way = waiting.popleft()
         if way[0] in ways:
