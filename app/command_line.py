@@ -12,18 +12,20 @@ are str, int, float, bool, Path and Literal, each also in `| None` and in tuples
 """
 
 import ast
+import contextlib
 import difflib
 import inspect
+import json
 import re
 import shlex
 import textwrap
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
 from shapeshift.app.errors import UsageError
 
@@ -56,6 +58,7 @@ class FieldsOf:
     of: type
     usual: tuple[str, ...] = ()  # fields, in the order of help
     expert: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()  # of the file of --settings: app/training/train_options.py
     # Options that left the program, without their dashes -> what does their work now, in words.
     left: Mapping[str, str] | None = None
 
@@ -130,7 +133,7 @@ def parse(kind: type[Options], words: Sequence[str], prog: str) -> Options:
     """
     arguments = arguments_of(kind)
     known = {name: each for each in arguments for name in _spellings(each)}
-    values, loose = _values_of(words, known, left_options_of(kind), prog)
+    values, loose = _values_of(words, known, partial(_refuse_unknown, kind, prog))
     values |= _place([each for each in arguments if each.opt.positional], loose, prog)
     missing = [a for a in arguments if a.required and a.field.name not in values]
     _refuse_missing(missing, values, shlex.join([*prog.split(), *loose]))
@@ -184,24 +187,64 @@ def nearest(word: str, known: Sequence[str]) -> str:
     return folded[found[0]] if found else ""
 
 
+def _notes_of(kind: type) -> dict[str, FieldsOf]:
+    """The dicts among a command's options that take fields of another dataclass."""
+    return {
+        name: note
+        for name, hint in typing.get_type_hints(kind, include_extras=True).items()
+        if typing.get_origin(hint) is Annotated
+        for note in typing.get_args(hint)[1:]
+        if isinstance(note, FieldsOf)
+    }
+
+
 def left_options_of(kind: type) -> dict[str, str]:
     """Options that a command had once -> what does their work now, in words."""
-    left: dict[str, str] = {}
-    for hint in typing.get_type_hints(kind, include_extras=True).values():
-        for note in typing.get_args(hint)[1:] if typing.get_origin(hint) is Annotated else ():
-            left |= (note.left or {}) if isinstance(note, FieldsOf) else {}
-    return left
+    left = (note.left or {} for note in _notes_of(kind).values())
+    return {name: now for each in left for name, now in each.items()}
+
+
+def line_of(each: Argument, words: Sequence[str]) -> str:
+    """How a setting with this value, or its usual one, stands in the file of --settings."""
+    value = each.field.default
+    if words and not _is_option(words[0]):
+        with contextlib.suppress(ValueError):
+            value = each.kind(words[0])
+    text = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    return f"{each.field.name} = {text}"
+
+
+def dicts_of(kind: type) -> dict[str, type]:
+    """Each dict among a command's options -> the dataclass whose fields it takes."""
+    return {name: note.of for name, note in _notes_of(kind).items()}
+
+
+def lines_of(kind: type) -> dict[str, Argument]:
+    """What the file of --settings may say, by name: options that are settings, then what only it
+    has.
+    """
+    return {a.field.name: a for a in arguments_of(kind) if a.into} | _only_lines_of(kind)
+
+
+def _only_lines_of(kind: type) -> dict[str, Argument]:
+    return {
+        each.field.name: each
+        for into, note in _notes_of(kind).items()
+        for each in _arguments_in(replace(note, usual=note.lines, expert=()), into)
+    }
 
 
 _EXPECTED = {int: "a whole number", float: "a number", Path: "a path"}
 
 
 def _values_of(
-    words: Sequence[str], known: Mapping[str, Argument], left: Mapping[str, str], prog: str
-) -> tuple[dict[str, Any], list[str]]:
+    words: Sequence[str], known: Mapping[str, Argument],
+    refuse: Callable[[str, Sequence[str]], NoReturn],
+) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """Values by field of the options among the words, and the words that are none.
 
-    known: by all spellings; left: see FieldsOf.  Raises UsageError.
+    known: by all spellings; refuse: raises for another option, given what follows it.  Raises
+    UsageError.
     """
     rest = list(words)
     values: dict[str, Any] = {}
@@ -216,7 +259,7 @@ def _values_of(
         name, sign, value = word.partition("=")
         name = name.replace("_", "-")
         if name not in known:
-            raise UsageError(_no_such(name, known, left, prog))
+            refuse(name, [value] if sign else rest)
         each = known[name]
         if each.kind is bool:
             said = value if sign else rest.pop(0) if rest and rest[0] in SWITCHED else "True"
@@ -246,7 +289,7 @@ def _following(each: Argument, rest: list[str]) -> list[str]:
 def _checked(each: Argument, words: Sequence[str]) -> tuple:
     """The values of an option's words.  Raises UsageError."""
     if each.count == 1 and not words:
-        raise UsageError(f"{each.name} has no value, expected {_expected(each)}.")
+        raise UsageError(f"{each.name} has no value, expected {expected(each)}.")
     if len(words) != each.count and not (each.many and words):
         raise UsageError(f"{each.name} has {len(words)} values, expected {each.count or 'some'}.")
     return tuple(_read(word, each) for word in words)
@@ -257,13 +300,20 @@ def _is_option(word: str) -> bool:
     return word.startswith("-") and word != "-" and not NUMBER.match(word)
 
 
-def _no_such(name: str, known: Mapping[str, Argument], left: Mapping[str, str], prog: str) -> str:
-    bare = name.lstrip("-")
+def _refuse_unknown(kind: type, prog: str, name: str, rest: Sequence[str]) -> NoReturn:
+    """Raises UsageError.  rest: the words after it."""
+    bare, left = name.lstrip("-"), left_options_of(kind)
+    if (line := _only_lines_of(kind).get(bare.replace("-", "_"))) is not None:
+        raise UsageError(
+            f"{name} is a line of a settings file: write `{line_of(line, rest)}` into a file such "
+            "as train.toml and add --settings train.toml."
+        )
     if now := left.get(bare) or left.get(bare.removeprefix("no-")):
-        return f"{name} left the program: {now}."
-    meant = nearest(name, list(known))
+        raise UsageError(f"{name} left the program: {now}.")
+    known = [spelling for each in arguments_of(kind) for spelling in _spellings(each)]
+    meant = nearest(name, known)
     hint = f"did you mean {meant}?" if meant else f"`{prog} --help` lists them."
-    return f"there is no option '{name}'; {hint}"
+    raise UsageError(f"there is no option '{name}'; {hint}")
 
 
 def _place(arguments: Sequence[Argument], words: Sequence[str], prog: str) -> dict[str, Any]:
@@ -300,14 +350,15 @@ def _read(text: str, each: Argument) -> Any:
             return text
         meant = nearest(text, each.choices)
         hint = f"; did you mean {meant}?" if meant else "."
-        raise UsageError(f"{each.name} is '{text}', expected {_expected(each)}{hint}")
+        raise UsageError(f"{each.name} is '{text}', expected {expected(each)}{hint}")
     try:
         return each.kind(text)
     except ValueError:
-        raise UsageError(f"{each.name} is '{text}', expected {_expected(each)}.") from None
+        raise UsageError(f"{each.name} is '{text}', expected {expected(each)}.") from None
 
 
-def _expected(each: Argument) -> str:
+def expected(each: Argument) -> str:
+    """What may stand there, for messages."""
     *most, last = each.choices or ("",)
     if each.choices:
         return f"{', '.join(most)} or {last}" if most else last

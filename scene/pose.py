@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 # OpenCV axes (x right, y down, z forward) from eye axes (x right, y up, -z forward).
 MOST_SIDE = 65536  # pixels
@@ -203,7 +204,7 @@ class View:
         return View(self.world_from_eye, (left, right, down, up), self.near, self.far, size)
 
 
-def look_at(eye: np.ndarray, target: np.ndarray, up: tuple = (0.0, 1.0, 0.0)) -> Pose:
+def look_at(eye: ArrayLike, target: ArrayLike, up: tuple = (0.0, 1.0, 0.0)) -> Pose:
     """The pose of an eye at `eye` (3,) that looks at `target` (3,), metres in the world.
 
     Raises ValueError where these and `up` say no direction.

@@ -12,7 +12,7 @@ BLENDED = "--blended-shapes learns what lies between two stops"
 # Option without its dashes -> what does its work now, with options as they are typed.
 LEFT = {
     "preset": "there is one set of defaults; the paper's sizes are --iterations 30000 "
-    "--max-anchors 100000 --splats-per-anchor 10",
+    "--max-anchors 100000 with the setting splats_per_anchor at 10",
     "encoding": UNITS,
     "control": UNITS,
     "sigma": UNITS,
@@ -23,7 +23,7 @@ LEFT = {
     "with half of them",
     "rise": "a run that diverges goes on with a learning-rate warm-up by itself",
     "revive": "the loss that keeps faint splats from vanishing has a fixed weight of 0.05",
-    "layers": "each network has one hidden layer, and --hidden says how wide it is",
+    "layers": "each network has one hidden layer, and the setting hidden says how wide it is",
     "coarse": FULL,
     "coarse-until": FULL,
     "thermal-smooth": "thermal pictures did not gain by it; leave it out",
@@ -35,7 +35,8 @@ LEFT = {
     "grow": "runs always grow, which makes packages smaller and no worse; leave it out",
     "view-dependent": "colours depend on the direction, and `fit` finds out whether a scene can "
     "spare that",
-    "splats": "a run of --model splats starts with 10,000 a modality, and --max-splats bounds them",
+    "splats": "a run of --model splats starts with 10,000 a modality, and the setting max_splats "
+    "bounds them",
     **dict.fromkeys(
         (
             "anchors", "voxel", "growth", "grow-threshold", "grow-grids", "grow-each",

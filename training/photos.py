@@ -263,7 +263,7 @@ def validate_views(photos: list[LoadedPhoto], masks: str) -> tuple[list[LoadedPh
                 "will be a guess; 30 and more from all around are a good capture."
                 + (
                     f"  If it shows the shapes of {shared}, it can share them: "
-                    "--fixed offset,scale,rotation,opacity."
+                    'fixed = "offset,scale,rotation,opacity" in the file of --settings.'
                     if more.count(shared) > FEW
                     else ""
                 )

@@ -110,8 +110,8 @@ class TrainSettings:
     max_anchors: int = 12000
     """Most anchors; as far as there are points, a run starts with that many.  A capture of one
     modality with 16 or more training photos has 30000 of 2 splats with light by direction instead,
-    layers with shapes of their own have 12000 a shape, where none of --max-anchors,
-    --splats-per-anchor, --anchor-attributes and --max-mb is given."""
+    layers with shapes of their own have 12000 a shape, where none of max_anchors,
+    splats_per_anchor, anchor_attributes and max_mb is given."""
     max_by_shape: bool = False
     """Whether max_anchors is of each shape that the modalities' hulls are, beside triangulated
     points."""
@@ -139,8 +139,7 @@ class TrainSettings:
     splats_per_anchor: int = 5
     """Splats that the networks predict for each anchor: k in the paper.  Several modalities of
     photos with fewer than 60,000 pixels have fewer, as many as pixels by 12,000 anchors, at least
-    2, where none of --max-anchors, --splats-per-anchor, --anchor-attributes and --max-mb is
-    given."""
+    2, where none of max_anchors, splats_per_anchor, anchor_attributes and max_mb is given."""
     features: int = 16
     """Numbers that each anchor stores for the networks: the length of its feature vector."""
     hidden: int = 32

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from shapeshift.app.command_line import Argument, arguments_of
+from shapeshift.app.command_line import Argument, arguments_of, dicts_of
 from shapeshift.app.paths import file_name, full
 from shapeshift.app.program import ROOT, version
 from shapeshift.runtime_models.files.json_fields import saved_object
@@ -160,9 +160,16 @@ def digest_of_file(path: str) -> str:
 
 
 def words_for(command: str, options: Any) -> tuple[str, ...]:
-    """A command with its options, so that `parse` of them gives the same; paths are absolute."""
+    """A command with its options, so that `parse` of them gives the same; paths are absolute.
+
+    What is no option is in the file of --settings.  ValueError where there is none.
+    """
     places, rest = [], []
     kind: type = type(options)
+    asked = {name for group in dicts_of(kind) for name in getattr(options, group)}
+    lines = asked - {each.field.name for each in arguments_of(kind) if each.into}
+    if lines and options.settings is None:
+        raise ValueError(f"{', '.join(sorted(lines))}: lines of a settings file, and none is given")
     for each in arguments_of(kind):
         given, value = _value_of(options, each)
         if not given:

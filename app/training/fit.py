@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf, Opt
 from shapeshift.app.terminal import open_console, print_json, say
-from shapeshift.app.training.train_options import Asked, MachineOptions
+from shapeshift.app.training.train_options import SETTINGS, Asked, MachineOptions, with_settings
 from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings, suited
 
@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 
 
 USUAL = ("max_anchors", "downscale", "masks", "background")
-EXPERTS = (  # as of train
-    "seed", "splats_per_anchor", "features", "hidden", "fixed", "anchor_attributes",
-)  # fmt: skip
+LINES = ("splats_per_anchor", "features", "hidden", "fixed", "anchor_attributes")  # as of train
 
 
 @dataclass(frozen=True)
@@ -38,9 +36,11 @@ class Options(ClusterOptions, MachineOptions):
     """A folder of posed photos, as of train."""
     out: Path
     """The package to write: NAME.shift or a folder."""
-    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS, LEFT)] = field(
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, ("seed",), LINES, LEFT)] = field(
         default_factory=dict
     )
+    settings: Annotated[Path | None, SETTINGS] = None
+    """A TOML file with a setting a line, as of train.  Default: none."""
     tolerance_db: float = 0.1
     """dB that each modality may lose in all against the largest model, its error included."""
     seeds: int = 2
@@ -85,6 +85,7 @@ def run(options: Options) -> int:
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
 
+    options = with_settings(options)
     if options.only is not None:
         return run_trial(options)
     refuse_options(options)

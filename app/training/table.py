@@ -12,7 +12,13 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED
 from shapeshift.app.training.table_parts import MEAN, NAMES, TableRow, VggRow, finish, mean_row
-from shapeshift.app.training.train_options import OF_SPLATS, Asked, MachineOptions
+from shapeshift.app.training.train_options import (
+    OF_SPLATS,
+    SETTINGS,
+    Asked,
+    MachineOptions,
+    with_settings,
+)
 from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.left_options import LEFT
@@ -45,10 +51,12 @@ class Options(ClusterOptions, MachineOptions):
     """A folder of posed photos; each modality needs held-out ones."""
     out: Path
     """A folder for the models, table.csv and table.md.  A method that is in it is not run again."""
-    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, ("seed",), LEFT)] = field(
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, ("seed",), left=LEFT)] = field(
         default_factory=dict
     )
-    splats: Annotated[Asked, FieldsOf(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
+    splats: Annotated[Asked, FieldsOf(PlainSettings, lines=OF_SPLATS)] = field(default_factory=dict)
+    settings: Annotated[Path | None, SETTINGS] = None
+    """A TOML file with a setting a line, as of train.  Default: none."""
     seconds: float | None = None
     """Budget of every method; its models share it.  Default: none, give this or --iterations."""
     iterations: int | None = None
@@ -78,6 +86,7 @@ def run(options: Options) -> int:
     from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
+    options = with_settings(options)
     if options.seconds is None and options.iterations is None:
         raise UsageError("a comparison needs a budget: give --seconds or --iterations.")
     if not options.methods:
@@ -262,12 +271,14 @@ def command_line(options: Options) -> str:
     words = ["python3 launch.py table", options.capture.resolve().name]
     named = {each.name: getattr(options, each.name) for each in fields(options)}
     places = ("cluster", "certificates", "gpus", "only", "resume")
-    for unnamed in ("capture", "out", "methods", "asked", "splats", *places):
+    for unnamed in ("capture", "out", "methods", "asked", "splats", "settings", *places):
         del named[unnamed]
-    for name, value in (named | options.asked | options.splats).items():
+    for name, value in (named | options.asked).items():
         if value is not None:
             shown = value.name if isinstance(value, Path) else value
             words.append(f"--{name.replace('_', '-')} {shown}")
+    if lines := ", ".join(f"{name} = {value}" for name, value in options.splats.items()):
+        words.append(f"--settings FILE ({lines})")
     return " ".join([*words, "--out DIR"])
 
 

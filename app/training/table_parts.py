@@ -201,6 +201,8 @@ def task_of(part: TablePart, options: Any) -> Task:
     reads = [full(options.capture)]
     if options.calibrate is not None:
         reads.append(full(options.out / "rig.json"))
+    if options.settings is not None:
+        reads.append(full(options.settings))
     return Task(
         part.name, words_for("table", words), tuple(reads), (full(part.file), full(part.trained)),
         {"gpu": 1} if options.device == "gpu" else {},

@@ -24,7 +24,7 @@ from shapeshift.app.training.run_loop import (
     train,
     used,
 )
-from shapeshift.app.training.train_options import Options, settings_of
+from shapeshift.app.training.train_options import Options, settings_of, with_settings
 
 if TYPE_CHECKING:
     from shapeshift.training.train import Trainer
@@ -34,6 +34,7 @@ FEW_STEPS = USUAL_STEPS // 2  # scenes that are worth looking at need about so m
 
 
 def run(options: Options) -> int:
+    options = with_settings(options)
     check_calibrate(options)
     in_blocks = part_in_blocks(options)
     return in_blocks(options) if in_blocks is not None else run_whole(options)
@@ -145,8 +146,7 @@ def check_plain_options(options: Options) -> None:
     from shapeshift.app.errors import UsageError
 
     for name in options.splats:
-        option = f"--{name.replace('_', '-')}"
-        raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
+        raise UsageError(f"{name} is of plain splats; add --model splats, or leave it out.")
 
 
 def doubts(trainer: "Trainer") -> tuple[list[str], bool]:

@@ -21,7 +21,7 @@ from shapeshift.app.training.run_loop import (
     train,
     used,
 )
-from shapeshift.app.training.train_options import Asked, Options, settings_of
+from shapeshift.app.training.train_options import Asked, Options, as_given, settings_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -111,8 +111,9 @@ def plain_settings(options: Options) -> "PlainSettings":
     names = {f.name for f in fields(PlainSettings)}
     for name in options.asked:
         if name not in names:
-            option = f"--{name.replace('_', '-')}"
-            raise UsageError(f"{option} is of anchor models; leave it out with --model splats.")
+            raise UsageError(
+                f"{as_given(name)} is of anchor models; leave it out with --model splats."
+            )
     chosen = options.asked | options.splats
     if "seconds" in chosen and "iterations" not in chosen:
         chosen["iterations"] = None

@@ -14,7 +14,13 @@ from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED, decibels, train, used
-from shapeshift.app.training.train_options import Asked, MachineOptions, settings_of
+from shapeshift.app.training.train_options import (
+    SETTINGS,
+    Asked,
+    MachineOptions,
+    settings_of,
+    with_settings,
+)
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.model import AnchorModel, Model
 from shapeshift.runtime_models.package.feature_codes import EXACT
@@ -30,7 +36,8 @@ if TYPE_CHECKING:
     from shapeshift.training.update.update_trainer import UpdateTrainer
 
 USUAL = ("seconds", "iterations", "points", "downscale", "masks", "background")
-EXPERTS = ("seed", "max_anchors", "depth_share", "normal_share", "min_scale_px")
+EXPERTS = ("seed", "max_anchors")
+LINES = ("depth_share", "normal_share", "min_scale_px")  # as of train
 READING = "reading photos, finding the first points"
 
 
@@ -53,7 +60,11 @@ class Options(MachineOptions):
     change: Path | None = None
     """The folder that `change SCENE LATER --out` wrote: its places, and how the capture's world
     lies in the scene's.  Default: both are one world."""
-    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS, LINES)] = field(
+        default_factory=dict
+    )
+    settings: Annotated[Path | None, SETTINGS] = None
+    """A TOML file with a setting a line, as of train.  Default: none."""
     resume: bool = False
     """Continue from the checkpoint beside --out, with the same scene, capture and places."""
     overwrite: bool = False
@@ -77,6 +88,7 @@ def run(options: Options) -> int:
     from shapeshift.training.update.begin_update import begin_update
     from shapeshift.training.update.regions import moved_capture
 
+    options = with_settings(options)
     check_output(options.out, [options.scene], options.overwrite or options.resume)
     check_writable(options.out)
     refuse_foreign(options.out)

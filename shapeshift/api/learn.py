@@ -104,7 +104,7 @@ def train_in_blocks(
 ) -> TrainedScene:  # fmt: skip
     """As train --blocks.  more: other options of the command."""
     from shapeshift.app.training.blocks.outcome import train_quietly
-    from shapeshift.app.training.train_options import EXPERTS, USUAL, Options
+    from shapeshift.app.training.train_options import EXPERTS, LINES, USUAL, Options
 
     if out is None:
         raise UsageError("blocks wants out, a folder NAME.blocks.")
@@ -114,7 +114,7 @@ def train_in_blocks(
         more["certificates"] = plain(more["certificates"])
     settings_of(given, None)  # refused now, not after the run of the whole
     for name in given:
-        if name not in (*USUAL, *EXPERTS):
+        if name not in (*USUAL, *EXPERTS, *LINES):
             raise UsageError(f"{name}: blocks are trained by commands, which have no such option.")
     options = Options(plain(capture), out, given, blocks=blocks, **more)
     return TrainedScene(*train_quietly(options, pace, progress))

@@ -194,9 +194,8 @@ def test_the_settings_of_a_training_are_its_options(capsys):
     assert cli.main(["train", "--help"]) == 0
     told, usual = " ".join(capsys.readouterr().out.split()), TrainSettings()
     assert f"gives the same bits. (default: {usual.iterations})" in told
-    assert "k in the paper. Several modalities" in told
-    assert f"and --max-mb is given. (default: {usual.splats_per_anchor})" in told
-    assert f"those are not used. (default: {usual.depth_share})" in told
+    assert f"and max_mb is given. (default: {usual.max_anchors})" in told
+    assert "splats_per_anchor, features" not in told
     options = parse(options_of("train"), ["photos", "--out", "a", "--seed", "3"], PROG)
     assert options.asked == {"seed": 3} and options.splats == {}
 

@@ -4,8 +4,8 @@
 
 The capture is balls (training/synthetic/balls.py) or a folder whose photos have depth.  start is
 where the first anchors come from: the capture's points, or, without them, a visual hull.  views
-is how many training photos of each modality are used, 0 for all.  share is --depth-share; 0 trains
-on the same photos alone.  depth_error is what `eval` tells over the held-out photos: the mean of
+is how many training photos of each modality are used, 0 for all.  share is depth_share; 0 trains on
+the same photos alone.  depth_error is what `eval` tells over the held-out photos: the mean of
 |depth - d| / d, 1 where less than half of a pixel is covered.  Shares take turns within a seed.
 """
 

@@ -13,8 +13,8 @@ what a capture does not have are left out.
 
   default        2 splats an anchor and light, as `train` has it from 16 photos of one modality on;
                  without depth and normals
-  depth          with depth photos (--depth-share 0.3)
-  normals        with normal maps (--normal-share 0.1)
+  depth          with depth photos (depth_share = 0.3)
+  normals        with normal maps (normal_share = 0.1)
   both           with both
   rough depth    depth as a network guesses it that was fitted to the scene: each photo's scaled by
                  chance, one sigma 5 %, and bent by 5 % from side to side
@@ -27,7 +27,7 @@ what a capture does not have are left out.
   half           half of the anchors
   left out       each step leaves out a tenth of the anchors, drawn by chance (DropGaussian, 2025)
   early          half of the steps
-  coarse         a slope on scales below two pixels of the finest photo (--min-scale-px 2)
+  coarse         a slope on scales below two pixels of the finest photo (min_scale_px = 2)
 """
 
 import argparse

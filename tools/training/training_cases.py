@@ -104,6 +104,7 @@ class Case:
     change: Change = untouched
     judge: Callable[[Outcome], str] = by_loss
     options: tuple[str, ...] = ()
+    settings: str = ""  # lines of the file of --settings
     share: float = 1.0  # of the steps of the others: what is kept needs no good picture
     fault: Callable[[int], AbstractContextManager] = no_fault
     resumed: bool = False  # whether a second command goes on
@@ -113,7 +114,7 @@ class Case:
     def nothing_done(self) -> bool:
         """Whether the untouched capture itself is the case."""
         plain = self.change is untouched and self.fault is no_fault
-        return plain and not self.options and self.out == "scene.shift"
+        return plain and not (self.options or self.settings) and self.out == "scene.shift"
 
 
 def written(changed: Capture, case: str) -> Path:
@@ -304,7 +305,7 @@ def interrupted(trainer: Trainer) -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-SHARED = ("--fixed", "offset,scale,rotation,opacity")
+SHARED = 'fixed = "offset,scale,rotation,opacity"'
 CASES = (
     *(
         Case(f"{n} views", "balls", f"{n} of 40 training photos of each modality",
@@ -312,8 +313,8 @@ CASES = (
         for n in (3, 6, 12)
     ),
     Case("five images", "balls", "5 of 40 training photos of Thermal", partial(few, 5, "Thermal")),
-    Case("five images, one shape", "balls", "the same, with `--fixed` " + SHARED[1],
-         partial(few, 5, "Thermal"), options=SHARED),
+    Case("five images, one shape", "balls", f"the same, with `{SHARED}`",
+         partial(few, 5, "Thermal"), settings=SHARED),
     Case("wrong poses", "balls", "every 10th pose turned by 8 degrees",
          partial(wrong_poses, 8.0), named),
     Case("slightly wrong poses", "balls", "every 10th pose turned by 2 degrees",

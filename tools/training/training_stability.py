@@ -101,6 +101,10 @@ class Bench:
         steps = round(case.share * self.iterations)
         words = ["train", str(capture), "--out", str(out), "--iterations", str(steps)]
         start = [*words, *ANCHORS, *case.options]
+        if case.settings:
+            file = self.folder / "train.toml"
+            file.write_text(case.settings + "\n", encoding="utf-8")
+            start += ["--settings", str(file)]
         said = io.StringIO()
         with contextlib.redirect_stderr(said):
             with case.fault(steps):

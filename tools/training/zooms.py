@@ -8,7 +8,7 @@ CAPTURE is a folder of photos, made --downscale times smaller for the training, 
 demo's bench at 192x144 pixels, made on the spot unless there is such a folder.  Held-out views are
 drawn at 1/4, 1/2, 1, 2 and 4 times the size of the training.  The truth is the photo itself, for
 the bench ray-traced again at four times its size, and for the smaller sizes what blocks of its
-pixels have in the mean.  bound_px is --min-scale-px; thin is the share of the opacity in splats one
+pixels have in the mean.  bound_px is min_scale_px; thin is the share of the opacity in splats one
 axis of which is below 0.45 pixels.
 """
 

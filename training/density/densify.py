@@ -207,7 +207,7 @@ def anchor_cap(
     if fits < 1:
         raise BadFile(
             f"--max-mb {settings.max_mb:g} leaves no room for anchors: the networks alone take up "
-            f"to {fixed / 1e6:.3f} MB; allow more, or make them smaller with --hidden."
+            f"to {fixed / 1e6:.3f} MB; allow more, or make them smaller by the setting hidden."
         )
     return min(settings.max_anchors, fits)
 

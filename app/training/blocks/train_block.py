@@ -9,7 +9,7 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 from shapeshift.app.training.blocks.train_in_blocks import OF_BLOCKS, most_anchors, wanted_of
 from shapeshift.app.training.run_loop import INTERRUPTED, READING, decibels, describe, train
-from shapeshift.app.training.train_options import Options
+from shapeshift.app.training.train_options import Options, as_given
 
 if TYPE_CHECKING:
     from shapeshift.training.blocks.block_start import BlockStart
@@ -102,8 +102,7 @@ def settings_of_block(
     for name in options.asked:
         if name not in OF_BLOCKS:
             raise UsageError(
-                f"--{name.replace('_', '-')}: a block has the settings of its coarse run; leave "
-                "it out."
+                f"{as_given(name)}: a block has the settings of its coarse run; leave it out."
             )
     try:
         if resume is not None:

@@ -1,5 +1,6 @@
 """launch.py train --blocks: a coarse run of the whole, its cut, a task a block, one scene."""
 
+import json
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,7 +15,7 @@ from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
-from shapeshift.app.training.train_options import Asked, Options
+from shapeshift.app.training.train_options import LINES, Asked, Options
 
 if TYPE_CHECKING:
     from shapeshift.app.cluster.run_task import Shown
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 ENDING = ".blocks"
 OF_BLOCKS = ("iterations", "max_anchors", "max_mb")  # settings that a block may have of its own
-COARSE, CUT = "coarse.shift", "cut"  # in the folder of the work
+COARSE, CUT, LINES_FILE = "coarse.shift", "cut", "settings.toml"  # in the folder of the work
 
 
 def run_blocks(options: Options) -> int:
@@ -101,7 +102,7 @@ def refuse_options(options: Options, said: str) -> None:
     if options.model == "splats" or options.separate:
         raise UsageError("--blocks: plain splats and --separate are trained as a whole; leave it.")
     for name in options.splats:
-        raise UsageError(f"{typed(name, said)} is of plain splats; leave it out.")
+        raise UsageError(f"{name} is of plain splats; leave it out.")
     for name, value, least in (
         ("coarse_iterations", options.coarse_iterations, 1),
         ("block_photos", options.block_photos, 0),
@@ -177,6 +178,7 @@ def slots_of(argv: Sequence[str]) -> dict[str, int]:
 
 def coarse_task(options: Options, work: Path) -> Task:
     """The whole capture in one run, as ever."""
+    from shapeshift.runtime_models.files.whole_file import write_whole
     from shapeshift.training.checkpoint import checkpoint_path
 
     capture, out = capture_path(options), work / COARSE
@@ -190,7 +192,12 @@ def coarse_task(options: Options, work: Path) -> Task:
         asked["points"] = points
         reads.append(points)
     calibrate = ["--calibrate", options.calibrate] if options.calibrate else []
+    lines = "".join(f"{n} = {json.dumps(asked.pop(n))}\n" for n in LINES if n in asked)
     argv = ["train", capture, "--out", str(out), *words_of(asked), *calibrate]
+    if lines:
+        write_whole(work / LINES_FILE, lines.encode())
+        argv += ["--settings", str(work / LINES_FILE)]
+        reads.append(str(work / LINES_FILE))
     return task_of(
         "coarse run", [*argv, *shared_words(options)], reads, [out, checkpoint_path(out)]
     )

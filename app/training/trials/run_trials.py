@@ -18,6 +18,7 @@ from shapeshift.app.paths import full
 from shapeshift.app.progress import working
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED, READING, describe, train
+from shapeshift.app.training.train_options import as_given
 
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture
@@ -188,9 +189,7 @@ def refuse_others(options: Any) -> None:
         usual = each.default if each.default is not MISSING else {}
         if each.name not in MEANT and (given := getattr(options, each.name)) != usual:
             name = next(iter(given)) if each.name == "asked" else each.name
-            raise UsageError(
-                f"--only trains what its file says; leave out --{name.replace('_', '-')}."
-            )
+            raise UsageError(f"--only trains what its file says; leave out {as_given(name)}.")
     if options.out.suffix != ".shift":
         raise UsageError(f"--only writes one file; --out is {options.out}, expected NAME.shift.")
 

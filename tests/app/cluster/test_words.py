@@ -11,6 +11,7 @@ from shapeshift.app.film.film import Options as FilmOptions
 from shapeshift.app.training.fit import Options as FitOptions
 from shapeshift.app.training.table import Options as TableOptions
 from shapeshift.app.training.train import Options as TrainOptions
+from shapeshift.app.training.train_options import with_settings
 
 FILM = FilmOptions(Path("/a/b c.shift"), Path("/out"))
 TABLE = TableOptions(Path("/capture"), Path("/out"))
@@ -22,15 +23,26 @@ TABLE = TableOptions(Path("/capture"), Path("/out"))
             streams=("depth", "normal"), style_path="RGB@0 Thermal@3s", stereo=0.063,
             background=(0.0, 1e-7, 1.0), save_path=Path("/p.film.json")),
     replace(TABLE, asked={"max_anchors": 400, "background": "black", "seed": 0}, iterations=20,
-            splats={"sh_degree": 1}, methods=("joint", "splats"), vgg=Path("/-v.onnx")),
+            settings=Path("/-a.toml"), methods=("joint", "splats"), vgg=Path("/-v.onnx")),
     FitOptions(Path("/capture"), Path("/o.shift"), only=Path("/a/b c.json"), device="cpu",
                memory=0.1 + 0.2),
-    TrainOptions(Path("/capture"), Path("/out.shift"), {"iterations": 9, "fixed": "-"},
+    TrainOptions(Path("/capture"), Path("/out.shift"), {"iterations": 9, "points": "-"},
                  separate=True),
 ])  # fmt: skip
 def test_options_come_back_out_of_their_words(options):
     command, *words = words_for("cluster", options)
     assert command == "cluster" and parse(type(options), words, "x") == options
+
+
+def test_lines_of_a_settings_file_stay_in_it(tmp_path):
+    given = replace(TABLE, splats={"sh_degree": 1})
+    with pytest.raises(ValueError, match=r"^sh_degree: lines of a settings file"):
+        words_for("table", given)
+    file = tmp_path / "a.toml"
+    file.write_text("sh_degree = 1")
+    given = replace(given, settings=file)
+    _, *words = words_for("table", given)
+    assert with_settings(parse(TableOptions, words, "x")) == given
 
 
 def test_defaults_are_left_out_and_paths_are_absolute(monkeypatch, tmp_path):

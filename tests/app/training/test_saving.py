@@ -181,7 +181,7 @@ def test_few_photos_and_missing_masks_are_spoken_of(balls):
     assert len(kept) == 27 and all(p.masked for p in kept) and "9 photos" in doubts[0]
     fewer = [p for p in photos if p.modality == "Thermal"]
     assert validate_views(many + fewer, "ignore")[1][0].endswith(
-        "of RGB, it can share them: --fixed offset,scale,rotation,opacity."
+        'can share them: fixed = "offset,scale,rotation,opacity" in the file of --settings.'
     )
     most = [replace(p, masked=i % 4 == 0) for i, p in enumerate(many)]
     kept, doubts = validate_views(most, "object")

@@ -205,7 +205,10 @@ def test_options_go_to_the_methods_that_have_them(tmp_path):
     assert joint.asked == {"seconds": 60} | asked
     assert train_options("separate", options).separate
     words = command_line(options)
-    assert "--seconds 60" in words and "--max-anchors 400 --seed 3 --max-splats 900" in words
+    assert (
+        "--seconds 60" in words
+        and "--max-anchors 400 --seed 3 --settings FILE (max_splats = 900" in words
+    )
     assert "--methods" not in command_line(replace(options, methods=("joint",)))
 
 
@@ -238,10 +241,10 @@ def test_what_cannot_be_compared_is_refused_before_training(balls, tmp_path):
 def test_options_of_another_kind_of_model_are_refused(balls, tmp_path):
     asked = TrainOptions(balls.folder, tmp_path / "out", {"iterations": 2}, model="splats")
     for wrong, words in (
-        ({"asked": {"features": 8}}, "--features is of anchor models"),
+        ({"asked": {"features": 8}}, "^features is of anchor models"),
         ({"separate": True}, "leave out --separate"),
         ({"splats": {"sh_degree": 4}}, "up to degree 3"),
-        ({"model": "anchors", "splats": {"sh_degree": 2}}, "--sh-degree is of plain splats"),
+        ({"model": "anchors", "splats": {"sh_degree": 2}}, "^sh_degree is of plain splats"),
     ):
         with pytest.raises(UsageError, match=words):
             run_training(replace(asked, **wrong))

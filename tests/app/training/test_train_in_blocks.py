@@ -40,7 +40,6 @@ def files_of(folder: Path) -> dict[str, bytes]:
         ("a.blocks", ("--blocks", "2", "--seconds", "5"), "give --iterations"),
         ("a.blocks", ("--blocks", "2", "--poses", "refine"), "--poses refine"),
         ("a.blocks", ("--blocks", "2", "--separate"), "--separate"),
-        ("a.blocks", ("--blocks", "2", "--max-splats", "9"), "--max-splats is of plain splats"),
         ("a.blocks", ("--blocks", "auto", "--max-anchors", "99999"), "leave out --blocks"),
         ("a.shift", ("--coarse-iterations", "9"), "add --blocks"),
         ("a.shift", ("--block", "no.npz"), "no start of a block is there"),

@@ -268,7 +268,7 @@ def test_a_package_within_its_megabytes(tmp_path, features, max_mb, lit):
 
 def test_a_budget_that_holds_nothing_is_refused():
     layout, encoding = HeadLayout(), ControlEncoding(16, 1 / 15, 0.04)
-    with pytest.raises(BadFile, match=r"--max-mb 0.001 leaves no room for anchors.*--hidden"):
+    with pytest.raises(BadFile, match=r"--max-mb 0.001 leaves no room.*the setting hidden"):
         anchor_cap(TrainSettings(max_mb=0.001), layout, encoding, STOPS)
 
 
