@@ -131,7 +131,7 @@ def test_every_word_of_the_sheets_keys_fits_beside_what_it_does(code):
     use_language(code)
     groups = [*shell.GROUPS.values()]
     for name in KEY_TABLES:
-        rows = importlib.import_module(f"shapeshift.app.editor.window.{name}").KEYS
+        rows = importlib.import_module(f"shapeshift.app.{name}").KEYS
         groups += rows.values() if isinstance(rows, dict) else [rows]
     keys = {shell.key_text(key) for rows in groups for key, _ in rows}
     assert len(keys) > 60

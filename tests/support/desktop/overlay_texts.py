@@ -11,6 +11,7 @@ from shapeshift.renderer.debug.debug import REASON_TEXTS
 
 ROOT = Path(__file__).resolve().parents[3]
 EDITOR, HEADSET = ROOT / "app" / "editor", ROOT / "app" / "headset"
+BESIDE = (ROOT / "app" / "inspection" / "window", ROOT / "app" / "film" / "window")
 PANELS = "shapeshift.app.editor.panels"
 # function: which of its positional arguments are texts (None: all)
 SAYING: dict[str, tuple[int, ...] | None] = {
@@ -24,31 +25,34 @@ KEYS, VALUES, ALL = "keys", "values", "all"
 TABLES = {
     "cuts_panel": {"ADD": ALL, "EDGES": VALUES},
     "empty_panel": {"CHOICES": ALL, "WHAT": ALL},
-    "inspection.ruler_panel": {"KIND_LABELS": VALUES, "KIND_TIPS": ALL, "ACTIONS": ALL},
-    "keys_sheet": {"GROUPS": ALL, "KEY_WORDS": VALUES},
     "open_row": {"NEW": ALL},
     "panel": {"LARGER": ALL, "SMALLER": ALL, "ORDER": ALL},
-    "save_boxes": {"OVER": ALL, "SAVE": ALL, "LOSE": ALL},
-    "sections.appearance_panel": {"SLIDERS": VALUES, "PARTS": ALL},
     "sections.camera_panel": {
         "STEPS": ALL, "KEEP": ALL, "SIDES": ALL, "WAYS": ALL, "FORM_NAMES": VALUES,
     },
     "sections.export_panel": {"DEGREES": ALL, "FORMAT_TIPS": VALUES},
-    "sections.film_panel": {"AROUND": ALL, "PAST": ALL},
-    "sections.histogram_panel": {"EXPLAINED": ALL},
-    "sections.inspect_panel": {
-        "COLUMNS": ALL, "BOUND_TIPS": ALL, "VALUE_TIPS": ALL, "AUTO_TIPS": ALL, "MEASURES": ALL,
-        "EMISSIVITY": ALL,
-    },
-    "sections.look_panel": {"TWO_STOPS": ALL, "PALETTE_TIP": ALL, "DEBUG_NAMES": VALUES},
     "sections.objects_panel": {"MODES": VALUES, "FOUR_VIEW_NAMES": VALUES, "DEEDS": ALL},
     "sections.parts_panel": {
-        "AXES": ALL, "DEEDS": ALL, "SIZES": ALL, "CHOICES": ALL, "FLOATERS": ALL,
+        "AXES": ALL, "DEEDS": ALL, "EXPLAINED": ALL, "SIZES": ALL, "CHOICES": ALL, "FLOATERS": ALL,
         "DRAG_WORDS": VALUES,
     },
     "sections.quality_panel": {"GROUPS": KEYS, "ORDER_NAMES": VALUES},
     "sections.regions_panel": {"DIRECTIONS": KEYS, "HALVES": ALL, "PAINTED": ALL, "KIND_TIPS": ALL},
+    "sections.plain_sections": {
+        "SLIDERS": VALUES, "PARTS": ALL, "TWO_STOPS": ALL, "PALETTE_TIP": ALL,
+        "DEBUG_NAMES": VALUES,
+    },
     "sections.stops_panel": {"MODE_NAMES": VALUES},
+}  # fmt: skip
+TABLES_BESIDE = {
+    "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "LOSE": ALL},
+    "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},
+    "film.window.films": {"AROUND": ALL, "PAST": ALL},
+    "inspection.window.inspect_panel": {
+        "COLUMNS": ALL, "BOUND_TIPS": ALL, "VALUE_TIPS": ALL, "AUTO_TIPS": ALL, "MEASURES": ALL,
+        "EMISSIVITY": ALL,
+    },
+    "inspection.window.ruler_panel": {"KIND_LABELS": VALUES, "KIND_TIPS": ALL, "ACTIONS": ALL},
 }  # fmt: skip
 HEADSET_TABLES = {
     "sections.comfort_section": {
@@ -56,15 +60,17 @@ HEADSET_TABLES = {
         "TURN_NAMES": VALUES, "MODEL_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL, "ROOM": ALL,
         "NO_ROOM": ALL, "SHARP": ALL, "SHARP_NAMES": VALUES, "LATER": ALL, "NO_INSETS": ALL,
     },
-    "sections.glass_section": {"NONE": ALL, "HELP": ALL},
     "sections.tool_sections": {"HOW": VALUES},
-    "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL}, "wrist_menu": {"SURE": ALL},
+    "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL},
+    "wrist_menu": {"NONE": ALL, "HELP": ALL, "SURE": ALL},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
-# of app/editor/window: KEYS of the sheet
+# below app: KEYS of the sheet
 KEY_TABLES = (
-    "devices.gamepads", "devices.space_mice", "inspection.mouse_marks", "inspection.mouse_ruler",
-    "objects", "parts", "sections.section_handles", "split", "touch", "wipe",
+    "editor.desktop", "editor.window.devices.input_devices", "editor.window.devices.space_mice",
+    "editor.window.objects", "editor.window.parts", "editor.window.section_handles",
+    "editor.window.touch", "editor.window.two_pictures", "inspection.window.attach_inspection",
+    "inspection.window.attach_ruler",
 )  # fmt: skip
 STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
 # Texts on their way through variables, as tests/.../look/test_desktop_languages.py has found them.
@@ -147,14 +153,24 @@ def texts_of(value: object, what: str = ALL) -> Iterator[str]:
             yield from texts_of(each)
 
 
+def sources() -> list[Path]:
+    """Every file that says something over the picture."""
+    tops = (EDITOR / "panels", EDITOR / "state", EDITOR / "window", HEADSET, *BESIDE)
+    alone = (EDITOR / "desktop.py", ROOT / "app" / "streaming" / "refine.py")
+    return [*(path for top in tops for path in top.rglob("*.py")), *alone]
+
+
 def overlay_texts() -> set[str]:
     """All of them, in English."""
     found: set[str] = set()
-    for folder in (EDITOR / "panels", EDITOR / "state", EDITOR / "window", HEADSET):
-        for path in folder.rglob("*.py"):
-            found |= said_in(path)
+    for path in sources():
+        found |= said_in(path)
     for name, tables in TABLES.items():
         module = importlib.import_module(f"{PANELS}.{name}")
+        for table, what in tables.items():
+            found |= set(texts_of(getattr(module, table), what))
+    for name, tables in TABLES_BESIDE.items():
+        module = importlib.import_module(f"shapeshift.app.{name}")
         for table, what in tables.items():
             found |= set(texts_of(getattr(module, table), what))
     for name, tables in HEADSET_TABLES.items():
@@ -168,7 +184,7 @@ def overlay_texts() -> set[str]:
     found |= BY_VARIABLES | {*deeds.TEMPLATES, *deeds.DEEDS, deeds.THE_SCENE}
     found |= set(texts_of(REASON_TEXTS, VALUES))  # in the legend of a debug view
     for name in KEY_TABLES:
-        module = importlib.import_module(f"shapeshift.app.editor.window.{name}")
+        module = importlib.import_module(f"shapeshift.app.{name}")
         found |= set(texts_of(module.KEYS))
     return {text.split("##")[0] for text in found if is_text(text.split("##")[0])}
 
@@ -183,7 +199,7 @@ DEED_PLACES = {
 def deeds_in_source() -> set[str]:
     """What edits are called, where that stands in the call; {} for what is filled in."""
     found: set[str] = set()
-    for path in (*EDITOR.rglob("*.py"), *HEADSET.rglob("*.py")):
+    for path in sources():
         for node in ast.walk(ast.parse(path.read_text())):
             name = getattr(getattr(node, "func", None), "attr", None)
             name = name or getattr(getattr(node, "func", None), "id", None)
@@ -215,7 +231,7 @@ UNSAID = ("button", "checkbox", "color_edit3", "menu_item", "radio_button", "tex
 def unsaid_texts() -> list[str]:
     """Texts that go to ImGui as they stand in the code, and so in English alone."""
     found = []
-    for path in (*(EDITOR / "panels").rglob("*.py"), *HEADSET.rglob("*.py")):
+    for path in (p for top in (EDITOR / "panels", HEADSET, *BESIDE) for p in top.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
                 continue
