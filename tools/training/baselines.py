@@ -23,7 +23,7 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
 from ways import add_cluster, write_rows  # noqa: E402
 
-from shapeshift.app.charts.chart_rows import RowsFile  # noqa: E402
+from shapeshift.app.charts.chart_rows import RowsFile, write_text  # noqa: E402
 from shapeshift.app.training.table import Options, run  # noqa: E402
 from shapeshift.app.training.table_parts import TableRow, VggRow  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
@@ -57,9 +57,11 @@ def main() -> int:
             out.mkdir(parents=True, exist_ok=True)
             asked_of, of_splats = caps(size, asked)
             asked_of |= {"seed": seed} if seed else {}
+            lines = out / "settings.toml"
+            write_text(lines, "".join(f"{key} = {value}\n" for key, value in of_splats.items()))
             options = Options(
                 folder, out, asked_of, seconds=seconds, methods=cast(Any, methods), vgg=asked.vgg,
-                splats=of_splats, cluster=asked.cluster, certificates=asked.certificates,
+                settings=lines, cluster=asked.cluster, certificates=asked.certificates,
                 gpus=asked.gpus,
             )  # fmt: skip
             if code := run(options):

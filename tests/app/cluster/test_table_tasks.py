@@ -10,6 +10,7 @@ from shapeshift.app.training.table import Options, run
 from shapeshift.app.training.table_parts import parts_of
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.synthetic.balls import make_balls
+from tests.support.training.settings_files import settings_file
 
 SMALL = {"asked": {"max_anchors": 200}, "splats": {"max_splats": 400, "sh_degree": 1}}
 TIMES = ("seconds", "start_s")
@@ -21,7 +22,8 @@ def balls(tmp_path_factory):
 
 
 def options(balls: Path, out: Path, **more) -> Options:
-    return Options(balls, out, iterations=8, device="cpu", **SMALL, **more)
+    settings = settings_file(balls, **SMALL["splats"])
+    return Options(balls, out, iterations=8, device="cpu", settings=settings, **SMALL, **more)
 
 
 def rows(out: Path) -> list[dict]:

@@ -22,6 +22,7 @@ from shapeshift.training.calibration.extrinsics import (
     rig_of,
 )
 from shapeshift.training.synthetic.balls import make_balls
+from tests.support.training.settings_files import settings_file
 
 PLANTED = moved_by(np.array([0.1, -0.2, 0.05, 0.1, 0.05, -0.1]))
 ASKED = {"max_anchors": 300, "iterations": 20}
@@ -63,7 +64,8 @@ def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path):
         out = tmp_path / folder.name
         options = table.Options(
             folder, out, {"max_anchors": 300}, methods=("joint", "separate", "splats"),
-            splats={"max_splats": 300}, calibrate=calibrate, iterations=20, device="cpu",
+            settings=settings_file(tmp_path, max_splats=300), calibrate=calibrate, iterations=20,
+            device="cpu",
         )  # fmt: skip
         assert table.run(options) == 0
         lines = (out / "table.csv").read_text().splitlines()

@@ -35,6 +35,7 @@ from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from tests.support.training.settings_files import settings_file
 from tests.support.training.vgg_files import write_small
 
 SMALL = {"asked": {"max_anchors": 400}, "splats": {"max_splats": 900, "sh_degree": 1}}
@@ -52,7 +53,7 @@ def compared(balls, tmp_path_factory):
     write_small(folder / "small.onnx")
     options = Options(
         balls.folder, folder / "out", iterations=20, vgg=folder / "small.onnx", device="cpu",
-        **SMALL,
+        settings=settings_file(folder, **SMALL["splats"]), **SMALL,
     )  # fmt: skip
     assert run(options) == 0
     return options, (folder / "out" / "table.csv").read_text().splitlines()
@@ -146,7 +147,7 @@ def test_one_modality_is_evaluated_alone(compared, balls, tmp_path, capsys):
 def test_without_a_file_the_column_is_absent_and_the_reason_is_told(balls, tmp_path, capsys):
     options = Options(
         balls.folder, tmp_path / "out", iterations=4, methods=("splats",),
-        splats={"max_splats": 200}, device="cpu",
+        settings=settings_file(tmp_path, max_splats=200), device="cpu",
     )  # fmt: skip
     assert run(options) == 0
     lines = (tmp_path / "out" / "table.csv").read_text().splitlines()
@@ -305,8 +306,10 @@ def models_of(folder: Path) -> dict[str, bytes]:
 
 def test_a_comparison_that_was_ended_goes_on(balls, tmp_path, monkeypatch):
     """In the middle of the second model: the first is not trained again, the second goes on."""
-    few = {"splats": {"max_splats": 300}, "iterations": 24, "methods": ("splats",)}
-    table = Options(balls.folder, tmp_path / "t", device="cpu", **few)
+    table = Options(
+        balls.folder, tmp_path / "t", iterations=24, methods=("splats",), device="cpu",
+        settings=settings_file(tmp_path, max_splats=300),
+    )  # fmt: skip
     step, done = PlainTrainer.one_step, []
 
     def interrupted(self):
