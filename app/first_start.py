@@ -342,8 +342,9 @@ def pip_reason(code: int) -> str:
 def write_stubs() -> None:
     """Bring .venv's stubs to what the checkout has; only what changed is written."""
     for site in [*VENV.glob("lib/python*/site-packages"), *VENV.glob("Lib/site-packages")][:1]:
-        folder, texts = site / "shapeshift-stubs", stub_texts()
+        folder = site / "shapeshift-stubs"
         try:
+            texts = stub_texts()
             for old in sorted(folder.rglob("*.py*")):
                 if old.relative_to(folder).as_posix() not in texts:
                     old.unlink()

@@ -46,7 +46,9 @@ class Project:
         (self.folder / "shapeshift").mkdir()
         for name in (
             "launch.py",
+            "pyproject.toml",
             "shapeshift/__init__.py",
+            "shapeshift/__init__.pyi",
             "shapeshift/which_python.py",
             "app/__init__.py",
             "app/first_start.py",
