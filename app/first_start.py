@@ -347,14 +347,14 @@ def write_stubs() -> None:
             texts = stub_texts()
             for old in sorted(folder.rglob("*.py*")):
                 if old.relative_to(folder).as_posix() not in texts:
-                    old.unlink()
+                    old.unlink(missing_ok=True)  # another start does the same
             for name, text in texts.items():
                 stub = folder / name
                 if not stub.exists() or stub.read_text(encoding="utf-8") != text:
                     stub.parent.mkdir(parents=True, exist_ok=True)
                     stub.write_text(text, encoding="utf-8")
-        except OSError as error:
-            say(f"Editors will not follow imports: {error.strerror}: {error.filename}.")
+        except (OSError, ValueError, KeyError) as error:  # the program starts without them
+            say(f"Editors will not follow imports: {error}.")
 
 
 def stub_texts() -> dict[str, str]:

@@ -238,7 +238,9 @@ def test_every_module_of_the_package_leads_into_the_checkout(stubs):
     assert (stubs / "__init__.pyi").read_text() == face.read_text()
 
 
-def test_stubs_follow_the_files_and_nothing_else_is_written(stubs, tmp_path, monkeypatch):
+@pytest.fixture
+def checkout(tmp_path, monkeypatch) -> Path:
+    """A small one, in place of this."""
     root = tmp_path / "checkout"
     for name, text in {
         "pyproject.toml": '[tool.setuptools.package-dir]\n"shapeshift" = "shapeshift"\n'
@@ -252,6 +254,10 @@ def test_stubs_follow_the_files_and_nothing_else_is_written(stubs, tmp_path, mon
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
     monkeypatch.setattr(first_start, "ROOT", root)
+    return root
+
+
+def test_stubs_follow_the_files_and_nothing_else_is_written(stubs, checkout):
     first_start.write_stubs()
     found = {path.relative_to(stubs).as_posix(): path for path in stubs.rglob("*.pyi")}
     assert sorted(found) == ["__init__.pyi", "room/__init__.pyi", "room/deep/wall.pyi"]
@@ -261,16 +267,27 @@ def test_stubs_follow_the_files_and_nothing_else_is_written(stubs, tmp_path, mon
     assert others == [f"from room.deep.wall import {n} as {n}" for n in ("_A", "_E", "_b", "_g",
                                                                          "_h")]  # fmt: skip
     before = found["room/__init__.pyi"].stat().st_mtime_ns
-    (root / "room/deep/wall.py").rename(root / "room/deep/floor.py")
+    (checkout / "room/deep/wall.py").rename(checkout / "room/deep/floor.py")
     first_start.write_stubs()
     assert not found["room/deep/wall.pyi"].exists() and (stubs / "room/deep/floor.pyi").exists()
     assert found["room/__init__.pyi"].stat().st_mtime_ns == before
 
 
-def test_without_stubs_the_program_starts_all_the_same(stubs, capsys):
-    stubs.write_text("a file where the folder would be")
+SPOILT = {
+    "a file where the folder would be": lambda root, stubs: stubs.write_text(""),
+    "no table of folders": lambda root, stubs: (root / "pyproject.toml").unlink(),
+    "a table that is none": lambda root, stubs: (root / "pyproject.toml").write_text("[tool"),
+    "a table without folders": lambda root, stubs: (root / "pyproject.toml").write_text(""),
+    "a source in Latin-1": lambda root, stubs: (root / "room/a.py").write_bytes(b"# \xfc\n"),
+}
+
+
+@pytest.mark.parametrize("spoil", SPOILT.values(), ids=SPOILT)
+def test_without_stubs_the_program_starts_all_the_same(stubs, checkout, capsys, spoil):
+    spoil(checkout, stubs)
     first_start.write_stubs()
-    assert capsys.readouterr().err.startswith("Editors will not follow imports: ")
+    said = capsys.readouterr().err
+    assert said.startswith("Editors will not follow imports: ") and said.count("\n") == 1
 
 
 def test_the_tests_bring_the_stubs_to_the_files(calls, monkeypatch):
