@@ -15,7 +15,11 @@ from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import KERNELS, HeadLayout, Heads
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss, Target
-from shapeshift.training.losses.splat_losses import SHARE, MinScale, add_min_opacity_gradient
+from shapeshift.training.losses.splat_losses import (
+    MIN_OPACITY_SHARE,
+    MinScale,
+    add_min_opacity_gradient,
+)
 from shapeshift.training.losses.surface_losses import ShapeTerm
 
 SAME_STOP = 1e-6  # of Psi: between its own and a blend's rounding
@@ -93,7 +97,7 @@ class TrainingStep:
         target: Target,
         stats: DensificationStats | None = None,
         depth: ShapeTerm | None = None,
-        min_opacity_share: float = SHARE,
+        min_opacity_share: float = MIN_OPACITY_SHARE,
     ) -> dict[str, object]:
         """Gradients of the loss by what the optimiser holds, under its names.
 
@@ -144,7 +148,7 @@ LEAST_CONTRAST = 0.3  # of the contrast to the background of the photo, or of th
 IN_A_ROW = 3  # checks that show nothing: one alone may be a camera inside of something
 PROBATION = 8  # checks after a rollback, over which the mean loss has to come down to ...
 GAINED = 0.6  # ... this share of an untrained model's
-EVERY = 5  # rounds between checks; a round is one step of every modality
+GUARD_EVERY = 5  # rounds between checks; a round is one step of every modality
 SNAPSHOT_EVERY = 100  # steps
 KEPT = 3  # snapshots
 

@@ -37,8 +37,13 @@ from shapeshift.training.schedule import (
     ShapeBlending,
 )
 from shapeshift.training.settings import Rates, TrainSettings, parameter_rates
-from shapeshift.training.step import EVERY as GUARD_EVERY
-from shapeshift.training.step import SNAPSHOT_EVERY, DivergenceGuard, TrainingStep, Visibility
+from shapeshift.training.step import (
+    GUARD_EVERY,
+    SNAPSHOT_EVERY,
+    DivergenceGuard,
+    TrainingStep,
+    Visibility,
+)
 from shapeshift.training.supervision.backgrounds import (
     background_warning,
     choose_background,

@@ -20,7 +20,7 @@ from shapeshift.scene.world.record import Record
 from shapeshift.vr.frame import SIDES, Area, Frame, Hand, view_names
 from shapeshift.vr.glove import fingertip
 from shapeshift.vr.openxr.events import Life
-from shapeshift.vr.openxr.graphics import read
+from shapeshift.vr.openxr.graphics import read_color
 from shapeshift.vr.pace import FramePace
 
 DECIMALS = 6
@@ -66,7 +66,7 @@ class Report:
             self._lines.flush()
         if self._pictures is not None and frame.drawn and number % self._every == 0:
             for name, framebuffer in zip(view_names(len(eyes)), eyes, strict=True):
-                save_png(read(framebuffer), self._pictures / f"{name}-{number:05d}.png")
+                save_png(read_color(framebuffer), self._pictures / f"{name}-{number:05d}.png")
 
     def write(self, facts: dict) -> None:
         """The report itself; and a word on what has been written."""

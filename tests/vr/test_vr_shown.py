@@ -6,7 +6,7 @@ import pytest
 
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import IDENTITY
-from shapeshift.vr.openxr.graphics import FORMATS, choose_format, read
+from shapeshift.vr.openxr.graphics import FORMATS, choose_format, read_color
 from shapeshift.vr.shown import (
     WHOLE,
     Blit,
@@ -64,7 +64,7 @@ def sampled(ctx, texture: moderngl.Texture) -> np.ndarray:
     target.use()
     texture.use(0)
     ctx.vertex_array(program, []).render(moderngl.TRIANGLES, vertices=3)
-    return read(target)
+    return read_color(target)
 
 
 @pytest.mark.parametrize("left_on", [False, True])
@@ -87,7 +87,7 @@ def test_a_linear_image_holds_light(ctx, shown):
     image = ctx.texture(SIZE, 4, dtype="f4")
     target = ctx.framebuffer([image])
     shown.draw(texture, target, linear=True)
-    np.testing.assert_allclose(read(target), light(display), atol=1e-5)
+    np.testing.assert_allclose(read_color(target), light(display), atol=1e-5)
     np.testing.assert_allclose(sampled(ctx, image), light(display), atol=1e-5)
 
 
@@ -97,7 +97,7 @@ def test_a_part_is_what_the_mirror_shows(ctx, shown):
     part = middle(SIZE, into)
     target = ctx.framebuffer([ctx.texture(into, 4)])
     shown.draw(texture, target, part)
-    np.testing.assert_allclose(read(target), display[:, 22:42], atol=1 / 255)
+    np.testing.assert_allclose(read_color(target), display[:, 22:42], atol=1 / 255)
 
 
 def test_a_part_of_the_same_pixels_is_interpolated(ctx, shown):
@@ -111,7 +111,7 @@ def test_a_part_of_the_same_pixels_is_interpolated(ctx, shown):
         below = np.floor(place).astype(int)
         part = (place - below).reshape([-1 if i == axis else 1 for i in range(3)])
         wanted = (1 - part) * wanted.take(below, axis) + part * wanted.take(below + 1, axis)
-    np.testing.assert_allclose(read(target), wanted, atol=2 / 255)  # 8 bits of a weight
+    np.testing.assert_allclose(read_color(target), wanted, atol=2 / 255)  # 8 bits of a weight
 
 
 def test_the_middle_has_the_shape_of_the_window():
@@ -142,14 +142,14 @@ def test_an_inset_lies_in_its_place_over_an_eye_s_picture(ctx, shown):
     fine = ctx.texture((40, 40), 4, bytes([255, 0, 0, 255]) * (40 * 40))
     target = ctx.framebuffer([ctx.texture((64, 48), 4)])
     draw_eye(shown, target, (64, 48), wide, Inset(fine, (0.25, 0.5, 0.5, 0.25)))
-    seen = read(target)
+    seen = read_color(target)
     red = (seen == (1, 0, 0)).all(-1)
     wanted = np.zeros((48, 64), bool)
     wanted[48 - 36 : 48 - 24, 16:48] = True  # from below 0.5 to 0.75, rows on top first
     np.testing.assert_array_equal(red, wanted)
     assert (seen[~red] == (0, 0, 1)).all()
     draw_eye(shown, target, (64, 48), wide)
-    assert (read(target) == (0, 0, 1)).all()
+    assert (read_color(target) == (0, 0, 1)).all()
 
 
 def test_an_inset_is_cut_where_the_window_is():

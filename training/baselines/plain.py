@@ -36,8 +36,7 @@ from shapeshift.training.photo_store.open_photos import PhotoRoom, open_photos
 from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale
 from shapeshift.training.run import SETTLE, Run
 from shapeshift.training.schedule import Budget, Schedule
-from shapeshift.training.step import EVERY as GUARD_EVERY
-from shapeshift.training.step import SNAPSHOT_EVERY, DivergenceGuard
+from shapeshift.training.step import GUARD_EVERY, SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.supervision.backgrounds import choose_background, has_one_exposure
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets

@@ -79,7 +79,9 @@ def camera_rows(views: list[View]) -> np.ndarray:
 # a run over mostly background it may send all of them away.
 
 MIN_OPACITY = 0.02  # below it the loss is above 0; the same number stands in min_opacity.cl
-SHARE = 0.05  # of mean max(MIN_OPACITY - opacity, 0); bone of the leg gains 1 dB, docs/growth.md
+MIN_OPACITY_SHARE = (
+    0.05  # of mean max(MIN_OPACITY - opacity, 0); bone of the leg gains 1 dB, docs/growth.md
+)
 
 UNTIL = 0.3  # of a run of several stops
 
@@ -91,7 +93,7 @@ def min_opacity_share(stops: int, blended_shapes: float, done: float) -> float:
     pictures, and cost its steps as much as what shows.  Where some steps draw shapes between stops,
     it goes on: what is absent on one side grows from faint splats.
     """
-    return 0.0 if stops > 1 and not blended_shapes and done > UNTIL else SHARE
+    return 0.0 if stops > 1 and not blended_shapes and done > UNTIL else MIN_OPACITY_SHARE
 
 
 def add_min_opacity_gradient(device, splats: Gaussians, grad: Gaussians, share: float) -> None:

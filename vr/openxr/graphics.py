@@ -245,7 +245,7 @@ class Swapchain(Images):
             framebuffer = self._framebuffers[number]
             framebuffer.viewport = (0, 0, *self.size)
             shown.draw(texture, framebuffer, linear=self.pixels.linear)
-            return read(framebuffer, 4) if keep else None
+            return read_color(framebuffer, 4) if keep else None
 
     def close(self) -> None:
         for framebuffer in self._framebuffers:
@@ -276,7 +276,7 @@ class DepthSwapchain(Images):
         super().close()
 
 
-def read(framebuffer: moderngl.Framebuffer, parts: int = 3) -> np.ndarray:
+def read_color(framebuffer: moderngl.Framebuffer, parts: int = 3) -> np.ndarray:
     """(H, W, parts) float32 of what lies in it, row 0 on top."""
     width, height = framebuffer.size
     data = framebuffer.read(components=parts, alignment=1, dtype="f4")

@@ -16,7 +16,7 @@ from shapeshift.app.editor.window.pictures import write_numbered_png, write_png
 from shapeshift.app.errors import UsageError
 from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.runtime_models.files.whole_file import write_whole
-from shapeshift.vr.openxr.graphics import read
+from shapeshift.vr.openxr.graphics import read_color
 
 # A recording of what the left eye sees, as numbered PNGs, while the session goes on.
 
@@ -85,7 +85,7 @@ class Recorder:
         if len(self.writing) >= MOST_WAITING:
             self.left_out += 1
             return
-        pixels = (np.clip(read(framebuffer), 0, 1) * 255 + 0.5).astype(np.uint8)
+        pixels = (np.clip(read_color(framebuffer), 0, 1) * 255 + 0.5).astype(np.uint8)
         path = self.folder / f"{self.count:05d}.png"
         self._rows.append(f"{self.count},{seen_s - self._start_s:.3f}")
         self.count += 1
@@ -171,8 +171,8 @@ class Shutter:
     ) -> None:  # fmt: skip
         """Of what an eye has just seen, where somebody has asked for a picture or a recording."""
         if self.due:
-            self.expose(read(framebuffer))
-        shelf.saw(lambda: read(framebuffer))
+            self.expose(read_color(framebuffer))
+        shelf.saw(lambda: read_color(framebuffer))
         self.recorder.saw(seen_s, framebuffer)
         self.recorder.poll(messages, time.perf_counter())
 

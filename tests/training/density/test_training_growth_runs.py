@@ -18,7 +18,7 @@ from shapeshift.training.baselines.plain import one_modality
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.first_anchors import first_anchors
 from shapeshift.training.first_anchors.first_anchors import base_colors
-from shapeshift.training.losses.splat_losses import SHARE
+from shapeshift.training.losses.splat_losses import MIN_OPACITY_SHARE
 from shapeshift.training.schedule import LIGHT_FROM
 from shapeshift.training.settings import ONE_MODALITY, TrainSettings
 from shapeshift.training.supervision.exposure import Exposures
@@ -96,7 +96,7 @@ def test_a_run_of_two_stops_ends_the_loss_of_faint_splats(device, balls, monkeyp
     gradients = trainer.step.gradients
     monkeypatch.setattr(trainer.step, "gradients", lambda *a: shares.append(a[-1]) or gradients(*a))
     run(trainer)
-    assert shares[-20:] == [SHARE] * 7 + [0.0] * 13  # before them kernels are compiled
+    assert shares[-20:] == [MIN_OPACITY_SHARE] * 7 + [0.0] * 13  # before them kernels are compiled
 
 
 def test_nothing_changes_within_the_steps_that_a_picture_needs_to_settle(device, balls):
