@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from shapeshift.app.cluster import run_task as running
-from shapeshift.app.cluster import task as digests
+from shapeshift.app.cluster import task as task_module
 from shapeshift.app.cluster.open_cluster import open_cluster
 from shapeshift.app.cluster.run_task import TaskFailed, TaskStopped, progress_words, run_task
 from shapeshift.app.cluster.task import Task
@@ -80,26 +80,26 @@ def other_code(tmp_path, monkeypatch):
     (root / "app").mkdir(parents=True)
     (root / "app" / "__init__.py").write_text("")
     (root / "app" / "draw.cl").write_text("1")
-    monkeypatch.setattr(digests, "ROOT", root)
-    digests.own_code.cache_clear()
+    monkeypatch.setattr(task_module, "ROOT", root)
+    task_module.own_code.cache_clear()
     yield root
-    digests.own_code.cache_clear()
+    task_module.own_code.cache_clear()
 
 
 def test_a_digest_of_code_is_of_all_its_files_and_of_nothing_else(other_code):
-    first = digests.code_digest()
+    first = task_module.code_digest()
     (other_code / "app" / "draw.pyc").write_text("1")
     (other_code / "notes").mkdir()
     (other_code / "notes" / "mine.py").write_text("1")  # in no package
-    assert digests.code_digest() == first
+    assert task_module.code_digest() == first
     seen = {first}
     (other_code / "app" / "draw.cl").write_text("2")
-    seen.add(digests.code_digest())
+    seen.add(task_module.code_digest())
     (other_code / "app" / "draw.cl").rename(other_code / "app" / "drawn.cl")
-    seen.add(digests.code_digest())
+    seen.add(task_module.code_digest())
     (other_code / "app" / "more").mkdir()
     (other_code / "app" / "more" / "new.py").write_text("")
-    seen.add(digests.code_digest())
+    seen.add(task_module.code_digest())
     assert len(seen) == 4
 
 
@@ -107,7 +107,7 @@ def test_what_other_code_has_done_is_done_anew(counting, other_code):
     task, code = counting(letters=30), other_code / "app" / "draw.cl"
     assert run_heard(task) == ["from 0"] and run_heard(task) == []
     code.write_text("another")
-    digests.own_code.cache_clear()  # a later start of the program
+    task_module.own_code.cache_clear()  # a later start of the program
     assert run_heard(task) == ["from 0"] and run_heard(task) == []
     # Changed since the command began, or on a worker's machine: refused before it starts.
     key = task.key()
@@ -117,7 +117,7 @@ def test_what_other_code_has_done_is_done_anew(counting, other_code):
         run_task(task, key, print)
     assert not Path(task.writes[0]).exists()
     # Changed while it runs: what it wrote is there, yet no later start takes it for done.
-    digests.own_code.cache_clear()
+    task_module.own_code.cache_clear()
     heard: list[str] = []
 
     def hear(line: str) -> None:
@@ -126,7 +126,7 @@ def test_what_other_code_has_done_is_done_anew(counting, other_code):
 
     run_task(task, task.key(), hear)
     assert heard[0] == "from 0" and "does it anew" in heard[1] and Path(task.writes[0]).exists()
-    digests.own_code.cache_clear()
+    task_module.own_code.cache_clear()
     assert run_heard(task) == ["from 0"]  # nor is the checkpoint of the old code gone on from
 
 

@@ -14,7 +14,7 @@ from shapeshift.rasterizer.project_arena import project_arena
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.tiles import arena as culling
+from shapeshift.renderer.tiles import arena as arena_module
 from shapeshift.renderer.tiles import occlusion
 from shapeshift.renderer.tiles.inputs import bin_view, camera_of
 from shapeshift.renderer.tiles.occlusion import moved, widest
@@ -35,7 +35,7 @@ def at_once(monkeypatch):
         if open_device().kind != "cpu":
             pytest.skip("tiles on a GPU leave out what no view sees, not what is hidden")
     for name, value in (("RESTS", 0), ("LEAST_SPLATS", 0)):
-        monkeypatch.setattr(culling, name, value)
+        monkeypatch.setattr(arena_module, name, value)
     monkeypatch.setattr(occlusion, "LEAST_SPLATS", -(10**9))
 
 

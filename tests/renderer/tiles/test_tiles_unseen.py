@@ -8,7 +8,7 @@ import pytest
 from shapeshift.rasterizer.clusters.clusters import CLUSTER, bound_clusters
 from shapeshift.rasterizer.project_arena import Limits, clusters_unseen, project_arena
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.tiles import arena as culling
+from shapeshift.renderer.tiles import arena as arena_module
 from shapeshift.renderer.tiles.inputs import camera_of
 from shapeshift.scene.pose import HiddenMesh, Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
@@ -184,7 +184,7 @@ def test_behind_the_near_plane(device):
 def at_once(monkeypatch):
     """Boxes from the first frame on, of any scene, and asked for in each."""
     for name, value in (("RESTS", 0), ("LEAST_SPLATS", 0)):
-        monkeypatch.setattr(culling, name, value)
+        monkeypatch.setattr(arena_module, name, value)
 
 
 class Film:
@@ -292,40 +292,40 @@ def test_what_is_no_number_anywhere(renderer, at_once, seed):
 
 def test_boxes_wait_until_a_scene_rests(renderer, monkeypatch):
     """Frames with the same splats before boxes are made, and none while x moves or for so few."""
-    monkeypatch.setattr(culling, "LEAST_SPLATS", 2 * CLUSTER)
+    monkeypatch.setattr(arena_module, "LEAST_SPLATS", 2 * CLUSTER)
     layers = in_order(COUNT, layers=2)
     view = View(look_at((0, 0, 1), (1, 0, 0)), (-0.1, 0.1, -0.1, 0.1), 0.05, 50, (64, 64))
     drawing = renderer.drawing
     renderer.settings = RenderSettings()
-    for number in range(culling.RESTS + 4):
+    for number in range(arena_module.RESTS + 4):
         renderer.update(Scene((SceneObject("cloud", layers, x=0.05 * number),)))
         renderer.draw([view])
         assert drawing.culling.left_out is None
-    for number in range(culling.RESTS + 1):
-        assert (drawing.culling.in_use(LEAST) is None) == (number < culling.RESTS)
+    for number in range(arena_module.RESTS + 1):
+        assert (drawing.culling.in_use(LEAST) is None) == (number < arena_module.RESTS)
         renderer.draw([view])
     assert drawing.culling.in_use(2 * LEAST) is None
     for count in (2 * CLUSTER - 1, 2 * CLUSTER):
         renderer.update(Scene((SceneObject("cloud", only(layers, np.arange(count))),)))
-        for _ in range(culling.RESTS + 1):
+        for _ in range(arena_module.RESTS + 1):
             renderer.draw([view])
         assert (drawing.culling.left_out is None) == (count < 2 * CLUSTER)
 
 
 def test_where_too_little_is_out_of_view_nobody_is_asked(renderer, monkeypatch):
-    monkeypatch.setattr(culling, "LEAST_SPLATS", CLUSTER)
+    monkeypatch.setattr(arena_module, "LEAST_SPLATS", CLUSTER)
     monkeypatch.setattr(renderer.drawing.occlusion, "allowed", False)  # it asks by itself
     layers = in_order(COUNT)
     far = View(look_at((0, 0, 90), (0, 0, 0)), (-0.4, 0.4, -0.4, 0.4), 0.05, 100, (64, 64))
     renderer.settings = RenderSettings()
     renderer.update(Scene((SceneObject("cloud", layers),)))
     asked = []
-    for _ in range(culling.RESTS + 1 + 2 * culling.PAUSE):
+    for _ in range(arena_module.RESTS + 1 + 2 * arena_module.PAUSE):
         renderer.draw([far])
         asked.append(renderer.drawing.culling.left_out is not None)
-    first = culling.RESTS
-    assert asked.index(True) == first and sum(asked[first : first + culling.PAUSE]) == 1
-    assert asked[first + culling.PAUSE]
+    first = arena_module.RESTS
+    assert asked.index(True) == first and sum(asked[first : first + arena_module.PAUSE]) == 1
+    assert asked[first + arena_module.PAUSE]
 
 
 def test_two_objects_share_an_arena(renderer, at_once):

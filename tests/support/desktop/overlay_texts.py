@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from shapeshift.app.editor.texts import table as deeds
+from shapeshift.app.editor.texts import table as texts_table
 from shapeshift.renderer.debug.debug import REASON_TEXTS
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -181,7 +181,7 @@ def overlay_texts() -> set[str]:
         module = importlib.import_module(f"shapeshift.app.editor.state.{name}")
         for text in texts:
             found |= set(texts_of(getattr(module, text)))
-    found |= BY_VARIABLES | {*deeds.TEMPLATES, *deeds.DEEDS, deeds.THE_SCENE}
+    found |= BY_VARIABLES | {*texts_table.TEMPLATES, *texts_table.DEEDS, texts_table.THE_SCENE}
     found |= set(texts_of(REASON_TEXTS, VALUES))  # in the legend of a debug view
     for name in KEY_TABLES:
         module = importlib.import_module(f"shapeshift.app.{name}")
