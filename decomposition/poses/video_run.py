@@ -22,7 +22,6 @@ def take_frames(name: str, into: str, count: int, hear: Callable[..., None]) -> 
     Gives how many.  Raises Unreadable.
     """
     import av
-    import av.error
 
     video = Path(name)
     try:
@@ -37,7 +36,7 @@ def take_frames(name: str, into: str, count: int, hear: Callable[..., None]) -> 
         if len(times) < 2:
             raise Unreadable(f"holds {len(times)} frames; a video of a walk is wanted")
         return write_sharpest(av, video, Path(into), count, sorted(times), hear)
-    except (av.error.FFmpegError, OSError) as error:
+    except (av.FFmpegError, OSError) as error:
         raise Unreadable(f"no video that can be read ({error})") from None
 
 

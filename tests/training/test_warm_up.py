@@ -11,7 +11,7 @@ from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.losses.splat_losses import (
     MIN_OPACITY,
-    SHARE,
+    MIN_OPACITY_SHARE,
     UNTIL,
     add_min_opacity_gradient,
     min_opacity_share,
@@ -94,8 +94,8 @@ def test_a_capture_of_shapes_apart_is_turned_back_once_and_learned(device, apart
 
 def test_the_loss_of_faint_splats_ends_where_stops_are_told_apart():
     after = np.nextafter(UNTIL, 1)
-    assert [min_opacity_share(2, 0.0, done) for done in (0, UNTIL, after, 1)] == [SHARE] * 2 + [
-        0
-    ] * 2
+    times = (0, UNTIL, after, 1)
+    shares = [min_opacity_share(2, 0.0, done) for done in times]
+    assert shares == [MIN_OPACITY_SHARE] * 2 + [0] * 2
     for stops, blended in ((1, 0.0), (3, 0.1)):  # one shape; or shapes between stops are drawn
-        assert {min_opacity_share(stops, blended, done) for done in (0, UNTIL, after, 1)} == {SHARE}
+        assert {min_opacity_share(stops, blended, done) for done in times} == {MIN_OPACITY_SHARE}

@@ -18,7 +18,7 @@ SIZE = (6, 4)  # width, height
 @pytest.fixture(autouse=True)
 def pictures(monkeypatch):
     """A framebuffer is what is read from it."""
-    monkeypatch.setattr(recorder, "read", lambda picture: picture)
+    monkeypatch.setattr(recorder, "read_color", lambda picture: picture)
 
 
 def picture(shade: float) -> np.ndarray:
