@@ -17,8 +17,8 @@ from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
-from shapeshift.app.program import ROOT, is_installed
 from shapeshift.app.progress import PERIOD
+from shapeshift.runtime_models.program import ROOT, is_installed
 from shapeshift.scene.film.film_file import ENDING, write_film_file
 
 # A command of this program as a process of its own, for long work beside the window.
