@@ -4,6 +4,7 @@ python3 launch.py extras film && python3 launch.py film room.shift --out room.mp
 """
 
 import importlib
+import importlib.util
 import os
 import subprocess
 import sys
