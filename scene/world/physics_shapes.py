@@ -192,6 +192,19 @@ def stopped_bodies(world: Any, handles: dict[int, Any]) -> list[Finding]:
     ]
 
 
+STIRS = 1e-4  # m/s and rad/s: what floats and was touched is faster
+
+
+def end_floats(bodies: dict[int, Any], held: set[int]) -> None:
+    """What floats weighs again once it stirs or is held: something has touched it."""
+    for number, body in bodies.items():
+        if body.gravity_scale == 0:
+            v, w = body.linvel, body.angvel
+            speed = max(math.hypot(v.x, v.y, v.z), math.hypot(w.x, w.y, w.z))
+            if number in held or not speed < STIRS:
+                body.gravity_scale = 1.0
+
+
 def more_substeps(speeds: dict[int, tuple[float, float, float]], pressed: bool) -> int:
     """1, 2 or 4 times as many: what the fastest body moves in one must stay near PREDICTION.
 
