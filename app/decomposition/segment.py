@@ -342,8 +342,7 @@ def print_tables(found: "Segmented", scores: "Sequence[LabelScore]") -> None:
     from shapeshift.runtime_models.model import AnchorModel
 
     rows = "anchors" if isinstance(found.model, AnchorModel) else "splats"
-    rests = {rest.name: "yes" if rest.is_good else "floats" if rest.floats else "no"
-             for rest in found.rests}  # fmt: skip
+    rests = {rest.name: rest.word for rest in found.rests}
     table = Table("label", "object", "photos", rows, "pixels", "share", *["rests"] * bool(rests))
     for part in found.parts:
         table.add_row(

@@ -164,7 +164,7 @@ def at_rest(
     for item in file.items:
         rest = rests.get(item.name)
         if rest is not None:
-            item = replace(item, floats=rest.floats)
+            item = replace(item, floats=rest.kept)
             if not same_pose(rest.pose, starts[item.name]):
                 at, turn = three(rest.pose.position), four(rest.pose.wxyz)
                 item = replace(item, position=at, wxyz=turn, placed=True)

@@ -207,7 +207,7 @@ class Physics:
 
     def float_body(self, number: int) -> None:
         """Stays where it is, in the air too, until something touches or takes it."""
-        self.engine_body(number).gravity_scale = 0.0
+        physics_shapes.float_body(self.engine_body(number))
 
     # ---- what it tells
 

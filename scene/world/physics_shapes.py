@@ -192,7 +192,15 @@ def stopped_bodies(world: Any, handles: dict[int, Any]) -> list[Finding]:
     ]
 
 
-STIRS = 1e-4  # m/s and rad/s: what floats and was touched is faster
+# m/s and rad/s: what floats and was touched is faster; twice the speed below which things sleep, so
+# that what merely leans on it, or lies in it by a hair, does not count.
+STIRS, TURNS = 0.02, 0.2
+FLOAT_DAMPING = 10.0  # 1/s
+
+
+def float_body(body: Any) -> None:
+    """The engine's body has no weight, and loses what little speed it gets."""
+    body.gravity_scale, body.linear_damping, body.angular_damping = 0.0, *[FLOAT_DAMPING] * 2
 
 
 def end_floats(bodies: dict[int, Any], held: set[int]) -> None:
@@ -200,9 +208,9 @@ def end_floats(bodies: dict[int, Any], held: set[int]) -> None:
     for number, body in bodies.items():
         if body.gravity_scale == 0:
             v, w = body.linvel, body.angvel
-            speed = max(math.hypot(v.x, v.y, v.z), math.hypot(w.x, w.y, w.z))
-            if number in held or not speed < STIRS:
-                body.gravity_scale = 1.0
+            still = math.hypot(v.x, v.y, v.z) < STIRS and math.hypot(w.x, w.y, w.z) < TURNS
+            if number in held or not still:
+                body.gravity_scale, body.linear_damping, body.angular_damping = 1.0, 0.0, 0.0
 
 
 def more_substeps(speeds: dict[int, tuple[float, float, float]], pressed: bool) -> int:

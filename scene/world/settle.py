@@ -46,6 +46,7 @@ class Motion:
     down_m: float  # of moved_m, along gravity
     fell_m: float  # before anything carried it
     size_m: float  # the longest side of its box
+    left_s: float  # when it had moved more than a thing does that rests; inf: never
     on: int | None  # what it touched last: where several, the lowest
 
     @property
@@ -154,34 +155,50 @@ def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int
     boxes = {number: box_of(copy, number) for number in bodies}
     carried_at: dict[int, float] = {}  # height at the first contact
     on: dict[int, int] = {}
-    for body in bodies.values():
+    for body in bodies.values() if damping else ():
         body.linear_damping = body.angular_damping = damping
-    for _ in range(math.ceil(seconds * copy.hz)):
+    left_s = dict.fromkeys(bodies, math.inf)
+    for step in range(math.ceil(seconds * copy.hz)):
         lowest: dict[int, float] = {}
         for contact in copy.step():
             for mine, other in ((contact.a, contact.b), (contact.b, contact.a)):
                 if mine in bodies and contact.point[1] < lowest.get(mine, math.inf):
                     lowest[mine], on[mine] = float(contact.point[1]), other
-        for number in on:
-            carried_at.setdefault(number, float(copy.pose(number).position[1]))
+        for number in bodies:
+            if number in on:
+                carried_at.setdefault(number, float(copy.pose(number).position[1]))
+            if left_s[number] == math.inf and not bodies[number].is_sleeping:
+                way, turned = stirred(starts[number], copy.pose(number), boxes[number])
+                size = float(np.ptp(boxes[number], axis=0).max())
+                if np.linalg.norm(way) > MOST_MOVED * size or turned > MOST_TURNED:
+                    left_s[number] = step / copy.hz
     found = {}
     for number, start in starts.items():
         end = copy.pose(number)
-        middle = boxes[number].mean(axis=0)
-        way = (end.matrix() @ np.linalg.inv(start.matrix()) @ np.append(middle, 1))[:3] - middle
-        cosine = abs(float(start.wxyz @ end.wxyz))
+        way, turned = stirred(start, end, boxes[number])
         first_y = carried_at.get(number, float(end.position[1]))
         found[number] = Motion(
-            end, float(np.linalg.norm(way)), math.degrees(2 * math.acos(min(cosine, 1.0))),
-            float(-way[1]), max(float(start.position[1]) - first_y, 0.0),
-            float(np.ptp(boxes[number], axis=0).max()), on.get(number),
+            end, float(np.linalg.norm(way)), turned, float(-way[1]),
+            max(float(start.position[1]) - first_y, 0.0),
+            float(np.ptp(boxes[number], axis=0).max()), left_s[number], on.get(number),
         )  # fmt: skip
     return found
+
+
+def stirred(start: Pose, now: Pose, box: np.ndarray) -> tuple[np.ndarray, float]:
+    """(3,) metres that the middle of a body's box (2, 3) has moved, and degrees it has turned."""
+    middle = box.mean(axis=0)
+    way = (now.matrix() @ np.linalg.inv(start.matrix()) @ np.append(middle, 1))[:3] - middle
+    cosine = min(abs(float(start.wxyz @ now.wxyz)), 1.0)
+    return way, math.degrees(2 * math.acos(cosine))
 
 
 # The same of a world of named objects.
 
 TIPPED = 20.0  # degrees
+STEEP = 0.7  # of a way, that is along gravity
+STAYS = ": it stays where it is until it is touched"
+MOST_ROUNDS = 8  # of the test: what stirs first may push the others, and is kept before the next
 DECIMALS = 4  # in a row of a report
 
 
@@ -192,35 +209,39 @@ class Rest:
     name: str
     motion: Motion  # in the test
     pose: Pose  # from which it was tested
-    floats: bool  # nothing carried it: it stays where it is until it is touched
+    put: Motion | None  # how it was put down before; None: it stays where it was
+    floats: bool  # nothing carried it
+    kept: bool  # it floats, or does not rest alone: it stays where it is until it is touched
     on: str  # what carries it at the end; "": nothing
 
     @property
     def is_good(self) -> bool:
-        return self.motion.rests and not self.floats
+        return self.motion.rests and not self.kept
+
+    @property
+    def word(self) -> str:
+        """For a table."""
+        if self.is_good:
+            return "yes"
+        return "floats" if self.floats else "kept" if self.kept else "no"
 
     def sentence(self) -> str:
         """Why it does not rest, for people; "" where it does."""
         motion = self.motion
-        moved, down = f"{1e3 * motion.moved_m:.0f} mm", f"{1e3 * motion.down_m:.0f} mm"
-        size, on = 100 * motion.moved_m / max(motion.size_m, 1e-9), f" on {self.on}" * bool(self.on)
-        if self.floats:
-            return (
-                f"nothing that is in the scene carries {self.name}: it stays where it is until it "
-                "is touched"
-            )
-        if motion.rests:
+        if self.is_good:
             return ""
+        if self.floats:
+            return f"nothing that is in the scene carries {self.name}{STAYS}"
+        moved, on = f"{1e3 * motion.moved_m:.0f} mm", f" on {self.on}" * bool(self.on)
+        share = f"{100 * motion.moved_m / max(motion.size_m, 1e-9):.0f} % of its size"
         if motion.turned > MOST_TURNED:
-            word = "tips over" if motion.turned > TIPPED else "rocks or rolls"
-            return (
-                f"{self.name} {word}{on}: {motion.turned:.0f} degrees and {moved} in {REST_S:.0f} s"
-            )
-        if motion.down_m > 0.7 * motion.moved_m:
-            return f"{self.name} sinks or falls by {down}, {size:.0f} % of its size"
-        if motion.down_m < -0.7 * motion.moved_m:
-            return f"{self.name} rises by {moved}, {size:.0f} % of its size: something lifts it"
-        return f"{self.name} slides{on} by {moved}, {size:.0f} % of its size"
+            what = "tips over" if motion.turned > TIPPED else "rocks or rolls"
+            what += f"{on}, {motion.turned:.0f} degrees and {moved} in {REST_S:.0f} s"
+        elif abs(motion.down_m) > STEEP * motion.moved_m:
+            what = f"{'sinks or falls' if motion.down_m > 0 else 'rises'} by {moved}, {share}"
+        else:
+            what = f"slides{on} by {moved}, {share}"
+        return f"{self.name} alone {what}{STAYS * self.kept}"
 
     def row(self) -> dict:
         """The same as JSON has it."""
@@ -228,6 +249,9 @@ class Rest:
         return {
             "rests": self.is_good,
             "floats": self.floats,
+            "kept": self.kept,
+            "put_mm": round(1e3 * self.put.moved_m, 2) if self.put else 0.0,
+            "put_deg": round(self.put.turned, 2) if self.put else 0.0,
             "moved_mm": round(1e3 * motion.moved_m, 2),
             "moved_share": round(motion.moved_m / motion.size_m, DECIMALS),
             "turned_deg": round(motion.turned, 2),
@@ -262,21 +286,45 @@ def begin(world: World) -> None:
 def settle(world: World) -> list[Rest]:
     """Puts every body on what carries it, where that is near, and tests whether it rests there.
 
-    The world is left as it begins: what stirs more than MOST_GAP and MOST_PUT stays where it was,
-    and what nothing carries floats.
+    What stirs more than MOST_GAP and MOST_PUT stays where it was.  What nothing carries, or what
+    does not rest alone, is kept where it is until something touches it: photos show it so, and
+    what holds it is not in the scene.
     """
     physics = world.physics
     put = let_fall(physics, PUT_DOWN_S, DAMPING)
     for number, motion in put.items():
         if motion.is_put:
             world.move_object(world.names[number], motion.pose)
-    floating = [number for number, motion in put.items() if motion.floats]
-    for number in floating:
-        physics.float_body(number)
     starts = {number: physics.pose(number) for number in put}
-    tested = let_fall(physics, REST_S)
-    return [
-        Rest(world.names[n], motion, starts[n], n in floating,
-             "" if motion.on is None else world.names.get(motion.on, FLOOR_NAME))
-        for n, motion in tested.items()
-    ]  # fmt: skip
+    found: dict[int, Motion] = {}  # of those that are kept: how they stirred alone
+    tested, new = put, [number for number, motion in put.items() if motion.floats]
+    for _ in range(MOST_ROUNDS):
+        for number in new:
+            physics.float_body(number)
+            found[number] = tested[number]
+        tested = let_fall(physics, REST_S)
+        stirring = {n: m for n, m in tested.items() if not m.rests and n not in found}
+        first = min((motion.left_s for motion in stirring.values()), default=0.0)
+        new = [n for n, motion in stirring.items() if motion.left_s <= first]
+        if not new:
+            break
+    rests = []
+    for number, motion in tested.items():
+        kept, down = number in found, put[number]
+        motion = found.get(number, motion)
+        rests.append(
+            Rest(
+                world.names[number],
+                motion,
+                starts[number],
+                down if down.is_put else None,
+                kept and down.floats,
+                kept,
+                name_of(world, motion.on),
+            )
+        )
+    return rests
+
+
+def name_of(world: World, number: int | None) -> str:
+    return "" if number is None else world.names.get(number, FLOOR_NAME)
