@@ -1,13 +1,16 @@
-"""The pixels of a picture as a graph, and a random walk over it (Grady 2005)."""
+"""The pixels of a picture: their colours counted, and a random walk over them (Grady 2005)."""
 
 import numpy as np
 from PIL import Image
 from scipy import sparse
+from scipy.ndimage import gaussian_filter
 
 from shapeshift.decomposition.masks.anchor_walk import conjugate_gradients
 
 CONTRAST = 6.0  # an edge of so many times the mean squared difference is e times weaker
 LEAST_WEIGHT = 1e-4
+BINS, BLUR = 12, 0.8  # of a channel's histogram; bins by which it is blurred
+FLOOR = 1e-5  # share of a colour that was never seen
 INSIDE, OUTSIDE, UNKNOWN = 1, 0, -1
 Edges = tuple[np.ndarray, np.ndarray]  # weights (h, w - 1) to the right, (h - 1, w) downwards
 
@@ -79,3 +82,24 @@ def solve(edges: Edges, seeds: np.ndarray, prior: np.ndarray, pull: np.ndarray) 
     diagonal = np.where(free, degree, 1.0).ravel()
     found = conjugate_gradients(multiply, diagonal, right, guess, 1e-3, 200).reshape(shape)
     return np.where(free, np.clip(found, 0, 1), known)
+
+
+def cells_of(image: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Of an image (h, w, C) uint8 the histogram cell (h, w) of each pixel, and how many channels
+    that histogram has: of sRGB as a whole, and of each further channel, which are taken to be
+    independent.
+    """
+    cells = np.minimum(image / 255 * BINS, BINS - 1).astype(int)
+    groups = [cells[..., :3], *(cells[..., c : c + 1] for c in range(3, image.shape[2]))]
+    found = []
+    for group in groups:
+        each = tuple(np.moveaxis(group, 2, 0))
+        found.append((np.asarray(np.ravel_multi_index(each, (BINS,) * group.shape[2])), len(each)))
+    return found
+
+
+def shares_of(index: np.ndarray, where: np.ndarray, channels: int) -> np.ndarray:
+    """(h, w) how usual each pixel's colour is among those of `where`."""
+    counts = np.bincount(index[where], minlength=BINS**channels).reshape((BINS,) * channels)
+    smooth = gaussian_filter(counts.astype(float), BLUR)
+    return (smooth / max(smooth.sum(), 1) + FLOOR).ravel()[index]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, label
+from scipy.ndimage import label
 
 from shapeshift.decomposition.masks.anchor_click import best_cut
 from shapeshift.decomposition.masks.pixel_grid import (
@@ -19,17 +19,17 @@ from shapeshift.decomposition.masks.pixel_grid import (
     UNKNOWN,
     Edges,
     box_in,
+    cells_of,
     edges_of,
     graph_of,
     resized,
+    shares_of,
     solve,
 )
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 
 MOST_SIDE = 256  # pixels of what is walked over: more cost time and gain nothing
 MARGIN = 0.25  # of the box's longer side: what is looked at around it
-BINS, BLUR = 12, 0.8  # of a channel's histogram; bins by which it is blurred
-FLOOR = 1e-5  # share of a colour that was never seen
 ROUNDS = 3
 PRIOR = 0.02  # pull of the colours, against an edge of weight 1
 SURE = 6.0  # log odds beyond which colours pull no harder
@@ -395,20 +395,6 @@ def learn(part: Part, others: np.ndarray) -> None:
     )  # fmt: skip
 
 
-def cells_of(image: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    """Of an image (h, w, C) uint8 the histogram cell (h, w) of each pixel, and how many channels
-    that histogram has: of sRGB as a whole, and of each further channel, which are taken to be
-    independent.
-    """
-    cells = np.minimum(image / 255 * BINS, BINS - 1).astype(int)
-    groups = [cells[..., :3], *(cells[..., c : c + 1] for c in range(3, image.shape[2]))]
-    found = []
-    for group in groups:
-        each = tuple(np.moveaxis(group, 2, 0))
-        found.append((np.asarray(np.ravel_multi_index(each, (BINS,) * group.shape[2])), len(each)))
-    return found
-
-
 def color_odds(part: Part, inner: np.ndarray, outer: np.ndarray) -> np.ndarray:
     """(h, w) log odds of a pixel's colours, inside over outside."""
     total = np.zeros(inner.shape)
@@ -416,10 +402,3 @@ def color_odds(part: Part, inner: np.ndarray, outer: np.ndarray) -> np.ndarray:
         ratio = shares_of(index, inner, channels) / shares_of(index, outer, channels)
         total += np.log(ratio)
     return total
-
-
-def shares_of(index: np.ndarray, where: np.ndarray, channels: int) -> np.ndarray:
-    """(h, w) how usual each pixel's colour is among those of `where`."""
-    counts = np.bincount(index[where], minlength=BINS**channels).reshape((BINS,) * channels)
-    smooth = gaussian_filter(counts.astype(float), BLUR)
-    return (smooth / max(smooth.sum(), 1) + FLOOR).ravel()[index]
