@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 from shapeshift.app.command_line import EXPERT, POSITIONAL
 from shapeshift.app.opening import ReadingOptions, open_capture, open_model
 from shapeshift.app.paths import full
-from shapeshift.app.program import program
 from shapeshift.app.terminal import open_console, print_json, say
+from shapeshift.runtime_models.program import program
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.completion.plane import Plane

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.program import package_words
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import UNIT_SLACK, Pose
@@ -155,8 +156,8 @@ def engine() -> ModuleType:
         import rapier3d
     except ImportError as why:
         raise BadFile(
-            f"nothing can move or be touched: the package rapier3d does not load ({why}); install "
-            "it with: python -m pip install -r requirements.txt."
+            f"nothing can move or be touched: the package rapier3d does not load ({why}); "
+            f"{package_words('rapier3d')} installs it."
         ) from why
     return rapier3d
 
