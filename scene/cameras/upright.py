@@ -6,10 +6,12 @@ them.  Here what there is to find is found, and one rule says which of it is bel
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, hypot, inf
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 
 STATED, ASSUMED, PHOTOS, PLANES = SOURCES = ("stated", "assumed", "photos", "planes")
@@ -54,7 +56,7 @@ class Upright:
         return turn_upright(self.used.direction)
 
 
-def angle(a: Sequence[float], b: Sequence[float]) -> float:
+def angle(a: ArrayLike, b: ArrayLike) -> float:
     """Degrees between two directions (3,), 0 to 180, exact also near both ends."""
     return degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b)))
 
@@ -141,7 +143,7 @@ def up_of_planes(
 
 
 def _middle(normals: dict[str, np.ndarray], names: Sequence[str]) -> np.ndarray:
-    total = sum(np.asarray(normals[name], np.float64) for name in names)
+    total = np.sum([np.asarray(normals[name], np.float64) for name in names], axis=0)
     return total / np.linalg.norm(total)
 
 
@@ -178,6 +180,54 @@ def turn_upright(up: Sequence[float]) -> np.ndarray:
         return np.diag([1.0, -1.0, -1.0])
     cross = np.array([[0, -x, 0], [x, 0, z], [0, -z, 0]])  # [up x Y]_x
     return np.eye(3) + cross + cross @ cross / (1 + y)
+
+
+def turn_of_world(up: object, left_handed: bool, where: str) -> np.ndarray:
+    """(4, 4) from a file's world to ours, in which `up` (of the file's) is +Y."""
+    if not left_handed:
+        return upright_rotation(up, where)
+    upright_rotation(up, where)  # checks it
+    x, y, z = np.asarray(up, np.float64)
+    return upright_rotation((-x, y, z), where) @ np.diag([-1.0, 1.0, 1.0, 1.0])
+
+
+def upright_rotation(up: object, where: str) -> np.ndarray:
+    """(4, 4) the shortest turn that brings `up` to +Y; half a turn about x for -Y."""
+    try:
+        up = np.asarray(up, np.float64)
+        length = hypot(*up.ravel())
+    except (TypeError, ValueError, OverflowError):
+        up, length = np.zeros(0), 0.0
+    if up.shape != (3,) or not 0 < length < inf:
+        raise BadFile(f"{where}: 'up' must be three numbers that are not all zero")
+    out = np.eye(4)
+    out[:3, :3] = turn_upright(three(up / length))
+    return out
+
+
+def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarray:
+    """(3,) the world axis nearest to the photos' mean upward direction (OpenCV axes).
+
+    For worlds as COLMAP leaves them this is -Y.  `otherwise` is taken where the photos disagree.
+    """
+    mean = -np.asarray(world_from_cameras)[:, :3, 1].mean(axis=0)
+    if not np.linalg.norm(mean) > CLEAR_UP:
+        return np.asarray(otherwise, np.float64)
+    axis = int(np.argmax(np.abs(mean)))
+    return np.sign(mean[axis]) * np.eye(3)[axis]
+
+
+def doubts_of_up(ups: Sequence[Up], ours_from_file: np.ndarray) -> tuple[str, ...]:
+    """A sentence where a capture's photos disagree with what was taken, the first of `ups`."""
+    if len(ups) < 2 or not disagree(*ups):
+        return ()
+    taken, photos = ups
+    x, y, z = np.array(photos.direction) @ ours_from_file[:3, :3]
+    return (
+        f"Up by {name_of(taken)} is {photos.off(taken):.1f} degrees from up by {name_of(photos)}, "
+        f"[{x:.3f}, {y:.3f}, {z:.3f}] in its own axes; the first is kept. `segment` looks for "
+        "what things stand on and turns a scene upright; 'up' in its file settles it for training.",
+    )
 
 
 def ways_sentence(ways: Sequence[Up], used: Up) -> str:

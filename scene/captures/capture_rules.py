@@ -1,6 +1,5 @@
 """What every reader of captures holds to: rigid poses, up, stops, splits, sizes, background."""
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,12 +16,11 @@ from shapeshift.runtime_models.stops.stop_formula import check_formulas, read_fo
 from shapeshift.scene.cameras.photo_view import subject_distance
 from shapeshift.scene.cameras.upright import (
     ASSUMED,
-    CLEAR_UP,
     STATED,
     Up,
-    disagree,
-    name_of,
-    turn_upright,
+    doubts_of_up,
+    turn_of_world,
+    up_of_cameras,
     up_of_photos,
 )
 from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
@@ -123,7 +121,7 @@ class CaptureWorld:
                 "Its poses mirror the world, as those of left-handed axes do; its x axis is turned "
                 "round, so that left and right are as in the photos.",
             )
-        more += self.doubts_of_up()
+        more += doubts_of_up(self.ups, self.ours_from_file)
         if background is None:
             background = plain_background(photos)
             notes["background"] = "found in the photos" if background else "none stated, none found"
@@ -148,19 +146,6 @@ class CaptureWorld:
             doubts + more,
             formulas,
             ups=self.ups,
-        )
-
-    def doubts_of_up(self) -> tuple[str, ...]:
-        """A sentence where the photos disagree with what was taken."""
-        if len(self.ups) < 2 or not disagree(*self.ups):
-            return ()
-        taken, photos = self.ups
-        x, y, z = np.array(photos.direction) @ self.ours_from_file[:3, :3]
-        return (
-            f"Up by {name_of(taken)} is {photos.off(taken):.1f} degrees from up by "
-            f"{name_of(photos)}, [{x:.3f}, {y:.3f}, {z:.3f}] in its own axes; the first is kept. "
-            "`segment` looks for what things stand on and turns a scene upright; 'up' in its file "
-            "settles it for training.",
         )
 
 
@@ -224,18 +209,6 @@ def rigid(matrix: object, where: str, may_mirror: bool = False) -> np.ndarray:
     return out
 
 
-def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarray:
-    """(3,) the world axis nearest to the photos' mean upward direction (OpenCV axes).
-
-    For worlds as COLMAP leaves them this is -Y.  `otherwise` is taken where the photos disagree.
-    """
-    mean = -np.asarray(world_from_cameras)[:, :3, 1].mean(axis=0)
-    if not np.linalg.norm(mean) > CLEAR_UP:
-        return np.asarray(otherwise, np.float64)
-    axis = int(np.argmax(np.abs(mean)))
-    return np.sign(mean[axis]) * np.eye(3)[axis]
-
-
 def is_left_handed(world_from_cameras: np.ndarray, where: str) -> bool:
     """Whether all poses (N, 4, 4) mirror.  Raises BadFile where some do and others do not."""
     mirrored = np.linalg.det(np.asarray(world_from_cameras)[:, :3, :3]) < 0
@@ -245,29 +218,6 @@ def is_left_handed(world_from_cameras: np.ndarray, where: str) -> bool:
             "do not; flip one axis of their matrices, or drop them"
         )
     return bool(mirrored.any())
-
-
-def turn_of_world(up: object, left_handed: bool, where: str) -> np.ndarray:
-    """(4, 4) from a file's world to ours, in which `up` (of the file's) is +Y."""
-    if not left_handed:
-        return upright_rotation(up, where)
-    upright_rotation(up, where)  # checks it
-    x, y, z = np.asarray(up, np.float64)
-    return upright_rotation((-x, y, z), where) @ np.diag([-1.0, 1.0, 1.0, 1.0])
-
-
-def upright_rotation(up: object, where: str) -> np.ndarray:
-    """(4, 4) the shortest turn that brings `up` to +Y; half a turn about x for -Y."""
-    try:
-        up = np.asarray(up, np.float64)
-        length = math.hypot(*up.ravel())
-    except (TypeError, ValueError, OverflowError):
-        up, length = np.zeros(0), 0.0
-    if up.shape != (3,) or not 0 < length < np.inf:
-        raise BadFile(f"{where}: 'up' must be three numbers that are not all zero")
-    out = np.eye(4)
-    out[:3, :3] = turn_upright(three(up / length))
-    return out
 
 
 def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop, ...]:

@@ -7,8 +7,7 @@ import pytest
 from PIL import Image
 
 from shapeshift.decomposition.masks.specs import read_specs
-from shapeshift.scene.cameras.upright import PHOTOS, angle
-from shapeshift.scene.captures.capture_rules import turn_of_world
+from shapeshift.scene.cameras.upright import PHOTOS, angle, turn_of_world
 from shapeshift.scene.captures.read_capture import read_capture
 from tools.synthetic.everyday import make_everyday
 from tools.synthetic.everyday_places import KINDS
