@@ -118,7 +118,7 @@ def cut(
     """Writes the labelled model and the scene file; what was found, and what became of each label
     in the photos where a segmenter was asked.  Raises BadFile, UsageError.
     """
-    from shapeshift.app.decomposition.segment_steps import CompletionSettings, completed
+    from shapeshift.app.decomposition.segment_steps import CompletionSettings, at_rest, completed
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
     from shapeshift.decomposition.upright_scene import planes_under, upright_scene
@@ -143,13 +143,15 @@ def cut(
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     planes: dict[int, Plane] = {}
+    how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
     if options.complete:
-        how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
         file, found, planes = completed(device, file, found, capture, how)
     file, told = upright_scene(file, found, capture.ups, planes or planes_under(found))
     for sentence in told:
         notice(sentence)
     write_model(found.model, path)
+    if options.complete:
+        file, found = at_rest(file, found, how)
     write_scene_file(file, options.out)
     return found, counts
 
@@ -299,7 +301,7 @@ def facts_of(
 
     from shapeshift.decomposition.score import mean_score
 
-    rows: dict[str, dict[str, float | None]] = {
+    rows: dict[str, dict] = {
         part.spec.name: {
             "label": part.spec.label,
             "photos": part.photos,
@@ -310,6 +312,8 @@ def facts_of(
         }
         for part in found.parts
     }
+    for rest in found.rests:
+        rows[rest.name]["rest"] = rest.row()
     for score in scores:
         figures = {"iou": score.iou, "boundary_iou": score.boundary_iou, "accuracy": score.accuracy}
         rows[score.object.name] |= {
@@ -343,11 +347,13 @@ def print_tables(found: "Segmented", scores: "Sequence[LabelScore]") -> None:
     from shapeshift.runtime_models.model import AnchorModel
 
     rows = "anchors" if isinstance(found.model, AnchorModel) else "splats"
-    table = Table("label", "object", "photos", rows, "pixels", "share")
+    rests = {rest.name: rest.word for rest in found.rests}
+    table = Table("label", "object", "photos", rows, "pixels", "share", *["rests"] * bool(rests))
     for part in found.parts:
         table.add_row(
             str(part.spec.label), part.spec.name, f"{part.photos:,}", f"{part.rows:,}",
             f"{part.pixels:,.0f}", f"{part.share:.1%}" if part.rows else "",
+            *[rests.get(part.spec.name, "")] * bool(rests),
         )  # fmt: skip
     console = open_console(stderr=False)
     console.print(table)

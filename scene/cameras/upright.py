@@ -58,7 +58,8 @@ class Upright:
 
 def angle(a: ArrayLike, b: ArrayLike) -> float:
     """Degrees between two directions (3,), 0 to 180, exact also near both ends."""
-    return degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b)))
+    one, other = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    return degrees(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))
 
 
 def up_of_photos(
