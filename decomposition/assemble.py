@@ -21,13 +21,14 @@ from shapeshift.decomposition.completion.plane import (
     looks_of,
     support_plane,
 )
-from shapeshift.decomposition.completion.verify import PhotoView
+from shapeshift.decomposition.completion.verify import ModelPictures, PhotoView
 from shapeshift.decomposition.partition import LabelledView
 from shapeshift.decomposition.proxies.silhouettes import SilhouetteScore, score_silhouettes
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile
-from shapeshift.runtime_models.parts import part_of
+from shapeshift.runtime_models.parts import part_of, splat_labels
+from shapeshift.scene.colliders.carve import SeenDepth, Sight, carved_mesh, is_free, votes
 from shapeshift.scene.colliders.collider import Collider, Making, collider_of_mesh, mesh_of_splats
 from shapeshift.scene.colliders.collider_wrap import join_meshes
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume
@@ -129,11 +130,13 @@ def assemble(
     shadows: bool = False,
     background: tuple[float, float, float] = (0.0, 0.0, 0.0),
     making: Making | None = None,
+    sights: Sequence[Sight] = (),
 ) -> Assembled:
     """Proxies, ground and completed background of a labelled model.
 
     objects: the labels that get a proxy, with a mesh file of the user's where there is one, which
-    is a candidate, too.  completed: whether the background is filled.  Raises BadFile, ValueError.
+    is a candidate, too.  completed: whether the background is filled.  sights: where photos were
+    taken from, small; what is solid is carved by what they see.  Raises BadFile, ValueError.
     """
     if model.labels is None:
         raise ValueError("the model has no labels of objects; partition it first.")
@@ -165,9 +168,11 @@ def assemble(
         if label in planes
     ]
     hollow = replace(making, hollow=True, faces=BACKGROUND_FACES)
+    seen = seen_depths(device, whole, sights, x, making)
     ground = ground_mesh(
-        only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing
-    )
+        only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing,
+        seen,
+    )  # fmt: skip
     return Assembled(whole, proxies, ground, tuple(told), failed)
 
 
@@ -225,19 +230,27 @@ def ground_mesh(
     x: float,
     making: Making,
     standing: Sequence[tuple[Plane, np.ndarray]] = (),
+    seen: Sequence[SeenDepth] = (),
 ) -> TriangleMesh:
-    """The background's mesh, in the model's frame: slabs under the planes, and the skin.
+    """The background's mesh, in the model's frame: slabs under the planes, and the skin: around
+    what rays end on, and where nobody looked around all splats.
 
     background: without the objects.  looks, labels (A,): of the whole model, so that a slab lies
     under the things, too.  standing: the plane that each object stands on, and the corners (V, 3)
     of what is touched of it; no skin is left within them, or the object would jump out of it.
     Raises BadFile where nothing can be touched.
     """
-    skin = mesh_of_splats(*Evaluator(background).geometry(x), making)
+    skin = carved_mesh(seen, making.faces) if seen else None
+    if skin is None:
+        skin = mesh_of_splats(*Evaluator(background).geometry(x), making)
     side = CELL * looks.spacing_m
     vertices, slabs = skin.vertices.astype(np.float64), []
     for plane in distinct(planes, side):
         low, covered = covered_cells(looks, labels, plane, side)
+        if seen:
+            covered = without_diagonals(covered & ~free_cells(seen, plane, low, covered, side))
+        if not covered.any():
+            continue
         slabs.append(slab(plane, low, covered, side))
         cells = ((vertices @ plane.axes().T - low) / side).astype(int)
         inside = np.asarray(((cells >= 0) & (cells < covered.shape)).all(1))
@@ -250,6 +263,32 @@ def ground_mesh(
         height = plane.height(vertices[within])
         vertices[within] -= np.maximum(height + SUNK * side, 0)[:, None] * plane.normal
     return join_meshes([TriangleMesh(vertices.astype(np.float32), skin.faces), *slabs])
+
+
+def seen_depths(
+    device: Device, model: AnchorModel, sights: Sequence[Sight], x: float, making: Making
+) -> list[SeenDepth]:
+    """How far each photo sees, and which of its pixels end on background."""
+    pictures, objects = ModelPictures(device, model), splat_labels(model) != 0
+    seen = []
+    for done, sight in enumerate(sights):
+        making.report("looking at what is free", done / len(sights))
+        depth_m, share = pictures.depth(sight.view, x, objects)
+        if sight.measured_m is not None:
+            depth_m = np.where(sight.measured_m > 0, sight.measured_m, depth_m)
+        seen.append(SeenDepth(sight.view, depth_m, share < 0.5))
+    return seen
+
+
+def free_cells(
+    seen: Sequence[SeenDepth], plane: Plane, low: np.ndarray, cells: np.ndarray, side: float
+) -> np.ndarray:
+    """(X, Y) bool: cells of a plane, chosen ones, that rays go through."""
+    flat = low + (np.argwhere(cells) + 0.5) * side  # (n, 2)
+    places = flat @ plane.axes() + (plane.offset - side / 2) * plane.normal
+    out = np.zeros(cells.shape, bool)
+    out[cells] = is_free(votes(seen, places, side))
+    return out
 
 
 def is_within(places: np.ndarray, corners: np.ndarray, margin: float) -> np.ndarray:
