@@ -36,6 +36,7 @@ Progress = Callable[[str, float], None]
 class Collider:
     parts: tuple[np.ndarray, ...]  # each (V, 3) float32 metres, object frame; 1 to 16 of them
     mesh: TriangleMesh  # watertight, the same frame
+    rough: bool = False  # one hull that stands in until the pieces are made
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Making:
     most_parts: int = MOST_PARTS
     hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
     kept: bool = True  # False: nothing is read from the user's cache or written to it
+    rough: bool = False  # what was made before, else one hull, in a tenth of a second; never cut
     progress: Progress | None = None  # (what is being done, part done 0..1); may raise to end it
 
     def report(self, what: str, part: float) -> None:
@@ -66,7 +68,9 @@ def collider_of_splats(
     """
     making = making or Making()
     columns = (means, scales, wxyz, opacity)
-    return cached_or_made(making, columns, lambda: mesh_of_splats(*columns, making))
+    return cached_or_made(
+        making, columns, lambda: mesh_of_splats(*columns, making), lambda: hull_points(*columns)
+    )
 
 
 def collider_of_model(
@@ -97,7 +101,10 @@ def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:
     given = pieces.skin if pieces else read_mesh(path)
     if making.hollow:  # the physics takes any triangles that stay where they are
         return Collider(around(given), given)
-    return cached_or_made(making, (given.vertices, given.faces), lambda: closed_mesh(given, making))
+    return cached_or_made(
+        making, (given.vertices, given.faces), lambda: closed_mesh(given, making),
+        lambda: given.vertices,
+    )  # fmt: skip
 
 
 def collider_of_pieces(pieces: Pieces) -> Collider:
@@ -110,9 +117,10 @@ def collider_of_pieces(pieces: Pieces) -> Collider:
 
 
 def cached_or_made(
-    making: Making, columns: tuple[np.ndarray, ...], make: Callable[[], TriangleMesh]
-) -> Collider:
-    """From a cache if it was made before, else made now and kept."""
+    making: Making, columns: tuple[np.ndarray, ...], make: Callable[[], TriangleMesh],
+    hull: Callable[[], np.ndarray],
+) -> Collider:  # fmt: skip
+    """From a cache if it was made before, else made now and kept; a rough one of points (V, 3)."""
     if not (making.faces >= 12 and 1 <= making.most_parts <= 64):
         raise ValueError(
             f"a collider of {making.faces} faces and {making.most_parts} parts is asked for; at "
@@ -121,6 +129,9 @@ def cached_or_made(
     settings = f"{VERSION} {making.faces} {making.most_parts} {making.hollow}"
     key = content_key(settings, *columns) if making.kept else ""
     made = read_cached(key) if making.kept else None
+    if made is None and making.rough and not making.hollow:
+        parts, mesh = one_hull(hull())
+        return Collider(parts, mesh, True)
     if made is None:
         mesh = make()
         parts, finished = around(mesh), True
@@ -131,6 +142,16 @@ def cached_or_made(
             write_cached(key, made)
     making.report("making a collider", 1.0)
     return Collider(*made)
+
+
+def one_hull(points: np.ndarray) -> tuple[tuple[np.ndarray, ...], TriangleMesh]:
+    """The hull of points (V, 3), nowhere thinner than an engine can hold, as the only piece."""
+    mesh = TriangleMesh(points.astype(np.float32), np.zeros((0, 3), np.int32))
+    parts = solid_parts([points], mesh, 1)
+    if not parts:  # a single place
+        mesh = box_around(points)
+        return (mesh.vertices,), mesh
+    return parts, TriangleMesh(parts[0], hull_faces(parts[0]))
 
 
 def around(mesh: TriangleMesh) -> tuple[np.ndarray, ...]:
@@ -149,14 +170,18 @@ def mesh_of_splats(
     making.report("looking for what is solid", 0.0)
     filling = fill_splats(means, scales, wxyz, opacity)
     if not len(filling.points):
-        raise BadFile(
-            f"none of {len(means):,} splats is opaque enough to be touched; name a mesh file as "
-            "the object's collider, or choose another x."
-        )
+        raise BadFile(nothing_to_touch(len(means)))
     if filling.splats < FEWEST_SPLATS or not filling.cell_m > 0:
         return box_around(filling.points)
     skin = wrap(filling.points, filling.cell_m, making.faces, making.report, making.hollow)
     return usable(skin, filling.points)
+
+
+def nothing_to_touch(splats: int) -> str:
+    return (
+        f"none of {splats:,} splats is opaque enough to be touched; name a mesh file as the "
+        "object's collider, or choose another x."
+    )
 
 
 def closed_mesh(given: TriangleMesh, making: Making) -> TriangleMesh:
@@ -209,6 +234,7 @@ BESIDE = 2.5  # times its own size: with neighbours so near it is none
 SPACING = 1.3  # cells are no smaller than this times the distance between splats
 COARSEST = 24  # cells along the longest side, however few splats there are
 MOST_LOOKED_AT = 300_000  # splats for distances
+ROUGH_SPLATS = 4000  # that a rough hull is made of
 NEEDLE = 4.0  # cells from its centre that a splat reaches where it is alone
 CLASSES = (1, 12, 48, 192, 768)  # points a splat gets, by its size in cells
 
@@ -251,6 +277,28 @@ def fill_splats(
     points = scatter(centres, axes, scales[rows], cell_m)
     dense = keep_dense(points, opacity[rows], solid, centres, cell_m)
     return Filling(dense, cell_m, len(rows))
+
+
+def hull_points(
+    means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
+) -> np.ndarray:
+    """(V, 3) metres: the ends of at most ROUGH_SPLATS of the splats that fill_splats() takes, six
+    each.  Raises BadFile where none is opaque enough.
+    """
+    known = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & np.isfinite(wxyz).all(1)
+    rows = np.flatnonzero(known & (opacity >= FAINT))
+    if not len(rows):
+        raise BadFile(nothing_to_touch(len(means)))
+    rows = rows[solid_or_all(opacity[rows])]
+    rows = rows[:: -(-len(rows) // ROUGH_SPLATS)]
+    rows = rows[in_the_object(means[rows], np.ones(len(rows), bool))]
+    slender = scales[rows].max(1) <= WIDEST * np.ptp(means[rows], axis=0).max()
+    rows = rows[slender] if slender.any() else rows
+    near = neighboured(means[rows].astype(np.float64), scales[rows])[0]
+    rows = rows[near] if near.any() else rows
+    axes = rotation_matrices(normalize(wxyz[rows].astype(np.float64))) * scales[rows, None, :]
+    ends = np.concatenate([axes, -axes], 2).swapaxes(1, 2)  # (n, 6, 3)
+    return (means[rows, None].astype(np.float64) + ends).reshape(-1, 3)
 
 
 def solid_or_all(opacity: np.ndarray) -> np.ndarray:
