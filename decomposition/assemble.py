@@ -268,12 +268,17 @@ def ground_mesh(
 def seen_depths(
     device: Device, model: AnchorModel, sights: Sequence[Sight], x: float, making: Making
 ) -> list[SeenDepth]:
-    """How far each photo sees, and which of its pixels end on background."""
+    """How far each photo sees, and which of its pixels end on background.
+
+    Where the model shows nothing, nothing is known: what has the colour that is behind the scene,
+    as a grey floor, has been left out of it.
+    """
     pictures, objects = ModelPictures(device, model), splat_labels(model) != 0
     seen = []
     for done, sight in enumerate(sights):
         making.report("looking at what is free", done / len(sights))
         depth_m, share = pictures.depth(sight.view, x, objects)
+        depth_m[np.isinf(depth_m)] = np.nan
         if sight.measured_m is not None:
             depth_m = np.where(sight.measured_m > 0, sight.measured_m, depth_m)
         seen.append(SeenDepth(sight.view, depth_m, share < 0.5))

@@ -22,7 +22,7 @@ from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.colliders.carve import Sight
 
 MOST_VIEWS = 24  # that verify and score: well spread, they say what all would
-MOST_SIGHTS, SIGHT_SIDE = 120, 160  # photos that carve what is free, pixels of their longest side
+MOST_SIGHTS, SIGHT_SIDE = 80, 160  # photos that carve what is free, pixels of their longest side
 
 
 def photo_views(

@@ -18,8 +18,10 @@ from shapeshift.scene.colliders.marching_tetrahedra import find_surface
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import View
 
-CELLS = 128  # along the longest side
+CELLS = 160  # along the longest side, at most
+MOST_PLACES = 200_000  # cells near surfaces, about; with more each is larger
 OUTER = 1.0  # percent of the points seen on either side that the grid may leave out
+FARTHEST = 3.0  # times the way to the subject, around that: so far the grid reaches
 REACH = 2.5  # cells before and behind a surface in which a pixel knows it; behind lies its back
 SURE = 1.0  # cells that a ray must go on behind a cell to have gone through it
 SURE_SHARE = 0.01  # of the distance, the same: depths are no surer
@@ -27,7 +29,7 @@ LEAST_FREE = 0.3  # of a cell's votes that must be of rays through it for it to 
 LEAST_ENDS = 2  # rays, each of another picture, that end on what is solid; with few pictures 1
 FEW = 6  # pictures
 GRAZING = 0.15  # cosine between a surface and a ray, below which its plane is not known
-JUMP = 0.03  # part of the depth that a neighbour lies nearer or farther: a pixel of an edge
+BEND = 0.04  # of 1 / depth that both neighbours together may be off one plane with a pixel
 LEAST_PART = 60  # cells of a piece; a smaller one is a floater
 ROOM = 2  # empty cells around all
 AROUND = 2.0  # cells around a camera that are free
@@ -85,13 +87,14 @@ class SeenDepth:
 
     @cached_property
     def edges(self) -> np.ndarray:
-        """(H, W) bool: a neighbour is nearer or farther, or not there."""
-        depth, out = self.depth_m, ~np.isfinite(self.depth_m)
-        padded = np.pad(depth, 1, mode="edge")
-        for rows, columns in ((0, 1), (2, 1), (1, 0), (1, 2)):
-            near = padded[rows : rows + depth.shape[0], columns : columns + depth.shape[1]]
-            with np.errstate(invalid="ignore"):
-                out |= ~(np.abs(near - depth) <= JUMP * depth)
+        """(H, W) bool: not on one plane with its neighbours.  Of a plane 1 / depth is linear."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            near = np.pad(1 / self.depth_m.astype(np.float64), 1, "reflect", reflect_type="odd")
+        out = ~np.isfinite(self.depth_m)
+        for axis in (0, 1):
+            bend = np.diff(near, 2, axis=axis)
+            bend = bend[:, 1:-1] if axis == 0 else bend[1:-1]
+            out |= ~(np.abs(bend) <= BEND * near[1:-1, 1:-1])
         return out
 
     @cached_property
@@ -166,32 +169,19 @@ def carved_mesh(seen: Sequence[SeenDepth], faces: int) -> TriangleMesh | None:
     """
     from scipy import ndimage
 
-    points = [one.points[(one.planes[1] > GRAZING) & solid_of(one)] for one in seen]
-    every = np.concatenate([np.zeros((0, 3)), *points])
-    if not len(every):
+    grid = grid_of(seen)
+    if grid is None:
         return None
-    low, high = np.percentile(every, (OUTER, 100 - OUTER), axis=0)
-    cell = float((high - low).max()) / CELLS
-    if not cell > 0:
-        return None
-    low = low - (ROOM + REACH + 1) * cell
-    shape = np.ceil((high - low) / cell + ROOM + REACH + 1).astype(int)
-    cells = np.floor((every - low) / cell).astype(np.int32)
-    cells = cells[((cells >= 0) & (cells < shape)).all(1)]
-    taken = np.zeros(shape, bool)
-    taken[tuple(cells.T)] = True
-    where = np.argwhere(within(taken, int(np.ceil(REACH))))
-    inner = ((where >= ROOM) & (where < shape - ROOM)).all(1)
-    where = where[inner]
+    low, cell, where, shape = grid
     places = low + (where + 0.5) * cell
     found = votes(seen, places, REACH * cell)
     least = LEAST_ENDS if len(seen) > FEW else 1
-    solid = (found.ends >= least) & ~is_free(found)
     eyes = np.array([one.view.world_from_eye.position for one in seen])
-    solid &= away_from(places, eyes, AROUND * cell)
+    free = is_free(found) | ~away_from(places, eyes, AROUND * cell)
+    # Before a surface its height stays, so that the field passes through 0 where the surface is.
+    known = (found.ends >= least) & ((found.height > 0) | ~free)
     field = np.full(shape, 1.0, np.float32)
-    at = tuple(where[solid].T)
-    field[at] = found.height[solid] / cell
+    field[tuple(where[known].T)] = found.height[known] / cell
     field[field == 0] = 1e-6
     pieces, count = ndimage.label(field < 0, np.ones((3, 3, 3)))
     small = np.bincount(pieces.ravel(), minlength=count + 1) < LEAST_PART
@@ -199,9 +189,48 @@ def carved_mesh(seen: Sequence[SeenDepth], faces: int) -> TriangleMesh | None:
     if not (field < 0).any():
         return None
     skin = find_surface(field)
-    vertices = (skin.vertices + np.float32(0.5)) * np.float32(cell)
+    vertices = (skin.vertices + np.float32(0.5)) * np.float32(cell)  # from low: short numbers
     coarse = simplify(TriangleMesh(vertices, skin.faces), faces)
     return TriangleMesh((coarse.vertices + low).astype(np.float32), coarse.faces)
+
+
+def grid_of(
+    seen: Sequence[SeenDepth],
+) -> tuple[np.ndarray, float, np.ndarray, np.ndarray] | None:
+    """Where a grid begins (3,) metres, its cell, the cells (N, 3) near what rays end on, its shape.
+
+    None where no ray ends on anything.
+    """
+    ends = [one.planes[1] > GRAZING for one in seen]
+    solid = [found & solid_of(one) for one, found in zip(seen, ends, strict=True)]
+    every = np.concatenate(
+        [np.zeros((0, 3)), *(o.points[s] for o, s in zip(seen, solid, strict=True))]
+    )
+    if not len(every):
+        return None
+    other = [found & ~mine for found, mine in zip(ends, solid, strict=True)]
+    about = other if any(one.any() for one in other) else solid  # the things, if there are some
+    subject = np.concatenate([one.points[m] for one, m in zip(seen, about, strict=True)])
+    away = np.concatenate([one.depth_m[m] for one, m in zip(seen, about, strict=True)])
+    middle, far = np.median(subject, axis=0), FARTHEST * float(np.median(away))
+    low, high = np.percentile(every, (OUTER, 100 - OUTER), axis=0)
+    low, high = np.maximum(low, middle - far), np.minimum(high, middle + far)
+    cell = float((high - low).max()) / CELLS
+    if not (cell > 0 and (high >= low).all()):
+        return None
+    while True:
+        border = (ROOM + REACH + 1.37) * cell  # no plane of the lowest points through cells' middles
+        shape = np.ceil((high - low + 2 * border) / cell).astype(int)
+        cells = np.floor((every - (low - border)) / cell).astype(np.int32)
+        taken = np.zeros(shape, bool)
+        taken[tuple(cells[((cells >= 0) & (cells < shape)).all(1)].T)] = True
+        near = within(taken, int(np.ceil(REACH)))
+        inner = np.zeros_like(near)
+        inner[(slice(ROOM, -ROOM),) * 3] = True
+        where = np.argwhere(near & inner)
+        if len(where) <= 1.2 * MOST_PLACES:
+            return low - border, cell, where, shape
+        cell *= float(np.sqrt(len(where) / MOST_PLACES))  # places lie on surfaces
 
 
 def solid_of(one: SeenDepth) -> np.ndarray:
