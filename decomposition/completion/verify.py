@@ -23,6 +23,8 @@ from shapeshift.runtime_models.model import AnchorModel
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.pose import View
 
+LEFT = 0.7  # of the light: a surface of splats has a thickness, and one looks at its skin
+
 # Pictures of a model with the OpenCL tiles, one view after the other.
 
 
@@ -62,7 +64,7 @@ class ModelPictures:
         return np.where(seen, picture[..., 0] / np.where(seen, picture[..., 3], 1), np.nan)
 
     def depth(self, view: View, x: Controls, marked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(H, W) metres along the view where half of the light is stopped, Inf where it is not;
+        """(H, W) metres along the view behind which LEFT of the light is left, Inf where more is;
         and (H, W) the share of each pixel that the marked splats (N,) show.
         """
         width, height = view.size
@@ -75,7 +77,7 @@ class ModelPictures:
         projected = project(self._device, *self._geometry, self._device.upload(color), camera)
         tiles = bin_tiles(self._device, projected, view.size)
         surfaces = surface(self._device, *self._geometry[:3], camera, projected)
-        drawn = rasterize_depth(self._device, projected, tiles, surfaces, view.size, median=True)
+        drawn = rasterize_depth(self._device, projected, tiles, surfaces, view.size, light_left=LEFT)
         metres = self._device.download(drawn.metres)
         share = self._device.download(drawn.frame.image)[0].copy()
         return np.where(metres > 0, metres, np.float32(np.inf)), share

@@ -74,8 +74,8 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
 #ifdef SURFACE
       const float8 f = vload8(splat_of[j], surface);
       const float z = fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7);
-#ifdef MEDIAN
-      if (T > 0.5f && T - w <= 0.5f) depth = z;
+#ifdef LIGHT_LEFT
+      if (T > LIGHT_LEFT && T - w <= LIGHT_LEFT) depth = z;
 #else
       depth += w * z;
 #endif
