@@ -91,6 +91,7 @@ COMMANDS = {
         "cluster.command",
         "let other machines take part: certificates, a scheduler, workers",
     ),
+    "extras": ("commands.extras", "optional parts of the program, listed or installed"),
     "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
@@ -102,7 +103,7 @@ INTERRUPTED = 130
 
 
 def usage() -> str:
-    from shapeshift.app.program import program
+    from shapeshift.runtime_models.program import program
 
     name = program()
     return "\n".join(
@@ -121,7 +122,7 @@ def usage() -> str:
 
 def offered() -> dict[str, str]:
     """Every command and what it does; an installed package has no tests to run."""
-    from shapeshift.app.program import is_installed
+    from shapeshift.runtime_models.program import is_installed
 
     rows = {command: text for command, (_, text) in COMMANDS.items()}
     return rows if is_installed() else rows | LAUNCHED
@@ -206,8 +207,8 @@ def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.caches import settle_caches_for
     from shapeshift.app.command_line import parse, wants_help
     from shapeshift.app.paths import begin_at_start
-    from shapeshift.app.program import program
     from shapeshift.app.progress import lines
+    from shapeshift.runtime_models.program import program
 
     with uninterrupted():
         module = importlib.import_module(f"shapeshift.app.{COMMANDS[command][0]}")
@@ -257,7 +258,7 @@ def answer(arguments: list[str]) -> int:
         print_text(usage())
         return 0
     if arguments[:1] in (["--version"], ["-V"], ["version"]):
-        from shapeshift.app.program import version
+        from shapeshift.runtime_models.program import version
 
         print_text(f"shapeshift {version()}")
         return 0

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
@@ -60,6 +60,10 @@ PIP_REASONS = (
      "tools/packaging/lock.py makes it anew"),
     (r"No matching distribution found for (\S+)", "the package index has no {} for Python "
      f"{sys.version_info[0]}.{sys.version_info[1]} on {sys.platform} {platform.machine()}"),
+    (r"(?:Failed building wheel for|Failed to build|metadata-generation-failed)(?: '?([\w.-]+))?",
+     "{} has to be built here, and that failed; a compiler or its headers may lack"),
+    (r"(?:conflicting dependencies|ResolutionImpossible)", "it wants other versions of packages "
+     "than those that are installed here, and these stay as they are"),
 )  # fmt: skip
 
 
@@ -281,38 +285,48 @@ def install_requirements(testing: bool, lock: int | None) -> None:
     finished = stamp_file(False).exists()
     if finished:
         (VENV / UNFINISHED).touch()
-    code = run_pip(["install", "--require-hashes", *wanted], lock)
+    log = VENV / INSTALL_LOG
+    code = run_pip(["install", "--require-hashes", *wanted], lock, log)
     if code != 0:
         if finished and code > 0:  # pip has given up in order: what was there before still works
             (VENV / UNFINISHED).unlink()
-        stop(f"pip could not install the requirements: {pip_reason(code)}.")
+        stop(f"pip could not install the requirements: {pip_reason(code, log)}.")
     for level in {False, testing}:
         stamp_file(level).write_text(digest(level))
     (VENV / UNFINISHED).unlink(missing_ok=True)
 
 
-def run_pip(words: list[str], lock: int | None) -> int:
-    """pip's exit code; what it says goes into a file, and one line a minute is shown of it."""
+def say_still(line: str) -> None:
+    say(f"Still at it: {line}")
+
+
+def run_pip(
+    words: list[str], lock: int | None, log: Path, python: Path = PYTHON, temporary: str = "",
+    hear: Callable[[str], None] = say_still, every_s: float = PATIENCE_S,
+) -> int:  # fmt: skip
+    """pip's exit code; what it says goes into a file, and `hear` gets a line of it now and then."""
     environment = {k: v for k, v in os.environ.items() if k not in PIP_ELSEWHERE}
+    if temporary:  # where pip and those that it calls leave what they do not need for long
+        environment |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), temporary)
     words = ["-m", "pip", *words, "--disable-pip-version-check", "--no-input"]
-    with (VENV / INSTALL_LOG).open("wb") as log:
-        output = {"stdout": log, "stderr": subprocess.STDOUT, "env": environment}
-        pip = run_python(PYTHON, *words, lock=lock, **output)
+    with log.open("wb") as file:
+        output = {"stdout": file, "stderr": subprocess.STDOUT, "env": environment}
+        pip = run_python(python, *words, lock=lock, **output)
         try:
             while True:
                 try:
-                    return pip.wait(PATIENCE_S)
+                    return pip.wait(every_s)
                 except subprocess.TimeoutExpired:
-                    say(f"Still at it: {pip_said(r'^ *(Collecting|Downloading|Installing) .*')}")
+                    hear(pip_said(r"^ *(Collecting|Downloading|Building|Installing) .*", log))
         except KeyboardInterrupt:
             pip.terminate()
             pip.wait()
             raise
 
 
-def pip_said(pattern: str) -> str:
+def pip_said(pattern: str, log: Path) -> str:
     """The last line of pip's that fits."""
-    text = (VENV / INSTALL_LOG).read_text(errors="replace")
+    text = log.read_text(errors="replace")
     found = [line for line in text.splitlines() if re.search(pattern, line)]
     return printable(found[-1].strip()) if found else "pip has said nothing yet"
 
@@ -321,16 +335,17 @@ def printable(line: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in line)[:120]
 
 
-def pip_reason(code: int) -> str:
+def pip_reason(code: int, log: Path) -> str:
     """Why pip failed, in words, and where all of its own words lie."""
-    text = (VENV / INSTALL_LOG).read_text(errors="replace")
-    where = f"all that pip said is in {VENV / INSTALL_LOG}"
+    text = log.read_text(errors="replace")
+    where = f"all that pip said is in {log}"
     if code < 0:
         return f"it was ended by signal {-code}, start again ({where})"
     for pattern, meaning in PIP_REASONS:
         if found := re.search(pattern, text):
-            return f"{meaning.format(*found.groups())} ({where})"
-    return f"{pip_said('^ERROR:').removeprefix('ERROR: ').rstrip('.')} ({where})"
+            named = (group or "a package" for group in found.groups())
+            return f"{meaning.format(*named)} ({where})"
+    return f"{pip_said('^ERROR:', log).removeprefix('ERROR: ').rstrip('.')} ({where})"
 
 
 # What editors see.  Running, shapeshift/__init__.py finds the folders beside it; an editor or a

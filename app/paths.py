@@ -8,6 +8,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models import program
 
 SCHEME = "file:"
 ASSETS = Path(__file__).resolve().parents[1] / "assets"  # what the program brought along
@@ -16,8 +17,6 @@ LONGEST_NAME = 100  # letters, of a file that is named after an object
 STANDARD_STREAM = "-"  # stands for one where a file is wanted
 # Settings of libraries that people give as paths.
 PATHS_IN_ENVIRONMENT = ("XR_RUNTIME_JSON", "OCL_ICD_VENDORS", "POCL_CACHE_DIR", "TMPDIR")
-
-_started_in: Path | None = None  # where relative paths begin; None: in the current folder
 
 
 def plain_path(text: str, windows: bool = sys.platform == "win32") -> str:
@@ -43,13 +42,13 @@ def plain(path: str | os.PathLike[str]) -> Path:
     text = os.fspath(path) if isinstance(path, str | os.PathLike) else None
     if not isinstance(text, str):
         raise UsageError(f"{path!r} is no path; a text or a pathlib.Path is wanted.")
-    path = Path(plain_path(text))
-    return path if _started_in is None or str(path) == STANDARD_STREAM else _started_in / path
+    path, start = Path(plain_path(text)), program.started_in
+    return path if start is None or str(path) == STANDARD_STREAM else start / path
 
 
 def has_left() -> bool:
     """Whether the program is one of its own, which has left the folder that it was started in."""
-    return _started_in is not None
+    return program.started_in is not None
 
 
 def leave_current_folder() -> None:
@@ -59,19 +58,19 @@ def leave_current_folder() -> None:
     Libraries see that otherwise: linkers that OpenCL drivers call take libgcc_s.so.1 from there,
     matplotlib its settings, Windows DLLs, and other Pythons the modules that they import.
     """
-    global _started_in
     os.environ["PYTHONSAFEPATH"] = "1"
     os.environ.pop("PYTHONPATH", None)
     root = Path(__file__).resolve().parents[1]
     try:
-        _started_in = Path.cwd()
+        start = Path.cwd()
     except FileNotFoundError:  # deleted meanwhile: whatever is relative lies nowhere
-        _started_in = Path(os.sep, "a folder that was deleted")
-    if str(_started_in) not in {str(root), *sysconfig.get_paths().values()}:
-        sys.path[:] = [entry for entry in sys.path if entry not in ("", str(_started_in))]
+        start = Path(os.sep, "a folder that was deleted")
+    program.started_in = start
+    if str(start) not in {str(root), *sysconfig.get_paths().values()}:
+        sys.path[:] = [entry for entry in sys.path if entry not in ("", str(start))]
     for name in PATHS_IN_ENVIRONMENT:
         if given := os.environ.get(name):
-            os.environ[name] = str(_started_in / given) + os.sep * given.endswith(os.sep)
+            os.environ[name] = str(start / given) + os.sep * given.endswith(os.sep)
     os.chdir(root)
 
 

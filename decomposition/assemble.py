@@ -28,10 +28,18 @@ from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.parts import part_of, splat_labels
-from shapeshift.scene.colliders.carve import SeenDepth, Sight, carved_mesh, is_free, votes
+from shapeshift.scene.colliders.carve import (
+    GRAZING,
+    SeenDepth,
+    Sight,
+    carved_mesh,
+    is_free,
+    votes,
+)
 from shapeshift.scene.colliders.collider import Collider, Making, collider_of_mesh, mesh_of_splats
 from shapeshift.scene.colliders.collider_wrap import join_meshes
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume
+from shapeshift.scene.colliders.cut_apart import apart
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
@@ -143,7 +151,12 @@ def assemble(
     making = making or Making()
     looks, x = looks_of(model), model.stops[0].x
     found = {label: support_plane(looks, model.labels, label) for label in objects}
-    planes = {label: plane for label, plane in found.items() if isinstance(plane, Plane)}
+    seen = seen_depths(device, model, sights, x, making)
+    planes = {
+        label: seen_plane(plane, seen, SAME_HEIGHT * looks.spacing_m)
+        for label, plane in found.items()
+        if isinstance(plane, Plane)
+    }
     proxies, failed = {}, {}
     for done, (label, given) in enumerate(objects.items()):
         making.report("making what is touched of objects", done / max(len(objects), 1))
@@ -153,6 +166,9 @@ def assemble(
             )
         except BadFile as why:
             failed[label] = str(why)
+    places = {label: np.array(part_of(model, label)[1]) for label in proxies}
+    cut, _ = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
+    proxies = {label: replace(proxy, collider=cut[label]) for label, proxy in proxies.items()}
     told: list[Completion] = []
     whole = model
     if completed:
@@ -168,7 +184,6 @@ def assemble(
         if label in planes
     ]
     hollow = replace(making, hollow=True, faces=BACKGROUND_FACES)
-    seen = seen_depths(device, whole, sights, x, making)
     ground = ground_mesh(
         only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing,
         seen,
@@ -219,6 +234,8 @@ def corners_of(proxy: Proxy, model: AnchorModel, label: int) -> np.ndarray:
 THICK = 4.0  # sides of a cell: of the slab below a plane
 SUNK = 2.0  # sides of a cell that the skin near a plane is kept below it: out of all contacts
 NEAR = 1.5  # sides of a cell above and below, in which the skin counts as the plane's
+SAME_HEIGHT, SAME_WAY = 2.0, 0.9  # spacings of anchors, cosine: a pixel that shows a plane
+FEWEST_PIXELS = 100  # that tell how high a plane is
 SAME_ANGLE, SAME_OFFSET = 0.999, 1.0  # cosine, sides of a cell: planes that are one
 
 
@@ -283,6 +300,23 @@ def seen_depths(
             depth_m = np.where(sight.measured_m > 0, sight.measured_m, depth_m)
         seen.append(SeenDepth(sight.view, depth_m, share < 0.5))
     return seen
+
+
+def seen_plane(plane: Plane, seen: Sequence[SeenDepth], near_m: float) -> Plane:
+    """The plane at the height of what photos see of it, at most near_m away.
+
+    Anchors lie in the middle of a layer of splats, half its thickness under what one looks at.
+    """
+    heights = [np.zeros(0)]
+    for one in seen:
+        normals, cosines, _ = one.planes
+        height = plane.height(one.points)
+        flat = one.solid & (cosines > GRAZING) & (normals @ plane.normal > SAME_WAY)
+        heights.append(height[flat & (np.abs(height) < near_m)])
+    found = np.concatenate(heights)
+    if len(found) < FEWEST_PIXELS:
+        return plane
+    return Plane(plane.normal, plane.offset + float(np.median(found)))
 
 
 def free_cells(

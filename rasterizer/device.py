@@ -1,6 +1,7 @@
 """The OpenCL device that everything here runs on: GPU before CPU, a plain word where is none."""
 
 import os
+import sys
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 GPU = "SHAPESHIFT_GPU"  # in the environment: which GPU, where several processes share them
 INSTALL = (
     "on Debian or Ubuntu run `apt-get install pocl-opencl-icd` (fastest on a CPU), elsewhere "
-    "`pip install pocl-binary-distribution`, or install the driver of your GPU"
+    f"`{sys.executable} -m pip install pocl-binary-distribution`, or install the driver of your GPU"
 )
 
 

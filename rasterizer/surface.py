@@ -121,7 +121,11 @@ def rasterize_depth(
     form = form or device.kind
     file, group, _ = FORMS[form]
     blocks = room_for_blocks(device, tiles, form)
-    defines = WITH_DEPTH | ({} if light_left is None else {"LIGHT_LEFT": float(light_left)}) | defines_of(device, form)
+    defines = (
+        WITH_DEPTH
+        | ({} if light_left is None else {"LIGHT_LEFT": float(light_left)})
+        | defines_of(device, form)
+    )
     kernel = device.program(file, **defines)["rasterize"]
     device.launch(
         kernel, number * group, group,

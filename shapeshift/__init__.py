@@ -60,7 +60,7 @@ __all__ = sorted(_MODULE_OF)
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        from shapeshift.app.program import version
+        from shapeshift.runtime_models.program import version
 
         return version()
     if name not in _MODULE_OF:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.errors import UsageError
-from shapeshift.app.program import is_installed, program
+from shapeshift.runtime_models.program import install_words, program
 
 if TYPE_CHECKING:
     from distributed.security import Security
@@ -23,19 +23,10 @@ def require_dask() -> None:
 
         del cryptography
     except ImportError:
-        what = "'shapeshift[cluster]'" if is_installed() else "distributed==2026.8.0 cryptography"
         raise UsageError(
-            "more than one process, or another machine, wants Dask, which is not installed: "
-            f"`{python()} -m pip install {what}`, or leave --cluster out."
+            "more than one process, or another machine, wants Dask, which "
+            f"{install_words('cluster')} installs; or leave --cluster out."
         ) from None
-
-
-def python() -> str:
-    """The words that start this Python."""
-    import shlex
-    import sys
-
-    return shlex.quote(sys.executable)
 
 
 def write_certificates(folder: Path) -> None:

@@ -25,9 +25,9 @@ from shapeshift.app.cluster.run_task import (
 )
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.errors import UsageError
-from shapeshift.app.program import ROOT, is_installed
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.files.whole_file import open_locked
+from shapeshift.runtime_models.program import ROOT, install_words, is_installed
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -210,7 +210,7 @@ def scheduler_at(address: str, certificates: Path | None) -> Iterator[DaskCluste
     from distributed import Client
 
     from shapeshift.app.cluster.certificates import read_certificates
-    from shapeshift.app.program import program
+    from shapeshift.runtime_models.program import program
 
     tls = address.startswith("tls:")
     security = read_certificates(certificates, address) if tls else None
@@ -302,8 +302,7 @@ def slurm_cluster(file: Path, certificates: Path | None) -> Iterator[DaskCluster
         from dask_jobqueue import SLURMCluster
     except ImportError:
         raise UsageError(
-            "--cluster slurm wants dask-jobqueue, which is not installed: `pip install "
-            "dask-jobqueue`."
+            f"--cluster slurm wants dask-jobqueue, which {install_words('slurm')} installs."
         ) from None
     from distributed import Client
 

@@ -153,7 +153,7 @@ def read_address(text: str, option: str) -> Address:
         )
     address = Address(text, found[1], found[2].strip("[]"), int(found[3]))
     if address.protocol == "tcp" and not is_loopback(address.host):
-        from shapeshift.app.program import program
+        from shapeshift.runtime_models.program import program
 
         raise UsageError(
             f"{option} is '{text}': whoever reaches such a port runs what he likes, so tcp:// is "

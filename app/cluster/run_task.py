@@ -16,9 +16,9 @@ from typing import IO
 
 from shapeshift.app.cluster.task import Task, is_of_code_here
 from shapeshift.app.errors import UsageError
-from shapeshift.app.program import ROOT, is_installed
 from shapeshift.app.progress import PERIOD, progress_bar
 from shapeshift.runtime_models.files.whole_file import LOCKS, open_locked
+from shapeshift.runtime_models.program import ROOT, is_installed
 
 # Runs one task in a process of its own, on the machine where this is called.
 

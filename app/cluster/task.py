@@ -15,9 +15,9 @@ from typing import Any
 
 from shapeshift.app.command_line import Argument, arguments_of, dicts_of
 from shapeshift.app.paths import file_name, full
-from shapeshift.app.program import ROOT, version
 from shapeshift.runtime_models.files.json_fields import saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.program import ROOT, version
 
 MOST_BYTES = 1 << 16  # of a note
 CODE_DIGITS = 24  # of a key's 64

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, Opt
 from shapeshift.app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
 from shapeshift.app.paths import full
-from shapeshift.app.program import program
 from shapeshift.app.terminal import say
+from shapeshift.runtime_models.program import program
 
 PACKAGE = ".shift"
 LEVELS_ENDING = ".lod"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from shapeshift.app.command_line import SIZE
 from shapeshift.app.paths import DEMO
-from shapeshift.app.program import program
 from shapeshift.app.terminal import print_json, say
+from shapeshift.runtime_models.program import program
 
 if TYPE_CHECKING:
     from shapeshift.app.document import Document

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT, POSITIONAL
 from shapeshift.app.paths import full
-from shapeshift.app.program import program
 from shapeshift.app.terminal import print_json, print_text, say
+from shapeshift.runtime_models.program import program
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.poses.find_poses import Length, PoseSettings

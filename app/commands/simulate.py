@@ -100,6 +100,7 @@ def make_simulation(file, acts: tuple, x: str = "", rough: bool = False):
     from shapeshift.runtime_models.splats.plain_splats import Reading
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document.scene_file import read_models
+    from shapeshift.scene.world.settle import begin
     from shapeshift.scene.world.simulation import Simulation
     from shapeshift.scene.world.world import World
 
@@ -108,6 +109,7 @@ def make_simulation(file, acts: tuple, x: str = "", rough: bool = False):
         file = file_at(file, models, x) if x else file
         colliders = colliders_of(file, models, shown, rough)
     world = World(file, models, colliders, hz=HZ)
+    begin(world)
     print_findings(models)
     for finding in world.findings:
         say(sentence(finding))

@@ -30,10 +30,10 @@ from shapeshift.app.editor.window.viewer import Viewer
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import DEMO, TOUCH, config_folder, plain
-from shapeshift.app.program import program
 from shapeshift.app.streaming.refine import Refiner, show_level
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile, SplatLayers
+from shapeshift.runtime_models.program import program
 from shapeshift.scene.cameras.camera_list import moved
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.scene import Scene

@@ -32,8 +32,8 @@ class Options(ClusterOptions, DrawingOptions):
     scene: Annotated[Path, POSITIONAL]
     """A package, splats of any known format, a folder of layers or a scene file."""
     out: Path
-    """NAME.mp4, NAME.webm (both want PyAV: pip install av), NAME.webp, NAME.gif, or a folder for
-    numbered pictures."""
+    """NAME.mp4, NAME.webm (both want PyAV: the command `extras film`), NAME.webp, NAME.gif, or a
+    folder for numbered pictures."""
     cameras: Annotated[str, Opt(metavar="CAMERAS")] = "auto"
     """auto (cameras that lie with the scene, else orbit), orbit, a file or folder of cameras, or a
     NAME.film.json from the viewer (docs/film.md)."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.files.whole_file import whole_file
+from shapeshift.runtime_models.program import install_words
 
 Done = Callable[[int], None]
 PICTURES = (".webp", ".gif")  # Pillow writes them, moving
@@ -68,8 +69,8 @@ def find_av(path: Path) -> Any:
         import av
     except ImportError:
         raise UsageError(
-            f"{path.name} wants PyAV, which is not installed: `pip install av`; a .webp, a .gif or "
-            "a folder of pictures as --out goes without."
+            f"{path.name} wants PyAV, which {install_words('film')} installs; a .webp, a .gif or a "
+            "folder of pictures as --out goes without."
         ) from None
     return av
 

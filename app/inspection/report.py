@@ -20,9 +20,9 @@ from shapeshift.app.inspection.length_pictures import (
 )
 from shapeshift.app.inspection.outputs import summary_lines, three_pictures
 from shapeshift.app.inspection.pictures import ColorScale, scale_ticks
-from shapeshift.app.program import is_installed
 from shapeshift.runtime_models.files.plain_text import json_text, one_line
 from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.program import is_installed
 from shapeshift.scene.cameras.camera_list import CameraList, moved
 from shapeshift.scene.cameras.own_cameras import own_rows
 from shapeshift.scene.inspection.mark_photos import photo_pixels

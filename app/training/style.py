@@ -7,11 +7,11 @@ import numpy as np
 
 from shapeshift.app.opening import open_model
 from shapeshift.app.paths import full
-from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.style_looks import check_looks, views_and_size, with_named_style
 from shapeshift.app.training.style_options import Options
 from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.runtime_models.program import program
 
 if TYPE_CHECKING:
     from shapeshift.training.styles.add_style import NewStyle

@@ -13,7 +13,6 @@ from shapeshift.app.cluster.task import is_task
 from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
-from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import (
     INTERRUPTED,
@@ -25,6 +24,7 @@ from shapeshift.app.training.run_loop import (
     used,
 )
 from shapeshift.app.training.train_options import Options, settings_of, with_settings
+from shapeshift.runtime_models.program import program
 
 if TYPE_CHECKING:
     from shapeshift.training.train import Trainer

@@ -11,7 +11,6 @@ from shapeshift.app.command_line import POSITIONAL, FieldsOf, Opt
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import ReadingOptions, open_capture, open_model
 from shapeshift.app.paths import full
-from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED, decibels, train, used
 from shapeshift.app.training.train_options import (
@@ -25,6 +24,7 @@ from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.model import AnchorModel, Model
 from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.package.write_package import package_files
+from shapeshift.runtime_models.program import program
 from shapeshift.scene.change.similarity import Similarity, read_change
 from shapeshift.scene.sections.section_texts import read_box
 from shapeshift.training.settings import TrainSettings

@@ -77,7 +77,9 @@ class ModelPictures:
         projected = project(self._device, *self._geometry, self._device.upload(color), camera)
         tiles = bin_tiles(self._device, projected, view.size)
         surfaces = surface(self._device, *self._geometry[:3], camera, projected)
-        drawn = rasterize_depth(self._device, projected, tiles, surfaces, view.size, light_left=LEFT)
+        drawn = rasterize_depth(
+            self._device, projected, tiles, surfaces, view.size, light_left=LEFT
+        )
         metres = self._device.download(drawn.metres)
         share = self._device.download(drawn.frame.image)[0].copy()
         return np.where(metres > 0, metres, np.float32(np.inf)), share

@@ -27,6 +27,7 @@ from shapeshift.runtime_models.gate.doors import DOORS, Door
 from shapeshift.runtime_models.gate.limits import MEMORY, TIME, resident
 from shapeshift.runtime_models.gate.wire import receive, send
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.program import package_words
 
 CHILD = Path(__file__).with_name("child.py")
 TICK_S = 0.05  # between looks at a process that works
@@ -240,7 +241,7 @@ def value_of(answer: dict, door: Door, path: Path, size: int) -> Any:
     if "absent" in answer:
         raise BadFile(
             f"{where} needs the package {door.package}, which does not load "
-            f"({str(answer['absent'])[:80]}): {sys.executable} -m pip install {door.package}"
+            f"({str(answer['absent'])[:80]}): {package_words(door.package)} installs it"
         )
     raise cut_off(door, path, size, 0.0, "memory")
 

@@ -51,6 +51,11 @@ class SeenDepth:
     depth_m: np.ndarray  # (H, W) along the view; Inf: nothing is seen, NaN: not known
     ends: np.ndarray | None = None  # (H, W) bool: pixels that end on what is looked for; None: all
 
+    @property
+    def solid(self) -> np.ndarray:
+        """(H, W) bool: pixels that end on what is looked for."""
+        return np.ones(self.depth_m.shape, bool) if self.ends is None else self.ends
+
     @cached_property
     def planes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(H, W, 3) unit normals towards the camera, world; (H, W) cosines to it, 0: not known; and
@@ -126,7 +131,7 @@ def votes(seen: Sequence[SeenDepth], places: np.ndarray, near_m: float) -> Votes
         sure = np.maximum(np.float32(SURE / REACH * near_m), np.float32(SURE_SHARE) * z)
         through[rows] += one.nearest.reshape(-1)[at] > z + sure
         normals, cosines, offsets = one.planes
-        cosine = np.where(solid_of(one), cosines, 0).reshape(-1)[at]
+        cosine = np.where(one.solid, cosines, 0).reshape(-1)[at]
         # What lies farther along the ray than that cannot be so near to the pixel's plane.
         known = np.flatnonzero(
             (cosine > GRAZING) & (np.abs(one.known_m.reshape(-1)[at] - z) * cosine < 2 * near_m)
@@ -202,7 +207,7 @@ def grid_of(
     None where no ray ends on anything.
     """
     ends = [one.planes[1] > GRAZING for one in seen]
-    solid = [found & solid_of(one) for one, found in zip(seen, ends, strict=True)]
+    solid = [found & one.solid for one, found in zip(seen, ends, strict=True)]
     every = np.concatenate(
         [np.zeros((0, 3)), *(o.points[s] for o, s in zip(seen, solid, strict=True))]
     )
@@ -219,7 +224,9 @@ def grid_of(
     if not (cell > 0 and (high >= low).all()):
         return None
     while True:
-        border = (ROOM + REACH + 1.37) * cell  # no plane of the lowest points through cells' middles
+        border = (
+            ROOM + REACH + 1.37
+        ) * cell  # no plane of the lowest points through cells' middles
         shape = np.ceil((high - low + 2 * border) / cell).astype(int)
         cells = np.floor((every - (low - border)) / cell).astype(np.int32)
         taken = np.zeros(shape, bool)
@@ -231,10 +238,6 @@ def grid_of(
         if len(where) <= 1.2 * MOST_PLACES:
             return low - border, cell, where, shape
         cell *= float(np.sqrt(len(where) / MOST_PLACES))  # places lie on surfaces
-
-
-def solid_of(one: SeenDepth) -> np.ndarray:
-    return np.ones(one.depth_m.shape, bool) if one.ends is None else one.ends
 
 
 def away_from(places: np.ndarray, eyes: np.ndarray, radius_m: float) -> np.ndarray:

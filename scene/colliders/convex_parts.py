@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.program import package_words
 from shapeshift.scene.colliders.coacd_run import ABSENT
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh, sample_faces, separate
 
@@ -163,7 +164,7 @@ def run_coacd(
             why = said.read_text(errors="replace")
             raise BadFile(
                 f"its collider cannot be cut into convex pieces: the package coacd does not load "
-                f"({why}); install it with: python -m pip install -r requirements.txt."
+                f"({why}); {package_words('coacd')} installs it."
             )
         if child.returncode != 0 or not wanted.is_file():
             progress("CoACD found no pieces: each separate part becomes one", 1.0)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.program import package_words
 from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import UNIT_SLACK, Pose
@@ -155,8 +156,8 @@ def engine() -> ModuleType:
         import rapier3d
     except ImportError as why:
         raise BadFile(
-            f"nothing can move or be touched: the package rapier3d does not load ({why}); install "
-            "it with: python -m pip install -r requirements.txt."
+            f"nothing can move or be touched: the package rapier3d does not load ({why}); "
+            f"{package_words('rapier3d')} installs it."
         ) from why
     return rapier3d
 
@@ -190,6 +191,27 @@ def stopped_bodies(world: Any, handles: dict[int, Any]) -> list[Finding]:
         for number, handle in (handles.items() if lost else ())
         if handle in lost
     ]
+
+
+# m/s and rad/s: what floats and was touched is faster; twice the speed below which things sleep, so
+# that what merely leans on it, or lies in it by a hair, does not count.
+STIRS, TURNS = 0.02, 0.2
+FLOAT_DAMPING = 10.0  # 1/s
+
+
+def float_body(body: Any) -> None:
+    """The engine's body has no weight, and loses what little speed it gets."""
+    body.gravity_scale, body.linear_damping, body.angular_damping = 0.0, *[FLOAT_DAMPING] * 2
+
+
+def end_floats(bodies: dict[int, Any], held: set[int]) -> None:
+    """What floats weighs again once it stirs or is held: something has touched it."""
+    for number, body in bodies.items():
+        if body.gravity_scale == 0:
+            v, w = body.linvel, body.angvel
+            still = math.hypot(v.x, v.y, v.z) < STIRS and math.hypot(w.x, w.y, w.z) < TURNS
+            if number in held or not still:
+                body.gravity_scale, body.linear_damping, body.angular_damping = 1.0, 0.0, 0.0
 
 
 def more_substeps(speeds: dict[int, tuple[float, float, float]], pressed: bool) -> int:

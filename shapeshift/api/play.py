@@ -118,6 +118,7 @@ def world_of(scene: OpenedScene, progress: Progress | None, rough: bool = False)
     """The bodies and physics of a scene file, each object's x as the scene has it."""
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document import edits
+    from shapeshift.scene.world.settle import begin
     from shapeshift.scene.world.world import World
 
     file = scene.subject.file
@@ -125,7 +126,9 @@ def world_of(scene: OpenedScene, progress: Progress | None, rough: bool = False)
     for obj in scene.objects:
         file = edits.change(file, obj.name, x=obj.x)
     models = {obj.name: obj.model for obj in scene.objects}
-    return World(file, models, colliders_of(file, models, progress, rough), hz=HZ)
+    world = World(file, models, colliders_of(file, models, progress, rough), hz=HZ)
+    begin(world)
+    return world
 
 
 def steps_of(scene: OpenedScene, simulation: Any, steps: int) -> Iterator[Step]:

@@ -97,7 +97,7 @@ def test_an_update_that_was_cut_short_is_made_anew(calls, monkeypatch):
     first_start.make_environment(testing=False)
     monkeypatch.setattr(first_start.sys, "version", "another Python")
 
-    def end(words, lock):
+    def end(words, lock, log):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:

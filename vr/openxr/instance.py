@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from shapeshift.runtime_models.program import package_words
+
 NAME = "Shapeshift"
 API = (1, 0, 34)  # every runtime still in use speaks it
 API_OF_INSETS = (1, 1, 0)  # from it on four views a frame need no extension
@@ -150,8 +152,8 @@ def load():
         import xr
     except (ImportError, OSError) as missing:
         raise NoHeadset(
-            f"the package pyopenxr cannot be loaded ({missing}); install it with "
-            "`pip install pyopenxr`, and on Linux libgl1."
+            f"the package pyopenxr cannot be loaded ({missing}); {package_words('pyopenxr')} "
+            "installs it, and Linux needs libgl1."
         ) from missing
     return xr
 

@@ -7,8 +7,8 @@ import glfw
 import moderngl
 from moderngl_window.context.glfw.window import Window as GlfwWindow
 
-from shapeshift.app.program import program
 from shapeshift.renderer.gl.context import NoContext
+from shapeshift.runtime_models.program import program
 
 Place = tuple[int, int, int, int]  # left, top, width, height of a window on the desktop
 LEAST_SEEN = 80  # pixels of a kept place, across and down, that a monitor has to show

@@ -24,7 +24,13 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.film.film_plan import FilmPlan
 from shapeshift.app.film.window.gallery import Gallery
 from shapeshift.app.film.window.gallery_panel import draw_gallery
-from shapeshift.app.film.window.rendering import VIDEOS, Rendering, origin_on_disk
+from shapeshift.app.film.window.rendering import (
+    VIDEOS,
+    WANT_PYAV,
+    ExtraInstall,
+    Rendering,
+    origin_on_disk,
+)
 from shapeshift.app.film.window.style_work import StyleWork
 from shapeshift.app.film.window.timeline import CAMERA, STOP, Timeline
 from shapeshift.app.paths import WorkFolders
@@ -127,7 +133,7 @@ class Films:
     def each_frame(self) -> bool:
         """What plays, is drawn or is waited for; True while there is such."""
         playing = self.preview.each_frame()
-        children = [self.rendering.poll(), self.styles.poll()]
+        children = [self.rendering.poll(), self.rendering.pyav.poll(), self.styles.poll()]
         return any([playing, *children, self.gallery.each_frame()])
 
     def handle_event(self, event: Event) -> bool:
@@ -344,8 +350,11 @@ class FilmPanel:
             return
         imgui.push_item_width(-1)
         rendering.ending = choice("ending", rendering.ending, VIDEOS, VIDEOS)
-        tip("Videos want PyAV: pip install av. The others go without.", ui_scale)
+        tip(".mp4 and .webm want PyAV, an optional part; .webp and .gif go without.", ui_scale)
         imgui.pop_item_width()
+        if rendering.ending in WANT_PYAV and rendering.pyav.missing:
+            self._install(rendering.pyav, ui_scale)
+            return
         tips = {
             "Render": "Draws it beside the window, which goes on.",
             "Save path": "Keeps the keys as NAME.film.json, for `film --cameras` and to drop here.",
@@ -355,6 +364,18 @@ class FilmPanel:
             rendering.start()
         elif clicked:
             rendering.save_path()
+
+    def _install(self, pyav: ExtraInstall, ui_scale: float) -> None:
+        if pyav.running:
+            words, part = pyav.progress
+            imgui.progress_bar(part, Vec(-1, 0), words)
+            if imgui.button(item_label("Cancel"), Vec(-1, 0)):
+                pyav.cancel()
+            return
+        words = said("Install ({size} MB)", size=pyav.megabytes)
+        if imgui.button(f"{words}##install", Vec(-1, 0)):
+            pyav.start()
+        tip("Puts PyAV beside the program; the window goes on.", ui_scale)
 
 
 PAST, AROUND = "Past cameras", "Around"

@@ -1,6 +1,8 @@
 """A film of the timeline, drawn by the program's own command beside the window."""
 
 import atexit
+import importlib
+import importlib.util
 import os
 import re
 import subprocess
@@ -17,8 +19,8 @@ from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
-from shapeshift.app.program import ROOT, is_installed
 from shapeshift.app.progress import PERIOD
+from shapeshift.runtime_models.program import EXTRAS, ROOT, is_installed
 from shapeshift.scene.film.film_file import ENDING, write_film_file
 
 # A command of this program as a process of its own, for long work beside the window.
@@ -163,7 +165,40 @@ class ChildWork(ABC):
         """What was made."""
 
 
+class ExtraInstall(ChildWork):
+    """An optional part of the program, installed while the window goes on."""
+
+    def __init__(self, state: EditorState, extra: str) -> None:
+        """extra: of EXTRAS."""
+        super().__init__()
+        self._state, self._extra = state, extra
+        module = EXTRAS[extra].modules[0]
+        self.missing = importlib.util.find_spec(module) is None
+
+    @property
+    def megabytes(self) -> int:
+        return EXTRAS[self._extra].megabytes
+
+    def start(self) -> None:
+        try:
+            self._child = ProgramChild(["extras", self._extra])
+        except OSError as error:
+            self.say_failed(error)
+
+    def say_left(self) -> None:
+        self._state.say(said("The installation was left; its button begins it anew."))
+
+    def say_failed(self, why: object) -> None:
+        self._state.problem = said("Nothing was installed: {error}", error=why)
+
+    def show(self, child: ProgramChild) -> None:
+        importlib.invalidate_caches()
+        self.missing = False
+        self._state.say(said("Installed; no new start is needed."))
+
+
 VIDEOS = (".mp4", ".webm", ".webp", ".gif")
+WANT_PYAV = (".mp4", ".webm")
 
 
 class Rendering(ChildWork):
@@ -172,7 +207,8 @@ class Rendering(ChildWork):
     def __init__(self, state: EditorState, folder: Path) -> None:
         super().__init__()
         self._state, self._folder = state, folder
-        self.ending = VIDEOS[0]
+        self.pyav = ExtraInstall(state, "film")
+        self.ending = ".webp" if self.pyav.missing else ".mp4"
         self._path = Path()
 
     def status(self) -> str:

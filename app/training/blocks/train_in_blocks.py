@@ -13,9 +13,9 @@ from shapeshift.app.errors import UsageError, as_typed
 from shapeshift.app.inspection.capture_facts import print_files
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
-from shapeshift.app.program import program
 from shapeshift.app.terminal import say
 from shapeshift.app.training.train_options import LINES, Asked, Options
+from shapeshift.runtime_models.program import program
 
 if TYPE_CHECKING:
     from shapeshift.app.cluster.run_task import Shown

@@ -5,7 +5,6 @@ process on some damaged files.
 """
 
 import importlib.util
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import member_names
 from shapeshift.runtime_models.gate.gate import ask, in_utf8
 from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.program import package_words
 from shapeshift.runtime_models.splats.placed_splats import instances, joined
 from shapeshift.runtime_models.splats.plain_splats import (
     COLMAP_UP,
@@ -48,8 +48,8 @@ def refuse_without(path: Path) -> None:
     """BadFile where the package that reads and writes USD is not installed."""
     if importlib.util.find_spec("pxr") is None:
         raise BadFile(
-            f"{path.name} is USD, which needs the package {PACKAGE}: {sys.executable} -m pip "
-            f"install {PACKAGE}"
+            f"{path.name} is USD, which needs the package {PACKAGE}: {package_words(PACKAGE)} "
+            "installs it"
         )
 
 

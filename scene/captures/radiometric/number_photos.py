@@ -20,6 +20,7 @@ from shapeshift.runtime_models.files.npy import BAD_HEADER
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.program import install_words
 from shapeshift.scene.captures.radiometric.dji_photo import ADVICE, converter, dji_celsius, is_dji
 from shapeshift.scene.captures.radiometric.no_value import resized_numbers
 
@@ -190,7 +191,7 @@ def cannot_read_radiometric(path: Path) -> str:
     """What is to be installed for the temperatures of such a photo; "": nothing."""
     if is_dji(path):
         return "" if converter() else ADVICE
-    return "" if find_spec("flyr") is not None else "for degrees: pip install flyr"
+    return "" if find_spec("flyr") is not None else f"for degrees: {install_words('thermal')}"
 
 
 def radiometric_celsius(path: Path, size: tuple[int, int]) -> np.ndarray:
@@ -220,7 +221,8 @@ def read_radiometric(path: Path) -> tuple[np.ndarray, dict[str, float]]:
         raise BadFile(f"{where}: a DJI camera's settings are not read; say them")
     if find_spec("flyr") is None:
         raise BadFile(
-            f"{where}: a radiometric JPEG; its temperatures want the package flyr: pip install flyr"
+            f"{where}: a radiometric JPEG; {install_words('thermal')} installs what reads its "
+            "temperatures"
         )
     data = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b""
     sides = [

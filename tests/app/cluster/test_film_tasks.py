@@ -43,6 +43,6 @@ def test_without_the_extra_nothing_is_drawn_or_lost(tmp_path, monkeypatch, capsy
     words = ["film", str(scene), "--cameras", "orbit", *TINY, "--out", str(tmp_path / "f")]
     assert cli.main([*words, "--cluster", "local"]) == 2
     said = capsys.readouterr().err
-    assert "pip install distributed" in said and said.count("\n") == 1
+    assert "launch.py extras cluster`" in said and said.count("\n") == 1
     assert cli.main([*words, "--cluster", "moon"]) == 2
     assert "--cluster is 'moon', expected none, local" in capsys.readouterr().err

@@ -117,7 +117,7 @@ def test_without_pyav_a_video_is_refused_before_anything_is_drawn(
 ):
     monkeypatch.setitem(sys.modules, "av", None)
     said = refused(capsys, scene, *TINY, "--out", tmp_path / "a.mp4")
-    assert "pip install av" in said and ".webp" in said
+    assert "launch.py extras film`" in said and ".webp" in said
     assert not list(tmp_path.iterdir())
 
 

@@ -339,9 +339,9 @@ def test_plugins_of_the_environment_are_not_loaded(tmp_path, monkeypatch):
 def test_without_the_package_it_is_asked_for(tmp_path, monkeypatch):
     write_usd(some_splats(3, 1), tmp_path / "a.usda")
     monkeypatch.setattr(read_usd.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(BadFile, match=r"needs the package usd-core: .* -m pip install usd-core"):
+    with pytest.raises(BadFile, match=r"package usd-core: .*launch\.py extras usd` installs"):
         read_model(tmp_path / "a.usda")
-    with pytest.raises(BadFile, match="pip install usd-core"):
+    with pytest.raises(BadFile, match=r"launch\.py extras usd`"):
         writer_of(tmp_path / "b.usdz")
 
 

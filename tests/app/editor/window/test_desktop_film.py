@@ -1,6 +1,7 @@
 """The sections Film and Gallery in the real window, by a real mouse and real keys."""
 
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -128,6 +129,37 @@ def test_a_scene_of_no_file_says_so_when_it_is_filmed(film):
         run_frames(viewer, 1)
         time.sleep(0.01)
     assert "ball.shift" in viewer.state.problem
+
+
+def test_a_video_that_wants_an_extra_offers_it(film, monkeypatch):
+    """Without PyAV the first choice works; .mp4 has a button in place of Render."""
+    viewer, hands, widgets = film
+    rendering = viewer.films.rendering
+    rendering.ending, rendering.pyav.missing = ".webp", True
+    began: list[list[str]] = []
+    child = SimpleNamespace(
+        progress=("installing film", 0.0), code=None, cancelled=False, problem=lambda: "no network."
+    )
+    monkeypatch.setattr(
+        "shapeshift.app.film.window.rendering.ProgramChild",
+        lambda words: began.append(words) or child,
+    )
+    hands.click(*widgets.middle("Around"))
+    assert "Render" in widgets.boxes and "Install (104 MB)" not in widgets.boxes
+    rendering.ending = ".mp4"
+    widgets.boxes.clear()
+    run_frames(viewer, 2)
+    assert "Render" not in widgets.boxes
+    for code, left in ((2, True), (0, False)):  # the button comes again where it failed
+        child.code = None
+        hands.click(*widgets.middle("Install (104 MB)"))
+        assert began.pop() == ["extras", "film"] and rendering.pyav.running
+        child.code, child.problem = code, lambda code=code: "no network." * bool(code)
+        widgets.boxes.clear()
+        run_frames(viewer, 2)
+        assert rendering.pyav.missing is left and not rendering.pyav.running
+        assert ("no network." in viewer.state.problem) is left or not left
+    assert "Render" in widgets.boxes and "Installed" in viewer.state.messages.note
 
 
 def test_two_stops_are_picked_by_clicks_and_slid_between(viewer, hands, only, monkeypatch):
