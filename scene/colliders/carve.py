@@ -97,9 +97,10 @@ class SeenDepth:
             near = np.pad(1 / self.depth_m.astype(np.float64), 1, "reflect", reflect_type="odd")
         out = ~np.isfinite(self.depth_m)
         for axis in (0, 1):
-            bend = np.diff(near, 2, axis=axis)
-            bend = bend[:, 1:-1] if axis == 0 else bend[1:-1]
-            out |= ~(np.abs(bend) <= BEND * near[1:-1, 1:-1])
+            with np.errstate(invalid="ignore"):
+                bend = np.diff(near, 2, axis=axis)
+                bend = bend[:, 1:-1] if axis == 0 else bend[1:-1]
+                out |= ~(np.abs(bend) <= BEND * near[1:-1, 1:-1])
         return out
 
     @cached_property
