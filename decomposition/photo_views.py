@@ -58,7 +58,7 @@ def photo_views(
     return views
 
 
-def sights_of(capture: Capture, stops: Sequence[Stop]) -> list[Sight]:
+def sights_of(capture: Capture, stops: tuple[Stop, ...]) -> list[Sight]:
     """MOST_SIGHTS photos, evenly, in few pixels; of those of the first stop with measured depth."""
     sights = []
     for photo in evenly(list(capture.photos), MOST_SIGHTS):

@@ -73,10 +73,12 @@ class ModelPictures:
         self._decode(x)
         color = np.zeros((len(self._means), 3), np.float32)
         color[:, 0] = marked
+        means, scales, wxyz, opacity = self._geometry
+        colors = self._device.upload(color)
         camera = Camera(*view.pinhole(), view.size, view.near)
-        projected = project(self._device, *self._geometry, self._device.upload(color), camera)
+        projected = project(self._device, means, scales, wxyz, opacity, colors, camera)
         tiles = bin_tiles(self._device, projected, view.size)
-        surfaces = surface(self._device, *self._geometry[:3], camera, projected)
+        surfaces = surface(self._device, means, scales, wxyz, camera, projected)
         drawn = rasterize_depth(
             self._device, projected, tiles, surfaces, view.size, light_left=LEFT
         )

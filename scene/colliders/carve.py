@@ -72,8 +72,8 @@ class SeenDepth:
         cosine = np.nan_to_num(np.abs(cosine))
         cosine[self.edges] = 0
         offset = np.where(cosine > 0, (normal * points).sum(2), 0)
-        columns = np.where(cosine[..., None] > 0, normal, 0), cosine, offset
-        return tuple(column.astype(np.float32) for column in columns)
+        normal[cosine <= 0] = 0
+        return normal.astype(np.float32), cosine.astype(np.float32), offset.astype(np.float32)
 
     @cached_property
     def known_m(self) -> np.ndarray:
