@@ -3,10 +3,9 @@
 import contextlib
 import importlib
 import os
-import signal
 import sys
-from collections.abc import Iterator
 
+from shapeshift.app.interrupts import answer_endings, uninterrupted
 from shapeshift.app.paths import leave_current_folder
 from shapeshift.app.terminal import clean_streams, drop_output, print_text, say
 
@@ -188,21 +187,6 @@ def report_fault(command: str, error: Exception) -> int:
     return FAULT
 
 
-@contextlib.contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Ctrl-C waits until the end of this: numpy takes one while it is imported for a broken
-    installation.  launch.py has held it back since Python started.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-
-
 def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.caches import settle_caches_for
     from shapeshift.app.command_line import parse, wants_help
@@ -231,6 +215,7 @@ def main(arguments: list[str] | None = None) -> int:
     """The program's exit code; without arguments, those of this process."""
     if arguments is None:  # the program itself, not a part of another
         arguments = sys.argv[1:]
+        answer_endings()
         leave_current_folder()
     try:
         with clean_streams():
