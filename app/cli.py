@@ -4,6 +4,7 @@ import contextlib
 import importlib
 import os
 import sys
+from typing import Any
 
 from shapeshift.app.interrupts import answer_endings, uninterrupted
 from shapeshift.app.paths import leave_current_folder
@@ -95,6 +96,7 @@ COMMANDS = {
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
+CLAIMING = ("demo", "film", "fit", "lod", "poses", "segment", "style", "table", "train", "update")
 OPEN_ENDED = ("view", "vr", "serve", "cluster")  # they last as long as somebody looks
 BAD_INPUT = 2  # exit code
 FAULT = 3
@@ -207,8 +209,17 @@ def run_command(command: str, arguments: list[str]) -> int:
     settle_caches_for(command)
     if command in OPEN_ENDED:
         return module.run(options)
-    with lines(command):
+    with lines(command), claim_of(command, options):
         return module.run(options)
+
+
+def claim_of(command: str, options: Any) -> contextlib.AbstractContextManager[None]:
+    """Long work has its --out for itself; the parts of a film share one."""
+    if command not in CLAIMING or getattr(options, "only", ""):
+        return contextlib.nullcontext()
+    from shapeshift.app.claims import claimed
+
+    return claimed(options.out, command)
 
 
 def main(arguments: list[str] | None = None) -> int:
