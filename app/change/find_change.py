@@ -1,6 +1,5 @@
 """What changed between two scenes: the work of the command and of ss.change."""
 
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ import numpy as np
 from shapeshift.app.change.draw_pairs import Progress, Visit, draw_side, rings_around
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.colors.palette import LUMINANCE
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.colmap.colmap_child import run_child
 from shapeshift.scene.change.places import (
@@ -275,7 +275,7 @@ def _by_features(
             gray = (each.color * each.coverage[..., None]) @ LUMINANCE
             arrays[f"{side}{i}"] = (np.clip(gray, 0, 1) * 255 + 0.5).astype(np.uint8)
             arrays[f"p{side}{i}"] = _places(view, each).astype(np.float32)
-    with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
+    with temporary_folder() as folder:
         given, wanted = Path(folder, "pictures.npz"), Path(folder, "found.npz")
         np.savez(given, **arrays)  # type: ignore[arg-type]  # its stubs take switches alone
         log = Path(folder, "log.txt")

@@ -73,8 +73,8 @@ def write_posed(
         text = json.dumps({"modalities": said}, indent=1, ensure_ascii=False)
         write_whole(out / "capture.json", text.encode())
     target = make_folders(out, "sparse/0")
-    for name, data in sorted(tables.items(), reverse=True):  # readers look for images.bin
-        write_whole(target / name, data)
+    for name in sorted(tables, key="images.bin".__eq__):  # what makes it a capture comes last
+        write_whole(target / name, tables[name])
     shutil.rmtree(work)
 
 
