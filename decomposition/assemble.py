@@ -31,6 +31,7 @@ from shapeshift.runtime_models.parts import part_of
 from shapeshift.scene.colliders.collider import Collider, Making, collider_of_mesh, mesh_of_splats
 from shapeshift.scene.colliders.collider_wrap import join_meshes
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume
+from shapeshift.scene.colliders.cut_apart import apart
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
@@ -150,6 +151,9 @@ def assemble(
             )
         except BadFile as why:
             failed[label] = str(why)
+    places = {label: np.array(part_of(model, label)[1]) for label in proxies}
+    cut, _ = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
+    proxies = {label: replace(proxy, collider=cut[label]) for label, proxy in proxies.items()}
     told: list[Completion] = []
     whole = model
     if completed:

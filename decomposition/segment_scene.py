@@ -36,6 +36,7 @@ from shapeshift.scene.document.scene_file import (
     SceneFile,
     SceneItem,
 )
+from shapeshift.scene.world.settle import Rest
 
 MOSTLY = 9  # times as many silent pixels as labelled ones: white masks with soft edges
 LONGEST_SIDE = 1024  # pixels of a photo whose training size nobody knows
@@ -58,6 +59,7 @@ class Segmented:
     parts: tuple[SegmentedPart, ...]
     pictures: tuple[LabelledView, ...]  # what the label maps said
     silent: int  # photos without a label map
+    rests: tuple[Rest, ...] = ()  # of each body, as the scene is written; (): nothing was tested
 
 
 def factor_of(photo: Photo, trained: int | None) -> int:

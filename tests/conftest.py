@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
 import warnings
 from pathlib import Path
@@ -23,6 +24,12 @@ pytest.register_assert_rewrite("tests.support")  # asserts there tell their valu
 # Started as a background job whose parent ignores Ctrl-C, so would the programs that are tested.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# A container often has PYTHONDONTWRITEBYTECODE; then each of hundreds of processes that tests start
+# compiles all that it imports, and pytest rewrites every assert at every start, a minute of a core.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 # Before its first input in a process Hypothesis looks through our whole source for numbers, which

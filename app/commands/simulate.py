@@ -98,6 +98,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
     from shapeshift.runtime_models.splats.plain_splats import Reading
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document.scene_file import read_models
+    from shapeshift.scene.world.settle import begin
     from shapeshift.scene.world.simulation import Simulation
     from shapeshift.scene.world.world import World
 
@@ -106,6 +107,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
         file = file_at(file, models, x) if x else file
         colliders = colliders_of(file, models, shown)
     world = World(file, models, colliders, hz=HZ)
+    begin(world)
     print_findings(models)
     for finding in world.findings:
         say(sentence(finding))

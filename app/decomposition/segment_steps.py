@@ -126,6 +126,52 @@ def write_colliders(
     return replace(file, items=items, background=background)
 
 
+def at_rest(
+    file: "SceneFile", found: "Segmented", settings: CompletionSettings
+) -> "tuple[SceneFile, Segmented]":
+    """The scene with every object on what carries it, and what a test of some seconds says of it.
+
+    The labelled model has been written beside the file.  Of pairs that begin too far inside each
+    other it is said that nothing moves them.  Raises BadFile.
+    """
+    from shapeshift.runtime_models.model import AnchorModel, BadFile
+    from shapeshift.runtime_models.shapes import four, three
+    from shapeshift.scene.colliders.collider_files import colliders_of
+    from shapeshift.scene.document.scene_file import read_models
+    from shapeshift.scene.world.rigid_object import same_pose
+    from shapeshift.scene.world.settle import begin, settle
+    from shapeshift.scene.world.world import World
+
+    if not isinstance(found.model, AnchorModel):  # nothing was made for it to be touched
+        return file, found
+    settings.progress("seeing whether it rests", 0, 1)
+    placed, models = read_models(file)
+    world = World(placed, models, colliders_of(placed, models))
+    starts = {name: obj.pose for name, obj in world.objects.items()}
+    try:
+        begin(world)
+    except BadFile as why:
+        settings.notice(str(why))
+        return file, found
+    for finding in world.findings:
+        settings.notice(f"{finding.what}: {finding.done}.")
+    rests = {rest.name: rest for rest in settle(world)}
+    for rest in rests.values():
+        if why := rest.sentence():
+            settings.notice(f"{why}.")
+
+    items = []
+    for item in file.items:
+        rest = rests.get(item.name)
+        if rest is not None:
+            item = replace(item, floats=rest.kept)
+            if not same_pose(rest.pose, starts[item.name]):
+                at, turn = three(rest.pose.position), four(rest.pose.wxyz)
+                item = replace(item, position=at, wxyz=turn, placed=True)
+        items.append(item)
+    return replace(file, items=tuple(items)), replace(found, rests=tuple(rests.values()))
+
+
 def sentences_of(made: "Assembled", names: dict[int, str]) -> Iterator[str]:
     """What became of each object."""
     for label, proxy in made.proxies.items():

@@ -26,6 +26,7 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.colliders.collider_files import colliders_of
 from shapeshift.scene.document.scene_file import SceneFile, SceneItem, is_scene_file
 from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.world.settle import begin
 from shapeshift.scene.world.world import World
 
 Opened = tuple[Document, EditorState]
@@ -135,6 +136,7 @@ def open_xr(path: Path, options: ReadingOptions, x: str = "") -> tuple[Document,
     with progress_after(PATIENCE_S) as progress:
         colliders = colliders_of(file, models, progress)
     world = World(file, models, colliders, hz=HZ)
+    begin(world)
     for finding in world.findings:
         say(sentence(finding))
     sources = [Source(path, models[item.name]) for item in file.all_items]

@@ -15,7 +15,18 @@ from shapeshift.scene.world.reactions import start
 from shapeshift.scene.world.rigid_object import RigidObject
 from shapeshift.scene.world.world import World
 
-BODY = ("model", "mode", "up", "flip", "collider", "static", "mass_kg", "friction", "restitution")
+BODY = (
+    "model",
+    "mode",
+    "up",
+    "flip",
+    "collider",
+    "static",
+    "floats",
+    "mass_kg",
+    "friction",
+    "restitution",
+)
 ANSWERS = ("states", "ring", "reactions")
 
 
@@ -109,4 +120,6 @@ def reset_objects(world: World) -> None:
         world.move_object(name, obj.item.pose)
         fresh = start(obj.machine, obj.item.x)
         world.objects[name] = replace(world.objects[name], reaction_state=fresh)
+        if obj.moves and obj.item.floats:
+            world.physics.float_body(obj.body_id)
     world.impulses = {}

@@ -72,12 +72,12 @@ class Physics:
         self.substeps = int(checked_number(substeps, "the substeps of a step", 1, 64))
         self.findings: list[Finding] = []
         self._handles: dict[int, Any] = {}  # id: the engine's handle of a rigid body
-        self._ids: dict[Any, int] = {}  # the engine's handle of a collider: id
+        self.ids_by_collider: dict[Any, int] = {}  # the engine's handle of a collider: id
         self._masses: dict[int, float] = {}  # kg, of bodies alone
         self._meshes: set[int] = set()  # statics that are triangle meshes
         self._holds: dict[int, Hold] = {}
         self._next_id, self._next_grab = FLOOR + 1, 1
-        self._world = physics_shapes.new_world(gravity)
+        self.engine = physics_shapes.new_world(gravity)
         self._events = rapier.ChannelEventCollector()
         self._attach()
         if floor_y is not None:
@@ -85,8 +85,8 @@ class Physics:
 
     def _attach(self) -> None:
         """Connects what a snapshot does not hold.  One thread: two are slower at these sizes."""
-        self._world.set_num_threads(1)
-        self._world.event_handler = self._events
+        self.engine.set_num_threads(1)
+        self.engine.event_handler = self._events
         self._queries_stale = True
 
     # ---- what is in the world
@@ -162,7 +162,7 @@ class Physics:
         if mass is not None:
             collider = collider.mass(mass).active_events(ActiveEvents.CONTACT_FORCE_EVENTS)
             collider = collider.contact_force_event_threshold(0.0)
-        handle = self._world.add_body(body, [collider])
+        handle = self.engine.add_body(body, [collider])
         self._handles[number] = handle
         self._note_collider(number)
         self._queries_stale = True
@@ -172,8 +172,8 @@ class Physics:
         from rapier3d import ShapeType
 
         collider = self._collider(number)
-        self._ids[collider] = number
-        if self._world.colliders[collider].shape.shape_type == ShapeType.TRIMESH:
+        self.ids_by_collider[collider] = number
+        if self.engine.colliders[collider].shape.shape_type == ShapeType.TRIMESH:
             self._meshes.add(number)
 
     def remove(self, number: int) -> None:
@@ -181,29 +181,33 @@ class Physics:
         handle = self._handle(number)
         for grab in [g for g, hold in self._holds.items() if hold.body == number]:
             self._remove_hand(grab)
-        del self._ids[self._collider(number)], self._handles[number]
-        self._world.remove_body(handle)
+        del self.ids_by_collider[self._collider(number)], self._handles[number]
+        self.engine.remove_body(handle)
         self._masses.pop(number, None)
         self._meshes.discard(number)
-        self._world.wake_up_all()
+        self.engine.wake_up_all()
         self._queries_stale = True
 
     def set_pose(self, number: int, pose: Pose) -> None:
         """Puts an object somewhere else, at rest: undo, reset and the gizmo."""
-        body = self._world.rigid_bodies[self._handle(number)]
+        body = self.engine.rigid_bodies[self._handle(number)]
         body.position = isometry(checked_pose(pose, f"object {number}"))
         if number in self._masses:
             body.linvel = body.angvel = (0.0, 0.0, 0.0)  # pyright: ignore[reportAttributeAccessIssue]
-        self._world.wake_up_all()
+        self.engine.wake_up_all()
         self._queries_stale = True
 
     def set_velocity(self, number: int, linear: Any, angular: Any = (0, 0, 0)) -> None:
         """(3,) m/s of the centre of mass and (3,) rad/s, world axes."""
-        body = self._body(number)
+        body = self.engine_body(number)
         line = checked_point(linear, f"the velocity of body {number}")
         turn = checked_point(angular, f"the turning of body {number}")
         body.linvel, body.angvel = tuple(map(float, line)), tuple(map(float, turn))
         body.wake_up(True)
+
+    def float_body(self, number: int) -> None:
+        """Stays where it is, in the air too, until something touches or takes it."""
+        physics_shapes.float_body(self.engine_body(number))
 
     # ---- what it tells
 
@@ -217,22 +221,22 @@ class Physics:
 
     def pose(self, number: int) -> Pose:
         """world_from_object, exactly what the engine holds."""
-        return pose_of(self._world.rigid_bodies[self._handle(number)].position)
+        return pose_of(self.engine.rigid_bodies[self._handle(number)].position)
 
     def velocity(self, number: int) -> tuple[np.ndarray, np.ndarray]:
         """(3,) m/s of the centre of mass and (3,) rad/s, world axes."""
-        body = self._world.rigid_bodies[self._handle(number)]
+        body = self.engine.rigid_bodies[self._handle(number)]
         v, w = body.linvel, body.angvel
         return np.array([v.x, v.y, v.z]), np.array([w.x, w.y, w.z])
 
     def mass(self, number: int) -> float:
         """kg, as clamped."""
-        self._body(number)
+        self.engine_body(number)
         return self._masses[number]
 
     def sleeps(self, number: int) -> bool:
         """Whether a body has come to rest and costs nothing."""
-        return self._body(number).is_sleeping
+        return self.engine_body(number).is_sleeping
 
     def cast_ray(self, origin: Any, direction: Any) -> tuple[int, float] | None:
         """The nearest object along a ray and its distance in metres; 0 from inside of one."""
@@ -245,7 +249,7 @@ class Physics:
             raise ValueError(f"a ray has the direction {direction}; 3 numbers, not 0, are wanted.")
         ray = Ray(three(start), three(along / length))
         hit = self._queries().cast_ray(ray, MOST_REACH, True)
-        return (self._ids[hit[0]], hit[1]) if hit else None
+        return (self.ids_by_collider[hit[0]], hit[1]) if hit else None
 
     def nearest(self, point: Any, within: float) -> tuple[int, float] | None:
         """The body nearest to a hand and its distance, at most `within` metres; 0 inside."""
@@ -259,13 +263,13 @@ class Physics:
             return None
         p = found[1].point
         distance = 0.0 if found[1].is_inside else math.dist(at, (p.x, p.y, p.z))
-        return (self._ids[found[0]], distance) if distance <= reach else None
+        return (self.ids_by_collider[found[0]], distance) if distance <= reach else None
 
     def _queries(self) -> Any:
         if self._queries_stale:
-            self._world.update_query_pipeline()
+            self.engine.update_query_pipeline()
             self._queries_stale = False
-        return self._world.query_pipeline
+        return self.engine.query_pipeline
 
     def _handle(self, number: int) -> Any:
         if number not in self._handles:
@@ -273,43 +277,45 @@ class Physics:
         return self._handles[number]
 
     def _collider(self, number: int) -> Any:
-        return self._world.rigid_bodies[self._handles[number]].colliders[0]  # each has one
+        return self.engine.rigid_bodies[self._handles[number]].colliders[0]  # each has one
 
-    def _body(self, number: int) -> Any:
+    def engine_body(self, number: int) -> Any:
+        """The engine's own word for a body.  Raises ValueError for what is none."""
         handle = self._handle(number)
         if number not in self._masses:
             raise ValueError(f"object {number} is static; only a body moves.")
-        return self._world.rigid_bodies[handle]
+        return self.engine.rigid_bodies[handle]
 
     # ---- time
 
     def step(self) -> list[Contact]:
         """One step of 1 / hz seconds; every pair that touched in it, once, by ids."""
-        bodies = {number: self._body(number) for number in self._masses}
+        bodies = {number: self.engine_body(number) for number in self._masses}
         held = {hold.body for hold in self._holds.values()}
         free = {n: (self._masses[n], body) for n, body in bodies.items() if n not in held}
         speeds = velocities(bodies)
         at_meshes = [(self._collider(a), self._collider(b)) for a in held for b in self._meshes]
         substeps = self.substeps * physics_shapes.more_substeps(
-            speeds, any_near(self._world, at_meshes)
+            speeds, any_near(self.engine, at_meshes)
         )
-        rules = self._world.integration_parameters
+        rules = self.engine.integration_parameters
         rules.dt = 1 / self.hz / substeps
-        hands = self._world.rigid_bodies
+        hands = self.engine.rigid_bodies
         starts = [(hold, hands[hold.hand].position) for hold in self._holds.values()]
-        tally = ContactTally(self._world, self._ids, -self._world.gravity.y)
+        tally = ContactTally(self.engine, self.ids_by_collider, -self.engine.gravity.y)
         for k in range(substeps):
-            move_hands(self._world, starts, (k + 1) / substeps)
-            rules.contact_clustering = not any_near(self._world, at_meshes)
+            move_hands(self.engine, starts, (k + 1) / substeps)
+            rules.contact_clustering = not any_near(self.engine, at_meshes)
             rules.normalized_prediction_distance = physics_shapes.prediction(speeds)
-            self._world.step()
+            self.engine.step()
             events = self._events.drain_contact_force_events()
             if events:
                 tally.gather(events, speeds, free)
             speeds = velocities(bodies)
+        physics_shapes.end_floats(bodies, held)
         for hold in self._holds.values():
             hold.trail.append(hold.target)
-        self.findings += physics_shapes.stopped_bodies(self._world, self._handles)
+        self.findings += physics_shapes.stopped_bodies(self.engine, self._handles)
         self._queries_stale = True
         return tally.contacts()
 
@@ -317,10 +323,10 @@ class Physics:
 
     def grab(self, number: int, hand_pose: Pose, point: Any) -> int:
         """A hand takes hold of a body at a point (3,) of the world; two hands may hold one body."""
-        body = self._body(number)
+        body = self.engine_body(number)
         hand = checked_pose(hand_pose, "a hand")
         at = checked_point(point, "the point of a grab")
-        hold = attach_hand(self._world, number, self._handles[number], hand, at)
+        hold = attach_hand(self.engine, number, self._handles[number], hand, at)
         self._holds[self._next_grab] = hold
         body.wake_up(True)
         self._next_grab += 1
@@ -337,28 +343,28 @@ class Physics:
             self._remove_hand(grab)
             return
         hold.target = checked_pose(pose, "a hand")
-        self._world.rigid_bodies[self._handles[hold.body]].wake_up(True)
+        self.engine.rigid_bodies[self._handles[hold.body]].wake_up(True)
 
     def carry(self, grab: int, moved: np.ndarray) -> None:
         """A hand jumps by (4, 4) now_from_before, rigid, with what it holds and who else does."""
-        hands, body = self._world.rigid_bodies, self._hold(grab).body
+        hands, body = self.engine.rigid_bodies, self._hold(grab).body
         holds = [(h, hands[h.hand]) for h in self._holds.values() if h.body == body]
-        carry(holds, self._body(body), moved)
+        carry(holds, self.engine_body(body), moved)
         self._queries_stale = True
 
     def release(self, grab: int) -> None:
         """Lets go: the body flies on with its hand's velocity, unless something kept it back."""
         hold = self._hold(grab)
-        body = self._world.rigid_bodies[self._handles[hold.body]]
-        with_hand = lag(hold, self._world.rigid_bodies[hold.hand], body) <= WITH_HAND
+        body = self.engine.rigid_bodies[self._handles[hold.body]]
+        with_hand = lag(hold, self.engine.rigid_bodies[hold.hand], body) <= WITH_HAND
         self._remove_hand(grab)
         if with_hand and all(other.body != hold.body for other in self._holds.values()):
             throw(hold, body, self.hz, physics_shapes.MOST_SPEED)
 
     def _remove_hand(self, grab: int) -> None:
         hold = self._holds.pop(grab)
-        self._world.impulse_joints.remove(hold.joint)
-        self._world.remove_body(hold.hand)
+        self.engine.impulse_joints.remove(hold.joint)
+        self.engine.remove_body(hold.hand)
 
     def _hold(self, grab: int) -> Hold:
         if grab not in self._holds:
@@ -380,7 +386,7 @@ class Physics:
             "masses": list(self._masses.items()),
             "holds": [[grab, hold_to_json(hold)] for grab, hold in self._holds.items()],
         }
-        return pack(books, self._world.snapshot())
+        return pack(books, self.engine.snapshot())
 
     def restore(self, data: bytes) -> None:
         """Back to a snapshot, one of another Physics too.  Raises ValueError, changing nothing."""
@@ -388,13 +394,13 @@ class Physics:
 
         books, engine = unpack(data)
         try:
-            self._world = PhysicsWorld.restore(engine)
+            self.engine = PhysicsWorld.restore(engine)
         except SerializationError as why:
             raise ValueError(f"a snapshot is of another engine ({why}); take a new one.") from why
         self.hz, self.substeps = books["hz"], books["substeps"]
         self._next_id, self._next_grab = books["next"]
         self._handles = {n: RigidBodyHandle(i, g) for n, i, g in books["things"]}
-        self._ids, self._meshes = {}, set()
+        self.ids_by_collider, self._meshes = {}, set()
         for number in self._handles:
             self._note_collider(number)
         self._masses = dict(books["masses"])

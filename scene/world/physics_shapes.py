@@ -193,6 +193,27 @@ def stopped_bodies(world: Any, handles: dict[int, Any]) -> list[Finding]:
     ]
 
 
+# m/s and rad/s: what floats and was touched is faster; twice the speed below which things sleep, so
+# that what merely leans on it, or lies in it by a hair, does not count.
+STIRS, TURNS = 0.02, 0.2
+FLOAT_DAMPING = 10.0  # 1/s
+
+
+def float_body(body: Any) -> None:
+    """The engine's body has no weight, and loses what little speed it gets."""
+    body.gravity_scale, body.linear_damping, body.angular_damping = 0.0, *[FLOAT_DAMPING] * 2
+
+
+def end_floats(bodies: dict[int, Any], held: set[int]) -> None:
+    """What floats weighs again once it stirs or is held: something has touched it."""
+    for number, body in bodies.items():
+        if body.gravity_scale == 0:
+            v, w = body.linvel, body.angvel
+            still = math.hypot(v.x, v.y, v.z) < STIRS and math.hypot(w.x, w.y, w.z) < TURNS
+            if number in held or not still:
+                body.gravity_scale, body.linear_damping, body.angular_damping = 1.0, 0.0, 0.0
+
+
 def more_substeps(speeds: dict[int, tuple[float, float, float]], pressed: bool) -> int:
     """1, 2 or 4 times as many: what the fastest body moves in one must stay near PREDICTION.
 

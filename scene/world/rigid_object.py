@@ -62,7 +62,10 @@ def add_body(physics, item: SceneItem, collider) -> int | None:
     add = physics.add_static if item.static else physics.add_body
     shape = collider.mesh if item.name == BACKGROUND else collider.parts
     try:
-        return add(shape, item.pose, *mass, item.friction, item.restitution)
+        number = add(shape, item.pose, *mass, item.friction, item.restitution)
+        if item.floats and not item.static:
+            physics.float_body(number)
+        return number
     except ValueError as error:
         raise BadFile(f"object '{item.name}': {error}") from None
 

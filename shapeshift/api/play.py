@@ -116,6 +116,7 @@ def world_of(scene: OpenedScene, progress: Progress | None):
     """The bodies and physics of a scene file, each object's x as the scene has it."""
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document import edits
+    from shapeshift.scene.world.settle import begin
     from shapeshift.scene.world.world import World
 
     file = scene.subject.file
@@ -123,7 +124,9 @@ def world_of(scene: OpenedScene, progress: Progress | None):
     for obj in scene.objects:
         file = edits.change(file, obj.name, x=obj.x)
     models = {obj.name: obj.model for obj in scene.objects}
-    return World(file, models, colliders_of(file, models, progress), hz=HZ)
+    world = World(file, models, colliders_of(file, models, progress), hz=HZ)
+    begin(world)
+    return world
 
 
 def steps_of(scene: OpenedScene, simulation: Any, steps: int) -> Iterator[Step]:

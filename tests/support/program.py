@@ -1,25 +1,43 @@
 """The program started as a person starts it, what a refusal must look like, lines of progress."""
 
+import contextlib
+import io
 import subprocess
 import sys
 import time
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from shapeshift.app import progress
+from shapeshift.app.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 60.0
 
 
-def launch(*arguments, **keywords):
-    return subprocess.run(
-        [sys.executable, "-m", "shapeshift", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=120,
-        **keywords,
-    )
+def launch(*arguments, **keywords) -> subprocess.CompletedProcess:
+    """The program with these arguments: exit code and what it said.
+
+    In this process, as a start is a second or two of a core; with keywords of subprocess.run, in
+    one of its own.
+    """
+    words = [str(argument) for argument in arguments]
+    if keywords:
+        return subprocess.run(
+            [sys.executable, "-m", "shapeshift", *words], capture_output=True, text=True, cwd=ROOT,
+            timeout=120, **keywords,
+        )  # fmt: skip
+    said, warned = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in range(2))
+    with contextlib.chdir(ROOT), redirect_stdout(said), redirect_stderr(warned):
+        try:
+            code = main(words)
+        except SystemExit as ended:
+            code = ended.code or 0
+    texts = []
+    for stream in (said, warned):
+        stream.flush()
+        texts.append(stream.buffer.getvalue().decode())
+    return subprocess.CompletedProcess(words, code, *texts)
 
 
 def assert_refused(done, *words):

@@ -9,10 +9,12 @@ from shapeshift.app.editor.state.arrange import steer
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.paths import is_bundled
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.world.follow import reset_objects
 from shapeshift.scene.world.grab import MouseHand
 from shapeshift.scene.world.record import Record
+from shapeshift.scene.world.settle import begin
 from shapeshift.scene.world.world import World
 
 HAND = "mouse"
@@ -92,8 +94,9 @@ class TouchState:
     def meet(self, world: World) -> None:
         """The bodies of what was opened are there, or there anew on another floor."""
         if self._known is None:
-            self._unfold, world.paused = True, not self.opens_playing
-            if self.opens_playing:
+            plays = self.opens_playing and self._begin(world)
+            self._unfold, world.paused = True, not plays
+            if plays:
                 self._say(said(HOW), HOW_S)
         self._known = world
 
@@ -123,8 +126,19 @@ class TouchState:
         world = self.world
         if world is None:
             return
+        if world.paused and not self._begin(world):
+            return
         world.paused = not world.paused
         self._say(said("Objects hold still. T lets them move.") if world.paused else said(HOW))
+
+    def _begin(self, world: World) -> bool:
+        """Nothing starts inside another thing; False, and a sentence, where it would."""
+        try:
+            begin(world)
+        except BadFile as error:
+            self._state.problem = str(error)
+            return False
+        return True
 
     def _say(self, text: str, seconds: float | None = None) -> None:
         if self._keys:

@@ -2,6 +2,8 @@
 plain splats decode to.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from shapeshift.rasterizer.project import Camera
@@ -12,7 +14,7 @@ from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.losses.splat_losses import MIN_OPACITY
-from tests.support.renderer.rasterizer_reference import render_reference
+from tests.support.renderer.rasterizer_reference import finite_differences, render_reference
 
 
 def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
@@ -33,15 +35,18 @@ def head_inputs(
 def heads_reference(
     layout: HeadLayout, networks: dict, features, direction, control
 ) -> dict[str, tuple]:
-    """(units of every hidden layer [(A, H)], raw (A, out)) of every head; networks as unpacked."""
+    """(units of every hidden layer [(A, H)], raw (A, out)) of every head; networks as unpacked.
+
+    Of networks (B, out, in) and (B, out) they are (B, A, H) and (B, A, out).
+    """
     out = {}
     for name in HEADS:
         arrays = [np.asarray(a, np.float64) for a in networks[name]]
         value, units = head_inputs(layout.parts_of(name), features, direction, control), []
         for weight, bias in zip(arrays[:-2:2], arrays[1:-2:2], strict=True):
-            value = np.maximum(value @ weight.T + bias, 0)
+            value = np.maximum(value @ weight.swapaxes(-1, -2) + bias[..., None, :], 0)
             units.append(value)
-        out[name] = (units, value @ arrays[-2].T + arrays[-1])
+        out[name] = (units, value @ arrays[-2].swapaxes(-1, -2) + arrays[-1][..., None, :])
     return out
 
 
@@ -85,18 +90,66 @@ def decode_reference(
     """The splats of an optimiser's values: weights (flat), anchors (A, 3), features (A, F).
 
     stop: whose base colours they have, where anchors have some for each.
+    Of weights (B, flat) there are the splats of B networks, one set after the other.
     """
     anchors = np.asarray(parameters["anchors"], np.float64)
     features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
-    networks = layout.unpack(parameters["weights"])
+    sets = np.atleast_2d(parameters["weights"])
+    places = layout.unpack(np.arange(sets.shape[1]))
+    networks = {name: [sets[:, place] for place in layers] for name, layers in places.items()}
     heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
+    anchors = np.tile(anchors, (len(sets), 1))
     of_color = layout.color_groups
     groups = dict(zip(layout.own, layout.own, strict=True))
     if of_color:
         groups["colors"] = of_color[stop if len(of_color) > 1 else 0]
-    own = {name: np.asarray(parameters[group], np.float64) for name, group in groups.items()}
-    raw = {name: outputs for name, (_, outputs) in heads.items()}
+    own = {
+        name: np.tile(np.asarray(parameters[group], np.float64), (len(sets), 1))
+        for name, group in groups.items()
+    }
+    raw = {name: outputs.reshape(len(anchors), -1) for name, (_, outputs) in heads.items()}
     return activate_reference(raw, anchors, voxel, **own, direction=directions(anchors, eye))
+
+
+def differences(
+    loss: Callable[[tuple], float], decode: Callable[[dict], tuple],
+    parameters: dict[str, np.ndarray], layout: HeadLayout | None = None, step: float = 1e-6,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Central differences of loss(decode(parameters)) for every entry of every group.
+
+    By the chain rule: those of the loss for each number of the splats, times those of the splats.
+    So a picture is drawn twice for a splat's 14 numbers and not for each weight.  Of anchors, one
+    makes no other's splats: a column of all moves at once.
+    """
+
+    def rows(moved: dict) -> np.ndarray:
+        return np.column_stack(decode(parameters | moved))  # (splats, 14)
+
+    def splats(values: np.ndarray) -> tuple:
+        means, scales, wxyz, opacity, color = np.split(values, (3, 6, 10, 11), axis=1)
+        return means, scales, wxyz, opacity[:, 0], color
+
+    slopes = finite_differences(lambda values: loss(splats(values)), rows({}), step)
+    found = {}
+    for name, array in parameters.items():
+        values = array.astype(np.float64)
+        grads = np.zeros(values.shape)
+        if name == "weights":  # what no head sees is frozen; the reference does not know it at all
+            assert layout is not None
+            real = np.flatnonzero(layout.pack(layout.unpack(np.ones(values.size))))
+            moves = step * np.eye(values.size)[real]
+            change = rows({name: values + moves}) - rows({name: values - moves})
+            each = (change.reshape(len(real), *slopes.shape) * slopes).sum(axis=(1, 2))
+            grads[real] = each / (2 * step)
+        else:
+            for column in np.ndindex(values.shape[1:]):
+                move = np.zeros(values.shape)
+                move[:, *column] = step
+                change = rows({name: values + move}) - rows({name: values - move})
+                each = (change * slopes).reshape(len(values), -1).sum(axis=1)
+                grads[:, *column] = each / (2 * step)
+        found[name] = grads
+    return found
 
 
 def image_loss_reference(image, photo, share: float, weight=None) -> float:

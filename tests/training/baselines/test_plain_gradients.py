@@ -12,9 +12,12 @@ from shapeshift.training.baselines.plain_step import (
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
-from tests.support.renderer.rasterizer_reference import finite_differences
 from tests.support.training.plain_situations import SIZE, situation
-from tests.support.training.reference import decode_plain_reference, step_loss_reference
+from tests.support.training.reference import (
+    decode_plain_reference,
+    differences,
+    step_loss_reference,
+)
 
 BACKGROUND = (0.2, 0.5, 0.9)
 SHARES = SSIM_SHARE, 0.0  # no loss of faint splats
@@ -34,17 +37,15 @@ def test_every_gradient(device, degree, used, seed):
     photo, camera, eye = rgba[..., :3] / 255, camera_of(view), view.world_from_eye.position
     assert (device.download(drawing.splats.color) == 0).any()  # colours that are cut are there
 
-    def loss_with(name: str, values: np.ndarray) -> float:
-        splats = decode_plain_reference({**parameters, name: values}, eye, used)
-        return step_loss_reference(splats, camera, photo, BACKGROUND, SHARES)
-
+    all_wanted = differences(
+        lambda splats: step_loss_reference(splats, camera, photo, BACKGROUND, SHARES),
+        lambda values: decode_plain_reference(values, eye, used), parameters,
+    )  # fmt: skip
     assert grads.keys() == parameters.keys()
     for name in GROUPS:
-        values = parameters[name].astype(np.float64)
-        if not values.size:
+        if not parameters[name].size:
             continue
-        found = device.download(grads[name])
-        wanted = finite_differences(lambda v, name=name: loss_with(name, v), values)
+        found, wanted = device.download(grads[name]), all_wanted[name]
         difference = np.abs(found - wanted).max() / np.abs(wanted).max()
         assert difference < 1e-5, (name, difference)
         if name == "rest":
