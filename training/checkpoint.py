@@ -28,8 +28,8 @@ def checkpoint_path(out: Path) -> Path:
 def write_checkpoint(path: Path, state: Mapping[str, np.ndarray], notes: dict) -> None:
     """All arrays and notes in one file, never half-written."""
     text = json.dumps(notes)
-    sealed = json.dumps({SEAL: seal_of(state, text), "notes": text})
     with whole_file(path) as file:
+        sealed = json.dumps({SEAL: seal_of(state, text), "notes": text})
         arrays: dict[str, Any] = {**state, "notes": np.array(sealed)}
         np.savez(file, **arrays)
 

@@ -63,6 +63,7 @@ def run(options: Options) -> int:
     from shapeshift.decomposition.poses.find_poses import WORK, find_poses
     from shapeshift.decomposition.poses.photo_list import list_photos
     from shapeshift.decomposition.poses.video_frames import VIDEOS
+    from shapeshift.runtime_models.files.whole_file import discard_folder
 
     settings = settings_of(options)
     if not options.every >= 1:
@@ -87,7 +88,7 @@ def run(options: Options) -> int:
             say(f"{full(options.out / WORK)} keeps what is done; the same command goes on there.")
             raise
     if video:
-        shutil.rmtree(options.out / FRAMES)
+        discard_folder(options.out / FRAMES)
         (options.out / FRAMES_OF).unlink(missing_ok=True)
     if options.json:
         from dataclasses import asdict
