@@ -14,7 +14,7 @@ from shapeshift.decomposition.masks.label_maps import SILENT, write_label_map
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs, PhotoPrompt
 from shapeshift.decomposition.masks.work_photos import find_photo, work_photos
-from shapeshift.decomposition.walk_objects import walk_objects
+from shapeshift.decomposition.walk_objects import heights_of, walk_objects
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.runtime_models.model import BadFile, Stop
 from tests.support.decomposition.demo_photos import (
@@ -241,3 +241,24 @@ def test_a_capture_of_other_stops_is_refused(photos, tmp_path):
         work_photos(capture, (Stop("Bone", 0.0), Stop("Skin", 1.0)))
     assert work_photos(capture, (Stop("Bone", 0.0), Stop("RGB", 1.0)))[0].stop.x == 1.0
     assert photos[0].view.size == SIZE
+
+
+def test_heights_tell_the_bench_from_what_stands_on_it(photos, specs):
+    """The truth is the ray tracer's: the bench's top is a plane, the mug stands on it; with nothing
+    flat around there are none."""
+    from shapeshift.decomposition.masks.anchor_walk import nodes_of
+
+    spec = next(spec for spec in specs.objects if spec.name == "mug")
+    view = largest(spec.label)
+    photo, true = photos[view], true_maps()[1][view]
+    nodes = nodes_of(demo().model, np.array([0, 0.6, 1.8], np.float32))
+    left, top, right, bottom = spec.prompts[0].box or (0, 0, 0, 0)
+    prompt = Prompt((left, top, right, bottom))
+    (height,) = heights_of(demo(), photo.view, 0.0, [prompt], nodes)
+    assert height is not None and height.dtype == np.uint8 and height.shape == true.shape
+    box = np.s_[int(top) : int(bottom), int(left) : int(right)]
+    mug, bench = height[box][true[box] == spec.label], height[box][true[box] == 0]
+    assert np.percentile(mug, 20) > np.percentile(bench, 80)
+    none = replace(nodes, means=np.random.default_rng(0).uniform(-1, 1, nodes.means.shape))
+    assert heights_of(demo(), photo.view, 0.0, [prompt], none) == [None]
+    assert heights_of(demo(), photo.view, 0.0, [], nodes) == []
