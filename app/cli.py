@@ -217,7 +217,7 @@ def claim_of(command: str, options: Any) -> contextlib.AbstractContextManager[No
     """Long work has its --out for itself; the parts of a film share one."""
     if command not in CLAIMING or getattr(options, "only", ""):
         return contextlib.nullcontext()
-    from shapeshift.app.claims import claimed
+    from shapeshift.app.commands.claims import claimed
 
     return claimed(options.out, command)
 

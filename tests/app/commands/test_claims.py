@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 
 from shapeshift.app import cli
-from shapeshift.app.claims import claimed, lock_of
+from shapeshift.app.commands.claims import claimed, lock_of
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.files.user_cache import cache_folder
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 HOLD = """
 import sys
 from pathlib import Path
-from shapeshift.app.claims import claimed
+from shapeshift.app.commands.claims import claimed
 with claimed(Path(sys.argv[1]), "train"):
     print("held", flush=True)
     sys.stdin.read()
@@ -76,7 +76,7 @@ def test_parts_and_tasks_share_what_their_command_has(owner, tmp_path, monkeypat
 
 def test_a_lock_whose_name_was_taken_away_is_none(tmp_path, monkeypatch):
     """Between opening and locking, its owner ended and removed it."""
-    from shapeshift.app import claims
+    from shapeshift.app.commands import claims
 
     real, seen = claims.try_lock, []
 
@@ -95,6 +95,6 @@ def test_no_cache_at_all_is_no_reason_to_refuse(tmp_path, monkeypatch):
     def refuse(name):
         raise OSError(28, "No space left on device", name)
 
-    monkeypatch.setattr("shapeshift.app.claims.cache_folder", refuse)
+    monkeypatch.setattr("shapeshift.app.commands.claims.cache_folder", refuse)
     with claimed(tmp_path / "a", "train"), claimed(tmp_path / "a", "train"):
         pass
