@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("pyopencl")
 
-from shapeshift.decomposition.label_photos import PhotoLabelling, best_of, choose_photos
+from shapeshift.decomposition.label_photos import PhotoLabelling, best_of, choose_photos, with_click
 from shapeshift.decomposition.masks.journal import open_journal
 from shapeshift.decomposition.masks.label_maps import SILENT, write_label_map
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
@@ -262,3 +262,16 @@ def test_heights_tell_the_bench_from_what_stands_on_it(photos, specs):
     none = replace(nodes, means=np.random.default_rng(0).uniform(-1, 1, nodes.means.shape))
     assert heights_of(demo(), photo.view, 0.0, [prompt], none) == [None]
     assert heights_of(demo(), photo.view, 0.0, [], nodes) == []
+
+
+def test_a_box_alone_gets_a_click_where_the_thing_is_deepest():
+    """A red ring on blue: the middle of its box is blue; clicks of a person stay as they are."""
+    rows, columns = np.mgrid[:80, :100]
+    away = np.hypot(rows - 40, columns - 50)
+    ring = (away < 28) & (away > 14)
+    image = np.where(ring[..., None], (200, 30, 30), (30, 60, 180)).astype(np.uint8)
+    box = (22.0, 12.0, 79.0, 69.0)
+    (click,) = with_click(image, Prompt(box)).inside
+    assert 17 < np.hypot(click[1] - 40.5, click[0] - 50.5) < 25  # deepest is 21, half a width off
+    said = Prompt(box, np.array([[30.0, 40.0]]))
+    assert with_click(image, said) is said and with_click(image, Prompt(text="a ring")).box is None
