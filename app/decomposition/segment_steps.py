@@ -1,7 +1,6 @@
 """The end of launch.py segment: what is touched of every object, and what stood behind it."""
 
 import hashlib
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -60,7 +59,7 @@ def completed(
     """
     from shapeshift.app.training.evaluate import trained_downscale
     from shapeshift.decomposition.assemble import assemble
-    from shapeshift.decomposition.photo_views import photo_views, row_evidence
+    from shapeshift.decomposition.photo_views import photo_views, row_evidence, sights_of
     from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.document.scene_file import HULLS
@@ -77,6 +76,7 @@ def completed(
         device, found.model, views, row_evidence(device, found.model, views), wanted,
         shadows=settings.shadows, background=capture.background or (0.0, 0.0, 0.0),
         making=Making(progress=lambda what, part: settings.progress(what, int(100 * part), 100)),
+        sights=sights_of(capture, found.model.stops),
     )  # fmt: skip
     names = {part.spec.label: part.spec.name for part in found.parts}
     for sentence in sentences_of(made, names):
@@ -247,6 +247,7 @@ def find_by_segmenter(
     from shapeshift.decomposition.masks.sam_files import open_segmenter
     from shapeshift.decomposition.partition import LabelledView
     from shapeshift.decomposition.segment_scene import segment
+    from shapeshift.runtime_models.files.whole_file import discard_folder
 
     segmenter = open_segmenter(folder)
     if not segmenter.reads_text and any(spec.text for spec in specs.objects):
@@ -272,7 +273,7 @@ def find_by_segmenter(
         shown.device, shown.model, pictures, specs.objects, len(capture.photos),
         lambda done, count: progress("evidence of photos", done, count),
     )  # fmt: skip
-    shutil.rmtree(work)
+    discard_folder(work)
     return found, labels.counts
 
 
