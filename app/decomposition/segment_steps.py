@@ -1,7 +1,6 @@
 """The end of launch.py segment: what is touched of every object, and what stood behind it."""
 
 import hashlib
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from shapeshift.scene.scene import Scene, SceneObject
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.assemble import Assembled
+    from shapeshift.decomposition.completion.plane import Plane
     from shapeshift.decomposition.label_photos import Counts, Progress
     from shapeshift.decomposition.masks.specs import ObjectSpecs
     from shapeshift.decomposition.shown import ShownAnchors
@@ -51,14 +51,15 @@ def completed(
     found: "Segmented",
     capture: "Capture",
     settings: CompletionSettings,
-) -> "tuple[SceneFile, Segmented]":
-    """With a completed background and colliders in files; of plain splats the same.
+) -> "tuple[SceneFile, Segmented, dict[int, Plane]]":
+    """With a completed background and colliders in files, and what each label stands on; of plain
+    splats the same file, and no planes.
 
     Raises BadFile.
     """
     from shapeshift.app.training.evaluate import trained_downscale
     from shapeshift.decomposition.assemble import assemble
-    from shapeshift.decomposition.photo_views import photo_views, row_evidence
+    from shapeshift.decomposition.photo_views import photo_views, row_evidence, sights_of
     from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.document.scene_file import HULLS
@@ -67,7 +68,7 @@ def completed(
         settings.notice(
             "Nothing is completed: plain splats have no features that copies could keep."
         )
-        return file, found
+        return file, found, {}
     wanted = {p.spec.label: None for p in found.parts if p.rows and p.spec.collider == HULLS}
     factor = settings.downscale or trained_downscale(found.model.provenance)
     views = photo_views(device, found, capture, factor)
@@ -75,11 +76,13 @@ def completed(
         device, found.model, views, row_evidence(device, found.model, views), wanted,
         shadows=settings.shadows, background=capture.background or (0.0, 0.0, 0.0),
         making=Making(progress=lambda what, part: settings.progress(what, int(100 * part), 100)),
+        sights=sights_of(capture, found.model.stops),
     )  # fmt: skip
     names = {part.spec.label: part.spec.name for part in found.parts}
     for sentence in sentences_of(made, names):
         settings.notice(sentence)
-    return write_colliders(file, found, made, settings.out), replace(found, model=made.model)
+    file = write_colliders(file, found, made, settings.out)
+    return file, replace(found, model=made.model), made.planes
 
 
 def colliders_folder(out: Path) -> Path:
@@ -244,6 +247,7 @@ def find_by_segmenter(
     from shapeshift.decomposition.masks.sam_files import open_segmenter
     from shapeshift.decomposition.partition import LabelledView
     from shapeshift.decomposition.segment_scene import segment
+    from shapeshift.runtime_models.files.whole_file import discard_folder
 
     segmenter = open_segmenter(folder)
     if not segmenter.reads_text and any(spec.text for spec in specs.objects):
@@ -269,7 +273,7 @@ def find_by_segmenter(
         shown.device, shown.model, pictures, specs.objects, len(capture.photos),
         lambda done, count: progress("evidence of photos", done, count),
     )  # fmt: skip
-    shutil.rmtree(work)
+    discard_folder(work)
     return found, labels.counts
 
 

@@ -52,6 +52,7 @@ class PixelWalk:
     name = "random walk over pixels"
     reads_text = False
     takes_boxes = True
+    wants_click = False
 
     def encode(self, image: np.ndarray) -> np.ndarray:
         """image (H, W, C) uint8: the first three channels display sRGB, each other one its own."""

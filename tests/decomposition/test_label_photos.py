@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("pyopencl")
 
 from shapeshift.decomposition.judge import BEST, FEW, MOST_VIEWS, judge, views_to_ask
-from shapeshift.decomposition.label_photos import PhotoLabelling, best_of, choose_photos
+from shapeshift.decomposition.label_photos import PhotoLabelling, best_of, choose_photos, with_click
 from shapeshift.decomposition.masks.journal import open_journal
 from shapeshift.decomposition.masks.label_maps import SILENT, write_label_map
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
@@ -128,8 +128,14 @@ def test_other_inputs_begin_anew_and_other_files_stay(tmp_path):
     with pytest.raises(BadFile, match="holds something else"):
         open_journal(tmp_path / "work", {"a": 3})
     (tmp_path / "other").mkdir()
-    with pytest.raises(BadFile, match="holds something else"):
-        open_journal(tmp_path / "other", {"a": 3})
+    assert open_journal(tmp_path / "other", {"a": 3}).resumed == 0  # killed as it was made
+    assert (tmp_path / "other/inputs.json").is_file()
+    (tmp_path / "third/3").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "third")
+    (tmp_path / "file").touch()
+    for name in ("third", "link", "file"):
+        with pytest.raises(BadFile, match="holds something else"):
+            open_journal(tmp_path / name, {"a": 3})
 
 
 def test_masks_of_other_programs_are_given_as_they_are(photos, specs, tmp_path):
@@ -272,7 +278,7 @@ def test_photos_that_were_used_are_asked_only_without_others(photos):
 
 
 def test_the_demos_mug_is_doubted_where_it_holds_bench(photos):
-    """Cut by the ray tracer's truth, and with all that lies within 6 cm of it on the bench: its
+    """Cut by the ray tracer's truth, and with the bench within 12 cm of its middle: its
     agreement falls, and the reason is named; too little of it says nothing."""
     model, name = demo().model, "mug"
     label = LABELS[name]
@@ -297,3 +303,16 @@ def test_the_demos_mug_is_doubted_where_it_holds_bench(photos):
     alone = asked(right, views=[])
     assert np.isnan(alone.agreement) and alone.doubt == "no other photo shows it"
     assert judge(demo().device, model, [], photos, set()) == ()
+
+
+def test_a_box_alone_gets_a_click_where_the_thing_is_deepest():
+    """A red ring on blue: the middle of its box is blue; clicks of a person stay as they are."""
+    rows, columns = np.mgrid[:80, :100]
+    away = np.hypot(rows - 40, columns - 50)
+    ring = (away < 28) & (away > 14)
+    image = np.where(ring[..., None], (200, 30, 30), (30, 60, 180)).astype(np.uint8)
+    box = (22.0, 12.0, 79.0, 69.0)
+    (click,) = with_click(image, Prompt(box)).inside
+    assert 17 < np.hypot(click[1] - 40.5, click[0] - 50.5) < 25  # deepest is 21, half a width off
+    said = Prompt(box, np.array([[30.0, 40.0]]))
+    assert with_click(image, said) is said and with_click(image, Prompt(text="a ring")).box is None
