@@ -106,7 +106,8 @@ def walk_together(
     known = [with_box_of_clicks(image, p, boxed[:k] + boxed[k + 1 :], heights[k])
              for k, p in enumerate(boxed)]  # fmt: skip
     # The smallest box first: what lies within another is the more exactly said.
-    order = sorted((k for k, p in enumerate(known) if is_placed(p)), key=lambda k: rank(known[k]))
+    placed = [k for k, p in enumerate(known) if p.box is not None]
+    order = sorted(placed, key=lambda k: rank(known[k]))
     parts = [
         part_of(image, known[k], [known[j] for j in order if j != k], heights[k]) for k in order
     ]
@@ -125,10 +126,6 @@ def walk_together(
     for k, (at, part) in enumerate(zip(order, parts, strict=True)):
         found[at] = candidate_of(part, k, owner)
     return found
-
-
-def is_placed(prompt: Prompt) -> bool:
-    return prompt.box is not None or len(prompt.inside) > 0
 
 
 def rank(prompt: Prompt) -> tuple:
