@@ -91,9 +91,9 @@ COMMANDS = {
         "cluster.command",
         "let other machines take part: certificates, a scheduler, workers",
     ),
-    "extras": ("commands.extras", "optional parts of the program, listed or installed"),
     "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
+    "extras": ("commands.extras", "optional parts of the program, listed or installed"),
 }
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
 CLAIMING = ("demo", "film", "fit", "lod", "poses", "segment", "style", "table", "train", "update")

@@ -291,7 +291,7 @@ def refuse_empty(points: np.ndarray, name: str) -> None:
 
 def surface_of(seen: SeenVisit) -> np.ndarray:
     """(n, 3) metres of its own world: what the views see, evenly thinned."""
-    parts = [seen.points(i)[told == SURFACE] for i, told in enumerate(seen.told)]
+    parts = [seen.points(i)[told == SURFACE] for i, told in enumerate(seen.evidence)]
     points = np.concatenate(parts)
     rows = np.random.default_rng(0).permutation(len(points))[:POINTS]
     return points[np.sort(rows)]

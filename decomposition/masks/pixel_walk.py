@@ -65,7 +65,7 @@ class PixelWalk:
 
 
 @dataclass
-class Part:
+class WalkArea:
     """What is walked over for one prompt: its box and what lies around it, made small."""
 
     region: tuple[int, int, int, int]  # left, top, right, bottom: pixels of the photo
@@ -135,7 +135,7 @@ def rank(prompt: Prompt) -> tuple:
     return (box[2] - box[0]) * (box[3] - box[1]), box, clicks
 
 
-def candidate_of(part: Part, number: int, owner: np.ndarray) -> Candidate:
+def candidate_of(part: WalkArea, number: int, owner: np.ndarray) -> Candidate:
     left, top, right, bottom = part.region
     here = owner[top:bottom, left:right]
     mask = np.zeros(owner.shape, bool)
@@ -171,7 +171,7 @@ def tidied(
     return kept | ((sizes < HOLE * kept.sum()) & like & free)[holes]
 
 
-def owners(parts: list[Part], claims: list[np.ndarray], shape: tuple[int, int]) -> np.ndarray:
+def owners(parts: list[WalkArea], claims: list[np.ndarray], shape: tuple[int, int]) -> np.ndarray:
     """(H, W) int16: which part each pixel of the photo belongs to, -1 none.
 
     Where two claim a pixel, a walk between what each of them alone claims decides.
@@ -192,7 +192,7 @@ def owners(parts: list[Part], claims: list[np.ndarray], shape: tuple[int, int]) 
     return owner
 
 
-def settled(part: Part, other: Part, mine: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+def settled(part: WalkArea, other: WalkArea, mine: np.ndarray, theirs: np.ndarray) -> np.ndarray:
     """(H, W) bool: what stays the smaller part's of the pixels that it and another claim."""
     one, two = part.of_photo(mine), part.of_photo(theirs)
     seeds = np.full(one.shape, UNKNOWN, np.int8)
@@ -297,7 +297,7 @@ def moved(prompt: Prompt, corner: tuple[int, int], scale: np.ndarray) -> Prompt:
 
 def part_of(
     image: np.ndarray, prompt: Prompt, others: Sequence[Prompt], height: np.ndarray | None = None
-) -> Part:
+) -> WalkArea:
     """The part of a photo (H, W, C) uint8 that is walked over for a prompt, beside others."""
     left, top, right, bottom = region = region_of(prompt, image.shape)
     here = image[top:bottom, left:right]
@@ -324,7 +324,7 @@ def part_of(
     for other in beside:  # what lies in its box may be of this one's colours
         if other.box is not None and (outer & ~box_in(other.box, outer.shape)).any():
             outer &= ~box_in(other.box, outer.shape)
-    part = Part(
+    part = WalkArea(
         region, cells_of(small), edges, seeds, core, clicks, core, outer if outer.any() else ~core,
         clicks, clicks,
     )  # fmt: skip
@@ -365,7 +365,7 @@ def seeds_of(prompt: Prompt, shape: tuple[int, ...]) -> tuple[np.ndarray, np.nda
     return seeds, core
 
 
-def learn(part: Part, others: np.ndarray) -> None:
+def learn(part: WalkArea, others: np.ndarray) -> None:
     """One round of a part: colours inside and outside, and the walk that they pull.
 
     others (h, w) bool: what belongs to other objects.
@@ -389,7 +389,7 @@ def learn(part: Part, others: np.ndarray) -> None:
     )  # fmt: skip
 
 
-def color_odds(part: Part, inner: np.ndarray, outer: np.ndarray) -> np.ndarray:
+def color_odds(part: WalkArea, inner: np.ndarray, outer: np.ndarray) -> np.ndarray:
     """(h, w) log odds of a pixel's colours, inside over outside."""
     total = np.zeros(inner.shape)
     for index, channels in part.cells:

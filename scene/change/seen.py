@@ -45,12 +45,14 @@ class SeenVisit:
         return world_points(self.views[number], np.stack([columns, rows], axis=2), depth)
 
     @cached_property
-    def told(self) -> list[np.ndarray]:
+    def evidence(self) -> list[np.ndarray]:
         """(H, W) of each picture: UNKNOWN, SURFACE or NOTHING."""
-        return [told_by(side, self.points(i), self.views[i]) for i, side in enumerate(self.sides)]
+        return [
+            evidence_of(side, self.points(i), self.views[i]) for i, side in enumerate(self.sides)
+        ]
 
 
-def told_by(side: SeenSide, points: np.ndarray, view: View) -> np.ndarray:
+def evidence_of(side: SeenSide, points: np.ndarray, view: View) -> np.ndarray:
     """(H, W) int8: what pixels tell; edges and grazing surfaces tell nothing."""
     surface = ~edge_pixels(side.depth_m) & (facing_cosine(points, view) >= GRAZING)
     return np.where(side.coverage < OPEN, NOTHING, np.where(surface, SURFACE, UNKNOWN)).astype(
@@ -88,7 +90,7 @@ def surface_cells(seen: SeenVisit, cell_m: float) -> tuple[np.ndarray, np.ndarra
     views.
     """
     keys, sums = [np.zeros(0, np.int64)], [np.zeros((0, 4))]
-    for i, told in enumerate(seen.told):
+    for i, told in enumerate(seen.evidence):
         points = seen.a_from_own.apply(seen.points(i)[told == SURFACE])
         cube = np.floor(points / cell_m)
         near = (np.abs(cube) < FARTHEST).all(axis=1)
@@ -130,7 +132,7 @@ def _evidence(points: np.ndarray, seen: SeenVisit, least_m: float) -> tuple[np.n
     counts = np.zeros((3, len(points)), int)
     colors = np.full((2, len(seen.views), len(points), 3), np.nan, np.float32)
     values = np.full((len(seen.views), len(points)), np.nan)
-    for i, (view, side, told) in enumerate(zip(seen.views, seen.sides, seen.told, strict=True)):
+    for i, (view, side, told) in enumerate(zip(seen.views, seen.sides, seen.evidence, strict=True)):
         rows, at, depth = pixels_of(own, view)
         kind, shown = told[at], side.depth_m[at]
         with np.errstate(invalid="ignore"):

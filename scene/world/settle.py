@@ -37,7 +37,7 @@ class Overlap:
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """What gravity did to a body that nobody touched."""
 
     pose: Pose  # at the end
@@ -147,7 +147,7 @@ def extent(box: np.ndarray, way: np.ndarray) -> float:
     return float(np.linalg.norm(sides * way)) / length if length > 0 else float(sides.min())
 
 
-def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int, Motion]:
+def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int, BodyMotion]:
     """What gravity does to each body in so many seconds, if nobody touches it."""
     copy = copy_of(physics)
     bodies = {number: copy.engine_body(number) for number in copy.bodies()}
@@ -177,7 +177,7 @@ def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int
         end = copy.pose(number)
         way, turned = stirred(start, end, boxes[number])
         first_y = carried_at.get(number, float(end.position[1]))
-        found[number] = Motion(
+        found[number] = BodyMotion(
             end, float(np.linalg.norm(way)), turned, float(-way[1]),
             max(float(start.position[1]) - first_y, 0.0),
             float(np.ptp(boxes[number], axis=0).max()), left_s[number], on.get(number),
@@ -207,9 +207,9 @@ class Rest:
     """How one object begins, and what the test of REST_S seconds said of it."""
 
     name: str
-    motion: Motion  # in the test
+    motion: BodyMotion  # in the test
     pose: Pose  # from which it was tested
-    put: Motion | None  # how it was put down before; None: it stays where it was
+    put: BodyMotion | None  # how it was put down before; None: it stays where it was
     floats: bool  # nothing carried it
     kept: bool  # it floats, or does not rest alone: it stays where it is until it is touched
     on: str  # what carries it at the end; "": nothing
@@ -296,7 +296,7 @@ def settle(world: World) -> list[Rest]:
         if motion.is_put:
             world.move_object(world.names[number], motion.pose)
     starts = {number: physics.pose(number) for number in put}
-    found: dict[int, Motion] = {}  # of those that are kept: how they stirred alone
+    found: dict[int, BodyMotion] = {}  # of those that are kept: how they stirred alone
     tested, new = put, [number for number, motion in put.items() if motion.floats]
     for _ in range(MOST_ROUNDS):
         for number in new:

@@ -127,6 +127,7 @@ HEAVY = [
     ("vr", "--help"),  # without a runtime it only says so; tests/xr has one
     ("serve", "--help"),  # it ends by Ctrl-C alone; tests/web starts it
     ("cluster", "--help"),  # tests/app/cluster starts its schedulers and workers
+    ("extras",),  # tests/app/commands installs some
     ("poses", "--help"),  # tests/decomposition/poses finds some
     ("segment", "--help"),  # tests/app/decomposition cuts some
     (),
@@ -221,5 +222,5 @@ def test_every_python_that_is_started_leaves_the_current_folder_out():
             if isinstance(node, ast.Attribute) and ast.unparse(node) in ("os.system", "os.popen"):
                 pytest.fail(f"{path}:{node.lineno} starts a shell")
     # launch.py, first_start.py, CoACD, COLMAP, the gate for outside parsers, the work beside the
-    # window, a cluster's
-    assert checked == 7
+    # window, a cluster's, the look at optional parts
+    assert checked == 8
