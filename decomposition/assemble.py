@@ -117,6 +117,7 @@ class Assembled:
     ground: TriangleMesh  # of the background, in the model's frame
     completions: tuple[Completion, ...]
     failed: dict[int, str]  # label: why it has no proxy, a sentence
+    planes: dict[int, Plane]  # label: what it stands on
 
 
 def assemble(
@@ -172,7 +173,7 @@ def assemble(
     ground = ground_mesh(
         only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing
     )
-    return Assembled(whole, proxies, ground, tuple(told), failed)
+    return Assembled(whole, proxies, ground, tuple(told), failed, planes)
 
 
 def proxy_of(

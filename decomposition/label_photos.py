@@ -5,7 +5,7 @@ OWD section 3.2, object by object.  decomposition.walk_objects does it without a
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from shapeshift.decomposition.masks.anchor_walk import (
     seeds_of_evidence,
 )
 from shapeshift.decomposition.masks.journal import Journal
+from shapeshift.decomposition.masks.pixel_walk import PixelWalk
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt, Segmenter
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs
 from shapeshift.decomposition.masks.work_photos import (
@@ -131,6 +132,8 @@ class PhotoLabelling:
             mask = given_mask(self.specs, said, photo)
             if mask is None:
                 prompt = prompt_of(spec, said, photo)
+                if self.segmenter.wants_click:
+                    prompt = with_click(photo.pixels(), prompt)
                 mask = self.asked(spec, view, prompt, encoded)
             found[view] = mask
         if not found:
@@ -223,6 +226,21 @@ class PhotoLabelling:
         }
         width, height = self.photos[view].view.size
         return merge(here, (height, width), hidden)
+
+
+def with_click(image: np.ndarray, prompt: Prompt) -> Prompt:
+    """A box without clicks gets one where a walk over the photo's pixels (H, W, 3) finds the object
+    deepest: networks take a box alone for a thing that fills it less often than for one of its
+    parts, or for what stands beside it.
+    """
+    if prompt.box is None or len(prompt.inside):
+        return prompt
+    (found,) = PixelWalk().candidates(image, prompt)
+    within = np.zeros_like(found.mask)
+    left, top, right, bottom = (max(round(side), 0) for side in prompt.box)
+    within[top:bottom, left:right] = True
+    mask = found.mask & within
+    return replace(prompt, inside=clicks_in(mask)[:1]) if mask.any() else prompt
 
 
 def best_of(candidates: list[Candidate], prompt: Prompt) -> Candidate | None:

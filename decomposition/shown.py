@@ -66,12 +66,24 @@ class ShownAnchors:
         eye = view.world_from_eye.position.astype(np.float32)
         return self._drawn(view, x, self._evaluator.color(x, eye))
 
+    def places(self, view: View, x: Control, means: np.ndarray) -> np.ndarray:
+        """(H, W, 3) metres: where what a pixel shows is, blended as colours are; NaN where less
+        than half of it is covered.  means: (A, 3) metres of the anchors.
+        """
+        rgba = self._rgba(view, x, np.repeat(means, self.each, axis=0))
+        shown = rgba[..., 3:]
+        return np.where(shown > 0.5, rgba[..., :3] / np.maximum(shown, 0.5), np.nan)
+
     def _drawn(self, view: View, x: Control, values: np.ndarray) -> np.ndarray:
+        return self._rgba(view, x, values)[..., :3].copy()
+
+    def _rgba(self, view: View, x: Control, values: np.ndarray) -> np.ndarray:
+        """(H, W, 4) of values (splats, 3); the device's own memory, until the next call."""
         color = np.zeros((self.model.splat_count, 4), np.float32)
         color[:, :3] = values
         self._color.set(color)
         projected, tiles = self._tiles(view, x)
-        return rasterize_rgba(self.device, projected, tiles, view.size)[..., :3].copy()
+        return rasterize_rgba(self.device, projected, tiles, view.size)
 
     def _tiles(self, view: View, x: Control) -> tuple[Projected, Tiles]:
         if self._projected is None or x != self._x:

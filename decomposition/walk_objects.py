@@ -8,16 +8,22 @@ with them and without (docs/bench/masks.csv).
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from shapeshift.decomposition.label_photos import Progress, best_of
+from shapeshift.decomposition.completion.plane import fit_plane
+from shapeshift.decomposition.label_photos import Progress
 from shapeshift.decomposition.masks.anchor_walk import (
+    UNKNOWN,
     AnchorGraph,
+    Nodes,
     make_graph,
     nodes_of,
     seeds_of_evidence,
 )
 from shapeshift.decomposition.masks.label_maps import SILENT
-from shapeshift.decomposition.masks.pixel_walk import PixelWalk
+from shapeshift.decomposition.masks.pixel_grid import box_in
+from shapeshift.decomposition.masks.pixel_walk import region_of, walk_together
+from shapeshift.decomposition.masks.segmenter import Prompt
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs, PhotoPrompt
 from shapeshift.decomposition.masks.work_photos import (
     WorkPhoto,
@@ -29,6 +35,8 @@ from shapeshift.decomposition.partition import LabelledView
 from shapeshift.decomposition.segment_scene import Segmented, SegmentedPart
 from shapeshift.decomposition.shown import ShownAnchors
 from shapeshift.runtime_models.model import AnchorModel, BadFile, ObjectLabel, SplatLayers
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.pose import View
 
 Masks = dict[int, dict[int, np.ndarray]]  # (H, W) bool by label and photo
 
@@ -44,20 +52,17 @@ def walk_objects(
     Raises BadFile, also for an object that gets no anchor.
     """
     eyes = np.array([photo.view.world_from_eye.position for photo in photos])
-    total = len(specs.objects) + 1
-    progress("graph of anchors", 0, total)
+    progress("graph of anchors", 0, len(specs.objects))
     graph = make_graph(nodes_of(shown.model, eyes.mean(axis=0).astype(np.float32)), eyes)
-    masks: Masks = {}
+    masks = prompted_masks(shown, photos, specs, graph.nodes, progress)
     inside: dict[int, np.ndarray] = {}
     seen: dict[int, np.ndarray] = {}
-    for done, spec in enumerate(specs.objects, 1):
-        progress(spec.name, done, total)
-        masks[spec.label] = prompted_masks(shown, photos, specs, spec)
-        inside[spec.label], seen[spec.label] = np.zeros(shown.count), np.zeros(shown.count)
-        for view, mask in masks[spec.label].items():
+    for label, by_photo in masks.items():
+        inside[label], seen[label] = np.zeros(shown.count), np.zeros(shown.count)
+        for view, mask in by_photo.items():
             (within,), all_of_it = shown.masks(photos[view].view, photos[view].stop.x, [mask])
-            inside[spec.label] += within
-            seen[spec.label] += all_of_it
+            inside[label] += within
+            seen[label] += all_of_it
     labels = walk_labels(graph, inside, seen)
     for spec in specs.objects:
         if not (labels == spec.label).any():
@@ -76,7 +81,7 @@ def walk_labels(
     Each object walks against all the rest, since photos of one object say nothing of another; an
     anchor that several take goes to the one with the largest share.
     """
-    seeds = {k: seeds_of_evidence(inside[k], seen[k] - inside[k]) for k in inside}
+    seeds = {k: seeds_of_evidence(inside[k], seen[k] - inside[k]) for k in sorted(inside)}
     nodes = graph.nodes
     best, labels = np.full(len(nodes.rows), 0.5), np.zeros(nodes.count, np.int32)
     for label, own in seeds.items():
@@ -84,6 +89,8 @@ def walk_labels(
         for other, theirs in seeds.items():
             if other != label:
                 here[(theirs == 1) & (here < 0)] = 0
+                # Seen in masks of both, in other photos: what lies around it tells whose it is.
+                here[(theirs == 1) & (own == 1)] = UNKNOWN
         share = graph.shares(here)[:, 1]
         won = share > best
         labels[nodes.rows[won]], best[won] = label, share[won]
@@ -91,35 +98,114 @@ def walk_labels(
 
 
 def prompted_masks(
-    shown: ShownAnchors, photos: list[WorkPhoto], specs: ObjectSpecs, spec: ObjectSpec
+    shown: ShownAnchors,
+    photos: list[WorkPhoto],
+    specs: ObjectSpecs,
+    nodes: Nodes,
+    progress: Progress = lambda what, done, of: None,
+) -> Masks:
+    """The objects' masks in the photos that their prompts name.  Raises BadFile."""
+    masks: Masks = {}
+    said_in: dict[int, dict[int, tuple[ObjectSpec, PhotoPrompt]]] = {}  # by photo and label
+    for spec in specs.objects:
+        masks[spec.label] = {}
+        for said in spec.prompts:
+            view = find_photo(photos, said.photo, f"object '{spec.name}'")
+            said_in.setdefault(view, {})[spec.label] = spec, said
+        if not spec.prompts:
+            raise BadFile(
+                f"object '{spec.name}' has no prompt; say in one photo where it is, by 'box', "
+                "'inside' or 'mask'."
+            )
+    for done, (view, said_here) in enumerate(said_in.items()):
+        progress(photos[view].name, done, len(said_in))
+        for label, mask in masks_of_photo(shown, photos[view], specs, said_here, nodes).items():
+            masks[label][view] = mask
+    return masks
+
+
+def masks_of_photo(
+    shown: ShownAnchors,
+    photo: WorkPhoto,
+    specs: ObjectSpecs,
+    said_here: dict[int, tuple[ObjectSpec, PhotoPrompt]],
+    nodes: Nodes,
 ) -> dict[int, np.ndarray]:
-    """The object's masks (H, W) bool in the photos that its prompts name.  Raises BadFile."""
+    """(H, W) bool by label: of all objects that have a prompt in a photo, by its colours, by the
+    heat that the model shows there, and by what stands above what; no two have a pixel of it, but
+    where masks are given that overlap.
+    """
     found: dict[int, np.ndarray] = {}
-    for said in spec.prompts:
-        view = find_photo(photos, said.photo, f"object '{spec.name}'")
-        mask = given_mask(specs, said, photos[view])
-        found[view] = walked_mask(shown, photos[view], spec, said) if mask is None else mask
-    if not found:
-        raise BadFile(
-            f"object '{spec.name}' has no prompt; say in one photo where it is, by 'box', 'inside' "
-            "or 'mask'."
-        )
+    asked: dict[int, Prompt] = {}
+    for label, (spec, said) in said_here.items():
+        mask = given_mask(specs, said, photo)
+        if mask is None:
+            asked[label] = prompt_of(spec, said, photo)
+        else:
+            found[label] = mask
+    if not asked:
+        return found
+    given = np.any([*found.values(), np.zeros(photo.view.size[::-1], bool)], axis=0)
+    image = np.concatenate([photo.pixels(), *heat_of(shown, photo)], axis=2)
+    prompts = list(asked.values())
+    heights = heights_of(shown, photo.view, photo.stop.x, prompts, nodes)
+    for label, answer in zip(asked, walk_together(image, prompts, heights), strict=True):
+        mask = None if answer is None else answer.mask & ~given
+        if mask is None or not mask.any() or mask.all():
+            spec, _ = said_here[label]
+            raise BadFile(
+                f"object '{spec.name}': nothing is found at its prompt in {photo.name}; give a "
+                "tighter box, clicks inside, or a mask."
+            )
+        found[label] = mask
     return found
 
 
-def walked_mask(
-    shown: ShownAnchors, photo: WorkPhoto, spec: ObjectSpec, said: PhotoPrompt
-) -> np.ndarray:
-    """The mask of one photo, by its colours and by the heat that the model shows there."""
-    image = np.concatenate([photo.pixels(), *heat_of(shown, photo)], axis=2)
-    prompt = prompt_of(spec, said, photo)
-    best = best_of(PixelWalk().candidates(image, prompt), prompt)
-    if best is None:
-        raise BadFile(
-            f"object '{spec.name}': nothing is found at its prompt in {photo.name}; give a tighter "
-            "box, clicks inside, or a mask."
-        )
-    return best.mask
+LEAST_ON = 0.2  # of what lies around a prompt, that has to lie on one plane
+WITHIN = 0.7  # spacings of anchors: as near to the plane is on it while it is looked for
+MOST_PLACES = 2000  # by which a plane is looked for
+FINE, LOW, HIGH = 1.5, -2.0, 6.5  # medians of what lies beside the plane; of asinh of heights
+
+
+def heights_of(
+    shown: ShownAnchors, view: View, x: Control, prompts: list[Prompt], nodes: Nodes
+) -> list[np.ndarray | None]:
+    """(H, W) uint8 a prompt: how high what the photo shows stands above the plane of what lies
+    around the prompt, finely near it; None where nothing flat is around.
+    """
+    means = np.zeros((nodes.count, 3))
+    means[nodes.rows] = nodes.means
+    places = shown.places(view, x, means)
+    eye = view.world_from_eye.position
+    apart = spacing_of(nodes.means)
+    found: list[np.ndarray | None] = []
+    for prompt in prompts:
+        left, top, right, bottom = region_of(prompt, places.shape)
+        around = np.zeros(places.shape[:2], bool)
+        around[top:bottom, left:right] = True
+        if prompt.box is not None:
+            around &= ~box_in(prompt.box, around.shape)
+        points = places[around & np.isfinite(places[..., 0])]
+        points = points[:: len(points) // MOST_PLACES + 1]
+        fitted = fit_plane(points, WITHIN * apart)
+        if fitted is None or fitted[1].sum() < LEAST_ON * len(points):
+            found.append(None)
+            continue
+        plane, on = fitted
+        height = plane.height(places) * (1 if plane.height(eye[None])[0] > 0 else -1)
+        fine = max(FINE * float(np.median(np.abs(plane.height(points)[on]))), 1e-9)
+        share = (np.arcsinh(height / fine) - LOW) / (HIGH - LOW)
+        # What is not covered stands above all: whatever is behind it is no table.
+        found.append(np.rint(255 * np.clip(np.nan_to_num(share, nan=1.0), 0, 1)).astype(np.uint8))
+    return found
+
+
+def spacing_of(means: np.ndarray) -> float:
+    """Metres from an anchor to the next one, median of some; 0 of fewer than two."""
+    if len(means) < 2:
+        return 0.0
+    some = means[:: len(means) // MOST_PLACES + 1]
+    return float(np.median(cKDTree(means).query(some, 2)[0][:, 1]))
 
 
 def heat_of(shown: ShownAnchors, photo: WorkPhoto) -> list[np.ndarray]:

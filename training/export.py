@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from shapeshift.runtime_models.eyes import EYES, spread_eyes
+from shapeshift.runtime_models.eyes import spread_eyes
 from shapeshift.runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
@@ -31,8 +31,10 @@ GATE = ((1, 1, -1, 0.5), (-1, 1, -1, -0.5), (1, 1, 0, 0.5), (1, -1, 0, -0.5))
 def notes_of(capture: Capture) -> dict[str, Any]:
     """What a package says of its capture: its name, where its photos were taken, and where the
     package's zero lies in the capture's world, if elsewhere."""
-    taken = [p.view.world_from_eye.position for p in capture.photos if p.split == "train"]
-    notes: dict[str, Any] = {"capture": capture.folder.name, EYES: spread_eyes(np.array(taken))}
+    taken = [p.view for p in capture.photos if p.split == "train"]
+    places = np.array([view.world_from_eye.position for view in taken])
+    looks = np.array([(*view.world_from_eye.wxyz, *view.tangents) for view in taken])
+    notes: dict[str, Any] = {"capture": capture.folder.name, **spread_eyes(places, looks)}
     return notes | ({"origin_m": list(capture.origin)} if any(capture.origin) else {})
 
 

@@ -40,8 +40,9 @@ class Options(ReadingOptions):
     """The values that black and white of the value stops stand for.  Default: what the scenes
     say."""
     camera: Annotated[str, Opt(metavar="CAMERA")] = ""
-    """A file or folder of cameras in A's world to draw both from (docs/cameras.md), for rooms and
-    halls.  Default: 26 views from all around and above."""
+    """A file or folder of cameras in A's world (docs/cameras.md): only what is in their pictures
+    is compared, and scenes that do not say where they were photographed are drawn from there.
+    Default: each from where its photos were taken, else 26 views from all around and above."""
     size: Annotated[str, SIZE] = "320x240"
     """WIDTHxHEIGHT in pixels of what is drawn to be compared."""
     colour: Annotated[float, EXPERT] = 14.0
@@ -59,7 +60,7 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     from shapeshift.app.camera_files import named_cameras
-    from shapeshift.app.change.draw_pairs import visit_of
+    from shapeshift.app.change.draw_visits import visit_of
     from shapeshift.app.change.find_change import ChangeChoice, find_change, without_heat
     from shapeshift.app.change.outputs import (
         change_rows,

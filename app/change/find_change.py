@@ -7,23 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.app.change.draw_pairs import Progress, Visit, draw_side, rings_around
+from shapeshift.app.change.draw_visits import Progress, Visit, own_views, see
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.colors.palette import LUMINANCE
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.colmap.colmap_child import run_child
 from shapeshift.scene.change.places import (
     HEAT_WORDS,
+    LEAST_VIEWS,
     VALUE_WORDS,
     ChangedPlace,
     ChangeSettings,
     SurfaceCells,
     cells_of,
     find_places,
+    own_surface,
 )
-from shapeshift.scene.change.seen_pair import SeenPair, SeenSide, edge_pixels, samples_of
+from shapeshift.scene.change.seen import SURFACE, SeenVisit, evidence_at, surface_cells
 from shapeshift.scene.change.similarity import Registration, Similarity, fit_surfaces
-from shapeshift.scene.inspection.value_picture import world_points
 from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ class SceneChange:
     unit: str  # of values; "" without
     compared: tuple[str, ...]  # of "shape", "colour", "heat" or "values"
     overall: float  # the median of all values less those before: the air, the load; NaN: no values
+    judged: tuple[float, float]  # part of the surface of before and after that the other can judge
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +88,7 @@ class FoundChange:
     before: Visit
     after: Visit
     cells: tuple[SurfaceCells, SurfaceCells]  # of before and after
-    pairs: list[SeenPair]
+    seen: tuple[SeenVisit, SeenVisit]
 
 
 def find_change(
@@ -100,24 +102,30 @@ def find_change(
     """views: of A's own metres; None: from all around.  Raises BadFile, UsageError."""
     before, after = visits
     heat = check_values(before, after, names)
-    centre, radius = before.document.bounds()
     stop = before.measured.stop if heat and before.measured else None
-    settings = choice.settings(radius, stop)
-    chosen = views or rings_around(centre, radius, choice.size)
     common = common_world(before, after)
-    first = draw_side(renderer, before, chosen, Similarity.identity(), heat, "A", progress)
-    second = draw_side(renderer, after, chosen, common, heat, "B", progress)
-    registration = register(renderer, visits, names, chosen, (first, second), progress)
-    if registration.how != "common":
-        found_b = registration.a_from_b
-        second = draw_side(renderer, after, chosen, found_b, heat, "B", progress)
-    pairs = [SeenPair(*three) for three in zip(chosen, first, second, strict=True)]
+    seen_a = see(renderer, before, own_views(before, views, choice.size), Similarity.identity(),
+                 heat, "A", progress)  # fmt: skip
+    in_b = None if views is None else [common.view_in_b(view) for view in views]
+    of_b = own_views(after, in_b, choice.size)
+    seen_b = see(renderer, after, of_b, common, heat, "B", progress)
+    radius = radius_of(before, seen_a)
+    settings = choice.settings(radius, stop)
+    registration = register((seen_a, seen_b), names, settings, radius, progress)
+    found_b = registration.a_from_b
+    if registration.how != "common" and views is not None and not seen_b.photographed:
+        in_b = [found_b.view_in_b(view) for view in views]
+        seen_b = see(renderer, after, (in_b, False), found_b, heat, "B", progress)
+    seen = seen_a, replace(seen_b, a_from_own=found_b)
     progress("comparing", 0.0)
-    samples = [samples_of(pairs, later, settings.least_m) for later in (False, True)]
+    first, second = (own_surface(visit, settings) for visit in seen)
+    if views is not None:
+        first, second = first.within(views), second.within(views)
     cells = (
-        cells_of(samples[0], samples[1], settings.cell_m),
-        cells_of(samples[1], samples[0], settings.cell_m),
+        cells_of(first, second, seen[1], settings),
+        cells_of(second, first, seen[0], settings),
     )
+    judged = judged_part(cells, names, settings)
     unit = stop.unit if stop else ""
     said = VALUE_WORDS if stop and stop.kind == "values" else HEAT_WORDS
     both = (before.photo is not None and after.photo is not None) and "colour"
@@ -128,8 +136,24 @@ def find_change(
     change = cells[1].value_change
     known = change[np.isfinite(change)]
     overall = -float(np.median(known)) if len(known) else float("nan")
-    found = SceneChange(tuple(places), registration, settings, unit, compared, overall)
-    return FoundChange(found, before, after, cells, pairs)
+    found = SceneChange(tuple(places), registration, settings, unit, compared, overall, judged)
+    return FoundChange(found, before, after, cells, seen)
+
+
+def judged_part(
+    cells: tuple[SurfaceCells, SurfaceCells], names: tuple[str, str], settings: ChangeSettings
+) -> tuple[float, float]:
+    """Part of each surface that the other visit can judge.  Raises BadFile where that is nothing:
+    then nothing is known, which is not that nothing changed.
+    """
+    told = [np.isfinite(each.through) for each in cells]
+    if max(map(np.count_nonzero, told)) < settings.least_cells:
+        raise BadFile(
+            f"no place was photographed for both {names[0]} and {names[1]} from {LEAST_VIEWS} sides"
+            "; nothing can be compared: take more photos of the same places."
+        )
+    first, second = (float(part.mean()) if len(part) else 0.0 for part in told)
+    return first, second
 
 
 def check_values(before: Visit, after: Visit, names: tuple[str, str]) -> bool:
@@ -158,7 +182,7 @@ def without_heat(before: Visit, after: Visit, names: tuple[str, str]) -> str:
 
 SCRIPT = Path(__file__).with_name("match_run.py")
 FAILURE = "matching the two scenes ended with code {code}, perhaps for want of memory."
-FEWEST = 100  # pixels that a surface must have, over all views
+FEWEST = 100  # pixels that a surface must have, over all views; cells that tell of a world
 POINTS = 20_000  # of each surface, at most
 SHARED = 0.5  # of each surface that must lie on the other's
 OVERLAP = 0.6  # of the surfaces that lie together already: then nothing is looked for
@@ -166,6 +190,8 @@ RESIDUAL = 0.012  # of the radius, that is allowed between them
 BETTER = 0.7  # times the distance of before: only so much is worth moving a world for
 ERROR = 0.03  # of the radius, of a match
 INLIERS = 20  # matches that agree
+MOST_PICTURES = 13, 26  # of A and of B, that features are matched between
+REACH = 95  # percentile of what photos show from its middle: the radius of what is compared
 
 
 def common_world(before: Visit, after: Visit) -> Similarity:
@@ -174,33 +200,35 @@ def common_world(before: Visit, after: Visit) -> Similarity:
     return Similarity(np.eye(3), origins[1] - origins[0])
 
 
+def radius_of(visit: Visit, seen: SeenVisit) -> float:
+    """Metres: of the scene, or of what its photos show of it, if that is less."""
+    radius = visit.document.bounds()[1]
+    points = surface_of(seen) if seen.photographed else np.zeros((0, 3))
+    if len(points) < FEWEST:
+        return radius
+    away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    return min(radius, float(np.percentile(away, REACH)))
+
+
 def register(
-    renderer: "Renderer",
-    visits: tuple[Visit, Visit],
-    names: tuple[str, str],
-    views: list[View],
-    sides: tuple[list[SeenSide], list[SeenSide]],
-    progress: Progress,
-) -> Registration:
+    seen: tuple[SeenVisit, SeenVisit], names: tuple[str, str], settings: ChangeSettings,
+    radius: float, progress: Progress,
+) -> Registration:  # fmt: skip
     """A's world from B's.  Raises BadFile, one sentence, where the scenes do not fit together.
 
-    Worlds that lie together already stay as they are unless closest points move them farther than
-    they are apart; else features of drawn pictures are matched, and closest points make it exact.
-    views: of A's own metres; sides: what both show in them, taken to be in one world.
+    The worlds as they are given are tried first: they stay where what both have photographed lies
+    together, unless closest points move them farther than they are apart; else features of drawn
+    pictures are matched, and closest points make it exact.
     """
-    radius = visits[0].document.bounds()[1]
-    a = surface_of(views, sides[0])
+    a, b = surface_of(seen[0]), surface_of(seen[1])
     refuse_empty(a, names[0])
+    refuse_empty(b, names[1])
     progress("laying both worlds together", 0.0)
-    found = _in_common(a, views, sides[1], common_world(*visits), radius)
+    found = _in_common(a, b, seen, settings, radius)
     if found is not None:
         return found
-    around = rings_around(*visits[1].document.bounds(), views[0].size)
-    seen = draw_side(renderer, visits[1], around, Similarity.identity(), False, "B", progress)
-    b = surface_of(around, seen)
-    refuse_empty(b, names[1])
     progress("matching features", 0.0)
-    start = _by_features(views, sides[0], around, seen, radius, names)
+    start = _by_features(seen, radius, names)
     fitted, residual, shared = fit_surfaces(a, b, start, radius, scaled=True)
     if moved_by(fitted, start, b) > ERROR * radius:  # it slid: features know better
         fitted, residual, shared = fit_surfaces(a, b, start, radius, scaled=True, rounds=0)
@@ -214,21 +242,34 @@ def register(
 
 
 def _in_common(
-    a: np.ndarray, views: list[View], sides_b: list[SeenSide], common: Similarity, radius: float
-) -> Registration | None:
-    """Where both lie together already; None: they do not."""
-    b = surface_of([common.view_in_b(view) for view in views], sides_b)
-    if len(b) < FEWEST:
-        return None
+    a: np.ndarray, b: np.ndarray, seen: tuple[SeenVisit, SeenVisit], settings: ChangeSettings,
+    radius: float,
+) -> Registration | None:  # fmt: skip
+    """Where both lie together already; None: they do not.  a (n, 3), b (m, 3): their surfaces."""
+    common = seen[1].a_from_own
     plain = fit_surfaces(a, b, common, radius, scaled=False, rounds=0)
     fitted, residual, shared = fit_surfaces(a, b, common, radius, scaled=False)
-    if not (min(plain[2], shared) >= OVERLAP and residual <= RESIDUAL * radius):
-        return None
-    # along flat walls closest points slide freely: then nothing lies nearer than before
-    farther = moved_by(fitted, common, b) > max(plain[1], residual)
-    if farther and residual <= BETTER * plain[1]:
-        return Registration(fitted, "icp", residual, shared)
-    return Registration(common, "common", *plain[1:])
+    if min(plain[2], shared) >= OVERLAP and residual <= RESIDUAL * radius:
+        # along flat walls closest points slide freely: then nothing lies nearer than before
+        farther = moved_by(fitted, common, b) > max(plain[1], residual)
+        if farther and residual <= BETTER * plain[1]:
+            return Registration(fitted, "icp", residual, shared)
+        return Registration(common, "common", plain[1], plain[2])
+    agreed = min(agreement(*seen, settings), agreement(*seen[::-1], settings))
+    return Registration(common, "common", plain[1], agreed) if agreed >= OVERLAP else None
+
+
+def agreement(own: SeenVisit, other: SeenVisit, settings: ChangeSettings) -> float:
+    """Part of one visit's surface that the other has too, of what both photographed; 0: too little
+    of it to tell.
+    """
+    points, views = surface_cells(own, settings.cell_m)
+    points = points[views >= LEAST_VIEWS]
+    found = evidence_at(points, other, settings.least_m)
+    told = found.same + found.through + found.hidden >= LEAST_VIEWS
+    if np.count_nonzero(told) < FEWEST:
+        return 0.0
+    return float((found.same > found.through + found.hidden)[told].mean())
 
 
 def moved_by(found: Similarity, start: Similarity, points: np.ndarray) -> float:
@@ -242,39 +283,29 @@ def refuse_empty(points: np.ndarray, name: str) -> None:
         raise BadFile(f"{name} shows next to nothing from around it; nothing can be compared.")
 
 
-def surface_of(views: list[View], sides: list[SeenSide]) -> np.ndarray:
-    """(n, 3) metres: what the views see, evenly thinned."""
-    parts = []
-    for view, side in zip(views, sides, strict=True):
-        parts.append(_places(view, side)[~edge_pixels(side.depth_m)])
+def surface_of(seen: SeenVisit) -> np.ndarray:
+    """(n, 3) metres of its own world: what the views see, evenly thinned."""
+    parts = [seen.points(i)[told == SURFACE] for i, told in enumerate(seen.told)]
     points = np.concatenate(parts)
     rows = np.random.default_rng(0).permutation(len(points))[:POINTS]
     return points[np.sort(rows)]
 
 
-def _places(view: View, side: SeenSide) -> np.ndarray:
-    """(H, W, 3) metres, NaN where nothing is."""
-    height, width = side.depth_m.shape
-    rows, columns = np.mgrid[:height, :width] + 0.5
-    return world_points(view, np.stack([columns, rows], axis=2), side.depth_m)
-
-
 def _by_features(
-    views_a: list[View], sides_a: list[SeenSide], views_b: list[View], sides_b: list[SeenSide],
-    radius: float, names: tuple[str, str],
-) -> Similarity:  # fmt: skip
-    """Roughly A's world from B's; every second view of A is near enough to one of B.
-
-    Raises BadFile.
-    """
-    views_a, sides_a = views_a[::2], sides_a[::2]
+    seen: tuple[SeenVisit, SeenVisit], radius: float, names: tuple[str, str]
+) -> Similarity:
+    """Roughly A's world from B's, by pictures of both.  Raises BadFile."""
     arrays: dict[str, np.ndarray] = {"error_m": np.array(ERROR * radius)}
-    arrays["counts"] = np.array([len(views_a), len(views_b)])
-    for side, views, seen in (("a", views_a, sides_a), ("b", views_b, sides_b)):
-        for i, (view, each) in enumerate(zip(views, seen, strict=True)):
+    counts = []
+    for side, visit, most in zip("ab", seen, MOST_PICTURES, strict=True):
+        rows = range(0, len(visit.views), -(-len(visit.views) // most))
+        counts.append(len(rows))
+        for i, row in enumerate(rows):
+            each = visit.sides[row]
             gray = (each.color * each.coverage[..., None]) @ LUMINANCE
             arrays[f"{side}{i}"] = (np.clip(gray, 0, 1) * 255 + 0.5).astype(np.uint8)
-            arrays[f"p{side}{i}"] = _places(view, each).astype(np.float32)
+            arrays[f"p{side}{i}"] = visit.points(row).astype(np.float32)
+    arrays["counts"] = np.array(counts)
     with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
         given, wanted = Path(folder, "pictures.npz"), Path(folder, "found.npz")
         np.savez(given, **arrays)  # type: ignore[arg-type]  # its stubs take switches alone

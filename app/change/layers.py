@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.app.change.draw_pairs import Visit
+from shapeshift.app.change.draw_visits import Visit
 from shapeshift.app.change.find_change import FoundChange
 from shapeshift.runtime_models.bake import bake
 from shapeshift.runtime_models.colors.spherical_harmonics import basis

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.app.change.draw_pairs import Progress, draw_pair
+from shapeshift.app.change.draw_visits import Progress, see
 from shapeshift.app.change.find_change import FoundChange, SceneChange
 from shapeshift.app.change.layers import write_layers
 from shapeshift.app.commands.compared import written
@@ -19,7 +19,7 @@ from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.cameras.framing import view_from
 from shapeshift.scene.change.places import HEAT_WORDS, VALUE_WORDS, ChangedPlace
-from shapeshift.scene.change.seen_pair import SeenPair, SeenSide
+from shapeshift.scene.change.seen import SeenVisit
 from shapeshift.scene.inspection.marks import box_around
 from shapeshift.scene.inspection.marks_file import MarksFile, marks_path, write_marks_file
 from shapeshift.scene.inspection.value_picture import ValuePicture
@@ -68,6 +68,7 @@ def change_rows(change: SceneChange, names: tuple[str, str], origin: np.ndarray)
             "a_from_b": a_from_b.round(6).tolist(),
         },
         "settings": {k: finite(v, 5) for k, v in vars(change.settings).items()},
+        "judged": [round(part, 3) for part in change.judged],
         "overall": finite(change.overall, 2),
         "unit": change.unit,
         "places": [place_row(place, origin) for place in change.places],
@@ -85,6 +86,7 @@ def csv_text(change: SceneChange, origin: np.ndarray) -> str:
 def registration_words(change: SceneChange) -> str:
     """One sentence."""
     found = change.registration
+    first, second = (100 * part for part in change.judged)
     how = {
         "common": "Both lie in one world",
         "icp": f"B was moved by {100 * np.linalg.norm(found.a_from_b.shift):.1f} cm and turned by "
@@ -94,7 +96,8 @@ def registration_words(change: SceneChange) -> str:
     }[found.how]
     return (
         f"{how}; surfaces lie {100 * found.residual_m:.2f} cm apart (median), "
-        f"{100 * found.shared:.0f} % of them together."
+        f"{100 * found.shared:.0f} % of them together. Photos of both show {first:.0f} % of A's "
+        f"surface and {second:.0f} % of B's; the rest is not judged."
     )
 
 
@@ -208,10 +211,9 @@ def words(place: ChangedPlace) -> str:
 def pictures_of(renderer: "Renderer", found: FoundChange, place: ChangedPlace) -> np.ndarray:
     """(H, 3 W, 3) before, after and the place marked, from the side that shows most of it."""
     view = best_view(found, place)
-    from_b = found.change.registration.a_from_b
-    pair = draw_pair(renderer, found.before, found.after, view, from_b)
+    both = draw_both(renderer, found, view)
     heat = place.kind in (*HEAT_WORDS, *VALUE_WORDS)
-    sides = (pair.before, pair.after)
+    sides = [visit.sides[0] for visit in both]
     pictures = [np.where(s.coverage[..., None] >= 0.5, s.color, NOTHING) for s in sides]
     scale = None
     if heat and found.before.measured is not None:
@@ -221,11 +223,22 @@ def pictures_of(renderer: "Renderer", found: FoundChange, place: ChangedPlace) -
         stop = found.before.measured.stop
         scale = ColorScale(float(low), float(max(high, low + least)), stop.palette)
         pictures = [heat_colors(value, scale) for value in values]
-    last = marked(pair, place, found.change.settings.cell_m)
+    last = marked(both, place, found.change.settings.cell_m)
     pictures = [written(pictures[0], "before"), written(pictures[1], "after")]
     if scale is not None:
         pictures[1] = with_scale_bar(pictures[1], scale, place.unit)
     return np.concatenate([*pictures, written(last, words(place))], axis=1)
+
+
+def draw_both(renderer: "Renderer", found: FoundChange, view: View) -> tuple[SeenVisit, SeenVisit]:
+    """Both visits in one view of A's world."""
+    silent: Progress = lambda what, part: None  # noqa: E731
+    before, after = (
+        see(renderer, visit, ([a.view_in_b(view)], False), a, True, "", silent)
+        for visit, a in zip((found.before, found.after), (s.a_from_own for s in found.seen),
+                            strict=True)
+    )  # fmt: skip
+    return before, after
 
 
 def heat_colors(value: np.ndarray, scale: ColorScale) -> np.ndarray:
@@ -237,44 +250,52 @@ def heat_colors(value: np.ndarray, scale: ColorScale) -> np.ndarray:
 
 def best_view(found: FoundChange, place: ChangedPlace) -> View:
     """A close look at a place from the direction that shows most of it."""
-    later = place.kind != "vanished"
-    seen = [
-        int(sees(pair, later, place.points).sum() + sees(pair, False, place.before).sum())
-        for pair in found.pairs
+    shows = [
+        (int(part.sum()), number, i)
+        for number, points in enumerate(shown_by(place))
+        for i, part in enumerate(sees(found.seen[number], points))
     ]
-    best = found.pairs[int(np.argmax(seen))].view
+    _, number, best = max(shows, key=lambda one: one[0])
+    visit = found.seen[number]
+    seen_from = visit.a_from_own.inverse.view_in_b(visit.views[best])
     every = np.concatenate([place.points, place.before])
     low, high = every.min(axis=0), every.max(axis=0)
     radius = found.before.document.bounds()[1]
     field = max(FIELD * float(np.linalg.norm(high - low)) / 2, LEAST_FIELD * radius / 2)
-    way = best.world_from_eye.position - (low + high) / 2
+    way = seen_from.world_from_eye.position - (low + high) / 2
     distance = min(field / np.tan(FOV_Y / 2), float(np.linalg.norm(way)))
     eye = (low + high) / 2 + way / np.linalg.norm(way) * distance
     return view_from(eye, (low + high) / 2, radius, SIZE, FOV_Y)
 
 
-def sees(pair: SeenPair, later: bool, points: np.ndarray) -> np.ndarray:
-    """(N,) bool: which points (N, 3) a visit shows in a view."""
-    side = pair.after if later else pair.before
-    return ValuePicture(pair.view, side.depth_m, side.depth_m, "m").sees(points)
+def shown_by(place: ChangedPlace) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) and (m, 3): what of a place the earlier visit shows, and the later one."""
+    if place.kind == "vanished":
+        return place.points, np.zeros((0, 3))
+    return place.before, place.points
 
 
-def marked(pair: SeenPair, place: ChangedPlace, cell_m: float) -> np.ndarray:
+def sees(visit: SeenVisit, points: np.ndarray) -> list[np.ndarray]:
+    """(n,) bool of each view: which points (n, 3), A's metres, it shows."""
+    own = visit.a_from_own.inverse.apply(points)
+    pairs = zip(visit.views, visit.sides, strict=True)
+    return [ValuePicture(view, s.depth_m, s.depth_m, "m").sees(own) for view, s in pairs]
+
+
+def marked(both: tuple[SeenVisit, SeenVisit], place: ChangedPlace, cell_m: float) -> np.ndarray:
     """(H, W, 3) the later visit in grey with the place in its kind's colour; where something
-    was, that stands in it too.
+    was, that stands in it too.  both: visits that have one view.
     """
     from scipy.spatial import cKDTree
 
-    later = pair.after.color @ LUMINANCE
-    out = np.where(pair.after.coverage >= 0.5, 0.75 * later, NOTHING)[..., None].repeat(3, axis=2)
+    after = both[1].sides[0]
+    later = after.color @ LUMINANCE
+    out = np.where(after.coverage >= 0.5, 0.75 * later, NOTHING)[..., None].repeat(3, axis=2)
     color = np.array(COLORS[place.kind])
-    groups = [(pair.before, place.points if place.kind == "vanished" else place.before, 0.5)]
-    if place.kind != "vanished":
-        groups.append((pair.after, place.points, 1.0))
-    for side, points, strength in groups:
+    for visit, points, strength in zip(both, shown_by(place), (0.5, 1.0), strict=True):
         if not len(points):
             continue
-        flat = surface_points(pair.view, side)
+        side, flat = visit.sides[0], visit.a_from_own.apply(visit.points(0))
         known = np.isfinite(flat).all(axis=2)
         inside = np.zeros(known.shape, bool)
         inside[known] = cKDTree(points).query(flat[known])[0] <= 1.2 * cell_m
@@ -282,8 +303,3 @@ def marked(pair: SeenPair, place: ChangedPlace, cell_m: float) -> np.ndarray:
         mixed = SHARE * color * strength + (1 - SHARE) * below
         out = np.where(inside[..., None], mixed, out)
     return out
-
-
-def surface_points(view: View, side: SeenSide) -> np.ndarray:
-    """(H, W, 3) metres, NaN where nothing is."""
-    return ValuePicture(view, side.depth_m, side.depth_m, "m").points

@@ -16,6 +16,7 @@ from shapeshift.app.terminal import open_console, print_json, say
 from shapeshift.runtime_models.program import program
 
 if TYPE_CHECKING:
+    from shapeshift.decomposition.completion.plane import Plane
     from shapeshift.decomposition.label_photos import Counts, Progress
     from shapeshift.decomposition.masks.specs import ObjectSpecs
     from shapeshift.decomposition.partition import LabelledView
@@ -120,6 +121,7 @@ def cut(
     from shapeshift.app.decomposition.segment_steps import CompletionSettings, at_rest, completed
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
+    from shapeshift.decomposition.upright_scene import planes_under, upright_scene
     from shapeshift.scene.document.write_scene_file import write_scene_file
 
     counts: dict[int, Counts] = {}
@@ -140,13 +142,16 @@ def cut(
         raise UsageError("no object got any part of the scene; look at the label maps.")
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
+    planes: dict[int, Plane] = {}
+    how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
     if options.complete:
-        how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
-        file, found = completed(device, file, found, capture, how)
-        write_model(found.model, path)
+        file, found, planes = completed(device, file, found, capture, how)
+    file, told = upright_scene(file, found, capture.ups, planes or planes_under(found))
+    for sentence in told:
+        notice(sentence)
+    write_model(found.model, path)
+    if options.complete:
         file, found = at_rest(file, found, how)
-    else:
-        write_model(found.model, path)
     write_scene_file(file, options.out)
     return found, counts
 

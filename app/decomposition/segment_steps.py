@@ -24,6 +24,7 @@ from shapeshift.scene.scene import Scene, SceneObject
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.assemble import Assembled
+    from shapeshift.decomposition.completion.plane import Plane
     from shapeshift.decomposition.label_photos import Counts, Progress
     from shapeshift.decomposition.masks.specs import ObjectSpecs
     from shapeshift.decomposition.shown import ShownAnchors
@@ -51,8 +52,9 @@ def completed(
     found: "Segmented",
     capture: "Capture",
     settings: CompletionSettings,
-) -> "tuple[SceneFile, Segmented]":
-    """With a completed background and colliders in files; of plain splats the same.
+) -> "tuple[SceneFile, Segmented, dict[int, Plane]]":
+    """With a completed background and colliders in files, and what each label stands on; of plain
+    splats the same file, and no planes.
 
     Raises BadFile.
     """
@@ -67,7 +69,7 @@ def completed(
         settings.notice(
             "Nothing is completed: plain splats have no features that copies could keep."
         )
-        return file, found
+        return file, found, {}
     wanted = {p.spec.label: None for p in found.parts if p.rows and p.spec.collider == HULLS}
     factor = settings.downscale or trained_downscale(found.model.provenance)
     views = photo_views(device, found, capture, factor)
@@ -79,7 +81,8 @@ def completed(
     names = {part.spec.label: part.spec.name for part in found.parts}
     for sentence in sentences_of(made, names):
         settings.notice(sentence)
-    return write_colliders(file, found, made, settings.out), replace(found, model=made.model)
+    file = write_colliders(file, found, made, settings.out)
+    return file, replace(found, model=made.model), made.planes
 
 
 def colliders_folder(out: Path) -> Path:

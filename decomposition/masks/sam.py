@@ -147,6 +147,7 @@ class PointSam:
         self.entry = next(iter(encoder.inputs))
         self.transformers = "input_points" in decoder.inputs
         self.takes_boxes = not self.transformers or "input_boxes" in decoder.inputs
+        self.wants_click = self.takes_boxes
         several = [
             n for n in decoder.inputs if n.startswith(("high_res_feats", "image_embeddings."))
         ]

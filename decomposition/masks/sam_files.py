@@ -101,7 +101,7 @@ MOST_MASKS = 16
 class ConceptSam:
     """A segmenter that reads."""
 
-    reads_text, takes_boxes = True, True
+    reads_text, takes_boxes, wants_click = True, True, False  # a click is a small box to it
 
     def __init__(self, encoder: Network, decoder: Network, text: Network, words: ClipWords) -> None:
         self.encoder, self.decoder, self.text, self.words = encoder, decoder, text, words

@@ -18,6 +18,7 @@ from shapeshift.runtime_models.files.memory import PART, machine_memory
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.upright import up_of_photos
 from shapeshift.scene.capture_files import photo_key
 from shapeshift.scene.captures.colmap.colmap_child import Progress, run_child
 from shapeshift.scene.captures.photo import open_image
@@ -215,9 +216,11 @@ def frame_of(
     """(3, 4) to the capture's world, and where its up and its metres come from."""
     orientation = {photo.name: photo.orientation for photo in photos.photos}
     poses = best["world_from_camera"]
-    up = find_up(poses, [orientation[str(name)] for name in best["names"]])
-    said = "as most photos were held" if up is not None else "not known: the photos do not agree"
-    up = COLMAP_UP if up is None else up
+    found = up_of_photos(poses, [orientation[str(name)] for name in best["names"]])
+    said = "not known: the photos do not agree"
+    if found is not None:
+        said = "as most photos were held" + ("" if found.sure else ", which all look one way")
+    up = COLMAP_UP if found is None else np.array(found.direction)
     centre = np.median(best["xyz"], axis=0)
     if length is None:
         scale = 1 / float(np.nanmedian(best["depth"]))
@@ -253,40 +256,9 @@ def model_length(best: dict[str, np.ndarray], photos: PhotoList, length: Length)
 # Structure from motion knows neither: its world is right but for a similarity. People hold
 # cameras level, so the rows of their photos lie in planes through the horizon.
 
-CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they say nothing
-CLEAR_PLANE = 0.5  # of the second singular value that the third may have: rows lie in a plane
-LEAST_TURN = 0.1  # of the first singular value in the second: photos look in different directions
-MOST_TILT = np.cos(np.radians(45))  # between the normal of that plane and the mean up vector
 NEAREST = 8  # points around a pixel that say how far what it shows is
 NEAR_PX = 0.05  # of the photo's longest side: no point nearer than that, and nobody knows
-# Up in a photo's own axes (x right, y down) by the EXIF orientation of its file
-UP_BY_ORIENTATION = {1: (0, -1), 2: (0, -1), 3: (0, 1), 4: (0, 1),
-                     5: (-1, 0), 6: (-1, 0), 7: (1, 0), 8: (1, 0)}  # fmt: skip
 COLMAP_UP = np.array([0.0, -1.0, 0.0])
-
-
-def find_up(world_from_camera: np.ndarray, orientations: list[int]) -> np.ndarray | None:
-    """(3,) unit vector of the world, or None where the photos do not agree.
-
-    world_from_camera: (N, 4, 4) OpenCV axes.  The normal of the plane that the photos' horizontal
-    axes lie in, where they lie in one and look in different directions; else the mean of their up
-    vectors, which a person who looks down from above on one side makes lean.
-    """
-    turns = np.asarray(world_from_camera)[:, :3, :3]
-    ups = np.array([UP_BY_ORIENTATION.get(o, (0, -1)) for o in orientations], float)  # (N, 2)
-    up_w = np.einsum("nij,nj->ni", turns[:, :, :2], ups)
-    across_w = np.einsum("nij,nj->ni", turns[:, :, :2], np.stack([-ups[:, 1], ups[:, 0]], axis=1))
-    mean = up_w.mean(axis=0)
-    if not np.linalg.norm(mean) > CLEAR_UP:
-        return None
-    mean /= np.linalg.norm(mean)
-    if len(turns) > 2:
-        _, size, axes = np.linalg.svd(across_w, full_matrices=False)
-        normal = axes[2] * np.sign(axes[2] @ mean)
-        turned = size[1] >= LEAST_TURN * size[0]
-        if turned and size[2] <= CLEAR_PLANE * size[1] and normal @ mean >= MOST_TILT:
-            return normal
-    return mean
 
 
 def similarity(up: np.ndarray, scale: float, centre: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.colors.light_harmonics import channels_of, most_light
-from shapeshift.runtime_models.eyes import EYES, eyes_of, spread_eyes
+from shapeshift.runtime_models.eyes import LOOKS, eyes_of, looks_of, spread_eyes
 from shapeshift.runtime_models.model import HEADS, AnchorFrames, AnchorModel, BadFile, Finding, Mlp
 
 FORMAT = "shapeshift-blocks 1"
@@ -99,12 +99,14 @@ def joined(models: Sequence[AnchorModel], names: Sequence[str]) -> BlockModel:
     lights = [model.light for model in models if model.light is not None]
     findings: tuple[Finding, ...] = sum((model.findings for model in models), ())
     places = np.concatenate([eyes_of(model) for model in models])
-    eyes = {EYES: spread_eyes(places)} if len(places) else {}
+    looks = np.concatenate([looks_of(model) for model in models])
+    eyes = spread_eyes(places, looks) if len(places) else {}
+    first_notes = {k: v for k, v in first.provenance.items() if k != LOOKS}
     return BlockModel(
         stacked([model.anchors for model in models]),
         stacked([model.features for model in models]),
         first.networks, first.splats_per_anchor, first.encoding, first.stops,
-        first.provenance | eyes | {"blocks": len(models), "files": list(names)}, findings,
+        first_notes | eyes | {"blocks": len(models), "files": list(names)}, findings,
         first.pace,
         first.between_stops, frames, light=stacked(lights) if lights else None,
         block=np.repeat(np.arange(len(models), dtype=np.int32), counts),

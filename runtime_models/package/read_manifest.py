@@ -1,9 +1,10 @@
 """scene.json of a package: every entry is checked here, what is wrong becomes one sentence."""
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from shapeshift.runtime_models.eyes import EYES, MOST_EYES
+from shapeshift.runtime_models.eyes import EYES, LOOK, LOOKS, MOST_EYES
 from shapeshift.runtime_models.files.json_fields import Fields, is_number, parse_json, shown
 from shapeshift.runtime_models.model import (
     BETWEEN_STOPS,
@@ -29,6 +30,8 @@ LARGEST_COUNT = 4096  # splats an anchor, features, Gaussians of the encoding
 LONGEST_PACE = 257  # weights of one pair of stops
 MOST_ROWS = 1 << 16  # stops, or pairs of stops with a pace
 LARGEST_NUMBER = 1e30  # beyond it float32 products overflow
+LARGEST_TANGENT = 1e4  # of a photo's edge: 179.99 degrees
+UNIT_SLACK = 0.01  # that a quaternion of four decimals may be off one
 PARTS = ("feature", "direction", LIGHT, "control")
 ADVICE = "docs/package.md lists what must be there"
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")
@@ -208,6 +211,19 @@ def check_eyes(provenance: Fields) -> None:
     if not isinstance(eyes, list) or len(eyes) > MOST_EYES or not all(map(is_place, eyes)):
         wanted = f"a list of at most {MOST_EYES} places of three finite numbers up to"
         raise provenance.error(EYES, f"{wanted} {LARGEST_NUMBER:g}")
+    looks = provenance.value(LOOKS, [])
+    if not isinstance(looks, list) or len(looks) > MOST_EYES or not all(map(is_look, looks)):
+        wanted = "a list with, beside each eye, a unit quaternion w x y z and the tangents left <"
+        raise provenance.error(LOOKS, f"{wanted} right, down < up")
+
+
+def is_look(value: object) -> bool:
+    if not (isinstance(value, list) and len(value) == LOOK and all(map(is_number, value))):
+        return False
+    if not all(abs(number) <= LARGEST_TANGENT for number in value):
+        return False
+    w, x, y, z, left, right, down, up = value
+    return abs(math.hypot(w, x, y, z) - 1) < UNIT_SLACK and left < right and down < up
 
 
 def is_place(value: object) -> bool:

@@ -66,8 +66,8 @@ def cameras_of(
     if reading.up:
         turn = ours_from_world(reading)
     else:
-        up = data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None)
-        world = CaptureWorld.of(np.array(cameras), (0, 0, 1), up, where)
+        usual = COLMAP_UP if opencv_axes(entries[0]) else None
+        world = CaptureWorld.of(np.array(cameras), (0, 0, 1), data.get("up"), where, usual)
         turn = flipped(reading) @ world.ours_from_file
     views, names = [], []
     for entry, camera, at in zip(entries, cameras, frames, strict=True):

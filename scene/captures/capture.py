@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.cameras.upright import Up
 from shapeshift.scene.captures.colmap_tables import PANORAMA, ColmapCamera
 from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING, NoValue
 from shapeshift.scene.pose import View
@@ -76,6 +77,7 @@ class Capture:
     doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
     formulas: tuple[Stop, ...] = ()  # stops of values by formula of its stops', without photos
     files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
+    ups: tuple[Up, ...] = ()  # what was taken to point up, first, and what the photos say of it
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]

@@ -1,6 +1,5 @@
 """What every reader of captures holds to: rigid poses, up, stops, splits, sizes, background."""
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +14,15 @@ from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.runtime_models.stops.stop_formula import check_formulas, read_formula
 from shapeshift.scene.cameras.photo_view import subject_distance
+from shapeshift.scene.cameras.upright import (
+    ASSUMED,
+    STATED,
+    Up,
+    doubts_of_up,
+    turn_of_world,
+    up_of_cameras,
+    up_of_photos,
+)
 from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
 from shapeshift.scene.captures.dated_stops import (
     NO_PLACE,
@@ -38,7 +46,6 @@ TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, fr
 # Worlds of COLMAP's axes are turned as 3DGS PLY files are, whatever their photos say: splats
 # trained elsewhere from the same model then lie where the capture is.
 COLMAP_UP = (0.0, -1.0, 0.0)
-CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they do not agree
 PLAIN_BORDER = 0.5  # share of a photo's border that must have exactly one colour
 
 
@@ -51,17 +58,32 @@ class CaptureWorld:
     # Metres, our axes: the capture's zero, where the file's own is so far that float32 would lose
     # what lies there (survey coordinates); zeros nearly always.
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ups: tuple[Up, ...] = ()  # in our axes: what was taken, and what the photos say
 
     @staticmethod
     def of(
-        world_from_cameras: np.ndarray, otherwise: tuple, up: object, where: str
+        world_from_cameras: np.ndarray,
+        otherwise: tuple,
+        up: object,
+        where: str,
+        usual: object = None,
     ) -> "CaptureWorld":
-        """`up` if the file gives one, else as the photos (N, 4, 4; OpenCV axes) tell."""
+        """`up` if the file gives one, else `usual`, else as the photos (N, 4, 4; OpenCV axes) tell:
+        the world axis nearest to their mean, or `otherwise` where they disagree.
+        """
+        taken = Up(ASSUMED if up is None else STATED, (0.0, 1.0, 0.0))
+        up = usual if up is None else up
         up = up_of_cameras(world_from_cameras, otherwise) if up is None else up
         turn = turn_of_world(up, is_left_handed(world_from_cameras, where), where)
-        origin = near_origin(world_from_cameras[:, :3, 3] @ turn[:3, :3].T)
+        ours = turn[:3, :3] @ world_from_cameras[:, :3]
+        photos = up_of_photos(ours)
         # + 0.0: never -0.0
-        return CaptureWorld(turn, three(np.asarray(up, np.float64) + 0.0), origin)
+        return CaptureWorld(
+            turn,
+            three(np.asarray(up, np.float64) + 0.0),
+            near_origin(ours[:, :, 3]),
+            (taken,) if photos is None else (taken, photos),
+        )
 
     @property
     def left_handed(self) -> bool:
@@ -99,6 +121,7 @@ class CaptureWorld:
                 "Its poses mirror the world, as those of left-handed axes do; its x axis is turned "
                 "round, so that left and right are as in the photos.",
             )
+        more += doubts_of_up(self.ups, self.ours_from_file)
         if background is None:
             background = plain_background(photos)
             notes["background"] = "found in the photos" if background else "none stated, none found"
@@ -122,6 +145,7 @@ class CaptureWorld:
             notes,
             doubts + more,
             formulas,
+            ups=self.ups,
         )
 
 
@@ -185,18 +209,6 @@ def rigid(matrix: object, where: str, may_mirror: bool = False) -> np.ndarray:
     return out
 
 
-def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarray:
-    """(3,) the world axis nearest to the photos' mean upward direction (OpenCV axes).
-
-    For worlds as COLMAP leaves them this is -Y.  `otherwise` is taken where the photos disagree.
-    """
-    mean = -np.asarray(world_from_cameras)[:, :3, 1].mean(axis=0)
-    if not np.linalg.norm(mean) > CLEAR_UP:
-        return np.asarray(otherwise, np.float64)
-    axis = int(np.argmax(np.abs(mean)))
-    return np.sign(mean[axis]) * np.eye(3)[axis]
-
-
 def is_left_handed(world_from_cameras: np.ndarray, where: str) -> bool:
     """Whether all poses (N, 4, 4) mirror.  Raises BadFile where some do and others do not."""
     mirrored = np.linalg.det(np.asarray(world_from_cameras)[:, :3, :3]) < 0
@@ -206,34 +218,6 @@ def is_left_handed(world_from_cameras: np.ndarray, where: str) -> bool:
             "do not; flip one axis of their matrices, or drop them"
         )
     return bool(mirrored.any())
-
-
-def turn_of_world(up: object, left_handed: bool, where: str) -> np.ndarray:
-    """(4, 4) from a file's world to ours, in which `up` (of the file's) is +Y."""
-    if not left_handed:
-        return upright_rotation(up, where)
-    upright_rotation(up, where)  # checks it
-    x, y, z = np.asarray(up, np.float64)
-    return upright_rotation((-x, y, z), where) @ np.diag([-1.0, 1.0, 1.0, 1.0])
-
-
-def upright_rotation(up: object, where: str) -> np.ndarray:
-    """(4, 4) the shortest turn that brings `up` to +Y; half a turn about x for -Y."""
-    try:
-        up = np.asarray(up, np.float64)
-        length = math.hypot(*up.ravel())
-    except (TypeError, ValueError, OverflowError):
-        up, length = np.zeros(0), 0.0
-    if up.shape != (3,) or not 0 < length < np.inf:
-        raise BadFile(f"{where}: 'up' must be three numbers that are not all zero")
-    x, y, z = up / length
-    out = np.eye(4)
-    if y < -1 + 1e-9:
-        out[:3, :3] = np.diag([1.0, -1.0, -1.0])
-    else:
-        cross = np.array([[0, -x, 0], [x, 0, z], [0, -z, 0]])  # [up x Y]_x
-        out[:3, :3] = np.eye(3) + cross + cross @ cross / (1 + y)
-    return out
 
 
 def spread_stops(names: Iterable[str], kinds: Sequence[str] = ()) -> tuple[Stop, ...]:

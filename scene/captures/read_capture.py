@@ -186,7 +186,7 @@ def read_colmap(folder: Path) -> Capture:
     paths = [find_file(root, name, ("",)).path for name in names]
     stops, modality_of = modalities(said, posed, paths, folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
-    world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
+    world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up"), str(folder), COLMAP_UP)
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))

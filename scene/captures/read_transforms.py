@@ -115,8 +115,9 @@ def capture_of(
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
         (0, 0, 1),
-        data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
+        data.get("up"),
         where,
+        COLMAP_UP if opencv_axes(entries[0]) else None,
     )
     photos, doubts = photos_and_doubts(shots, entries, world, folder, missing, table)
     photos, unsure = meant_by_masks(photos)

@@ -1,20 +1,29 @@
-"""Places where two visits differ: cells that hang together, each told apart by its kind."""
+"""Places where two visits differ: cells that hang together, each told apart by its kind.
+
+A visit's surface is what its own views agree on; it has changed where the views of the other, none
+of which need be the same, see through it.
+"""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shapeshift.scene.change.seen_pair import Samples
+from shapeshift.scene.change.seen import SeenVisit, evidence_at, pixels_of, surface_cells
 from shapeshift.scene.change.similarity import (
     Similarity,
     fit_surfaces,
     rotation_of,
     surface_normals,
 )
+from shapeshift.scene.pose import View
 
 # Pixels of many views in small cubes of space: what all views together say of a surface.
 
-LEAST_VIEWS = 3  # that a cell must be seen in: one view is no evidence
+LEAST_VIEWS = 3  # of either visit that a cell must be seen in: one view is no evidence
+DARK, BRIGHT, FEWEST = 0.02, 0.9, 100  # light, and cells, that tell an exposure
+AROUND = 8  # cells of the other visit that a colour is compared with
+CONTRAST = 6.0  # Lab: less says that nobody can see whether a surface is there
+UNSURE = 0.5  # of as many own views as show a cell may see through it: more, and it is fog
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,85 +32,121 @@ class SurfaceCells:
 
     points: np.ndarray  # (m, 3) metres, A's world: the mean of what was seen in it
     views: np.ndarray  # (m,) how many show it
-    through: np.ndarray  # (m,) part of the views in which the other visit sees through it, 0..1
+    # (m,) part of the other visit's views that see through it, 0..1; NaN: too few can tell
+    through: np.ndarray
     away_m: np.ndarray  # (m,) to the other visit's nearest surface
     color: np.ndarray  # (m, 3) display sRGB, median
     color_change: np.ndarray  # (m, 3) Lab, other less own; NaN where the other has none
     value: np.ndarray  # (m,) median, NaN: not known
     value_change: np.ndarray  # (m,) median of other less own
+    contrast: np.ndarray  # (m,) Lab, to what the other visit sees through it; inf: nothing
 
     def __len__(self) -> int:
         return len(self.points)
 
 
-def cells_of(own: Samples, other: Samples, cell_m: float) -> SurfaceCells:
-    """One visit's cells with side cell_m."""
+@dataclass(frozen=True, eq=False)
+class OwnSurface:
+    """What a visit's own views agree on, a row a cube."""
+
+    points: np.ndarray  # (m, 3) metres, A's world
+    views: np.ndarray  # (m,)
+    color: np.ndarray  # (m, 3) display sRGB
+    value: np.ndarray  # (m,)
+    all_points: np.ndarray  # (n, 3) of every cube, agreed on or not
+
+    def within(self, views: list[View]) -> "OwnSurface":
+        """What lies in the pictures of some views of A's world."""
+        kept = np.zeros(len(self.points), bool)
+        for view in views:
+            kept[pixels_of(self.points, view)[0]] = True
+        return OwnSurface(
+            self.points[kept], self.views[kept], self.color[kept], self.value[kept],
+            self.all_points,
+        )  # fmt: skip
+
+
+def own_surface(seen: SeenVisit, settings: "ChangeSettings") -> OwnSurface:
+    every, views = surface_cells(seen, settings.cell_m)
+    points, views = every[views >= LEAST_VIEWS], views[views >= LEAST_VIEWS]
+    found = evidence_at(points, seen, settings.least_m)
+    sure = (found.same >= LEAST_VIEWS) & (found.through <= UNSURE * found.same)
+    return OwnSurface(points[sure], views[sure], found.color[sure], found.value[sure], every)
+
+
+def cells_of(
+    own: OwnSurface, other: OwnSurface, seen: SeenVisit, settings: "ChangeSettings"
+) -> SurfaceCells:
+    """The surface of one visit, and what the other, as it was seen, says of it."""
     from scipy.spatial import cKDTree
 
-    keys = np.floor(own.points / cell_m).astype(np.int64)
-    _, group = np.unique(keys, axis=0, return_inverse=True)
-    group = group.ravel()
-    known = np.isfinite(own.through)
-    pairs = np.unique(np.stack([group[known], own.view[known]], axis=1), axis=0)
-    count = int(group.max()) + 1 if len(group) else 0
-    views = np.bincount(pairs[:, 0], minlength=count)
-    kept = np.flatnonzero(views >= LEAST_VIEWS)
-    row_of = np.full(count, -1)
-    row_of[kept] = np.arange(len(kept))
-    row, order = row_of[group], None
-    order = np.flatnonzero((row >= 0) & known)
-    row = row[order]
-    points = np.stack([means(row, own.points[order, i], len(kept)) for i in range(3)], axis=1)
-    lab = lab_of(own.color_other[order]) - lab_of(own.color[order])
-    heat = own.value_other[order] - own.value[order]
-    away = np.full(len(kept), np.inf)
-    if len(other.points) and len(kept):
-        away = cKDTree(other.points).query(points)[0]
+    points = own.points
+    found = evidence_at(points, seen, settings.least_m)
+    told = found.same + found.through
+    through = np.where(told >= LEAST_VIEWS, found.through / np.maximum(told, 1), np.nan)
+    away = np.full(len(points), np.inf)
+    if len(other.all_points) and len(points):
+        away = cKDTree(other.all_points).query(points)[0]
+    still = through < THROUGH
+    light = exposure_of(own.color, np.where(still[:, None], found.color, np.nan))
+    lab = lab_of(own.color)
+    change = lab_of(found.color, light) - lab
+    if len(other.points) and len(points):
+        change = least_change(change, lab, lab_of(other.color, light), points, other.points)
+    contrast = color_distance(lab_of(found.behind, light) - lab, shade=1.0)
     return SurfaceCells(
-        points,
-        views[kept],
-        means(row, own.through[order], len(kept)),
-        away,
-        np.stack([medians(row, own.color[order, i], len(kept)) for i in range(3)], axis=1),
-        np.stack([medians(row, lab[:, i], len(kept)) for i in range(3)], axis=1),
-        medians(row, own.value[order], len(kept)),
-        medians(row, heat, len(kept)),
-    )
+        points, own.views, through, away, own.color, np.where(still[:, None], change, np.nan),
+        own.value, np.where(still, found.value - own.value, np.nan),
+        np.where(np.isfinite(contrast), contrast, np.inf),
+    )  # fmt: skip
 
 
-def means(row: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count,) of values (n,) that belong to rows (n,)."""
-    total = np.bincount(row, values, minlength=count)
-    return total / np.maximum(np.bincount(row, minlength=count), 1)
+def least_change(
+    change: np.ndarray, lab: np.ndarray, lab_other: np.ndarray, points: np.ndarray,
+    points_other: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """(m, 3) the least of changes (m, 3) and of those to the cells of the other visit around: what
+    one capture shows a little beside or more blurred is no other colour.
+    """
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(points_other).query(points, k=min(AROUND, len(points_other)))[1]
+    beside = lab_other[near.reshape(len(points), -1)] - lab[:, None]  # (m, k, 3)
+    every = np.concatenate([change[:, None], beside], axis=1)
+    distance = np.nan_to_num(color_distance(every), nan=np.inf)
+    best = every[np.arange(len(every)), np.argmin(distance, axis=1)]
+    return np.where(np.isfinite(change), best, np.nan)
 
 
-def medians(row: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count,) of those values (n,) that are finite; NaN where a row has none."""
-    good = np.isfinite(values)
-    row, values = row[good], values[good]
-    order = np.lexsort((values, row))
-    row, values = row[order], values[order]
-    sizes = np.bincount(row, minlength=count)
-    first = np.cumsum(sizes) - sizes
-    out = np.full(count, np.nan)
-    some = sizes > 0
-    low, high = first + (sizes - 1) // 2, first + sizes // 2
-    out[some] = (values[low[some]] + values[high[some]]) / 2
-    return out
-
-
-def lab_of(srgb: np.ndarray) -> np.ndarray:
-    """(..., 3) CIE L*a*b* under D65 of display sRGB (..., 3); distances of 2 are just visible."""
+def linear_of(srgb: np.ndarray) -> np.ndarray:
+    """(..., 3) light of display sRGB (..., 3)."""
     c = np.clip(srgb, 0, 1)
-    linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def lab_of(srgb: np.ndarray, exposure: np.ndarray | float = 1.0) -> np.ndarray:
+    """(..., 3) CIE L*a*b* under D65 of display sRGB (..., 3), its light divided by an exposure;
+    distances of 2 are just visible.
+    """
     xyz_from_rgb = np.array(
         [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
          [0.0193339, 0.1191920, 0.9503041]]
     )  # fmt: skip
-    xyz = linear @ xyz_from_rgb.T / (0.95047, 1.0, 1.08883)
+    xyz = linear_of(srgb) / exposure @ xyz_from_rgb.T / (0.95047, 1.0, 1.08883)
     f = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
     x, y, z = np.moveaxis(f, -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+def exposure_of(own: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(3,) how much more light the other visit's photos caught of the same cells (m, 3): medians of
+    those neither dark nor burnt out; 1 where there are few.
+    """
+    light, more = linear_of(own), linear_of(other)
+    within = ((light > DARK) & (light < BRIGHT) & (more > DARK) & (more < BRIGHT)).all(axis=1)
+    if np.count_nonzero(within) < FEWEST:
+        return np.ones(3)
+    return np.median(more[within] / light[within], axis=0)
 
 
 KINDS = ("moved", "appeared", "vanished", "hotter", "colder", "higher", "lower", "recoloured")
@@ -174,8 +219,11 @@ def find_places(
 ) -> list[ChangedPlace]:
     """All places, the largest surface first.  unit: of the values; words: of more and of less."""
     gone, new = ((c.through >= THROUGH) & (c.away_m >= settings.least_m) for c in (before, after))
-    vanished = [_Part(before, rows) for rows in parts(before.points, gone, settings)]
-    appeared = [_Part(after, rows) for rows in parts(after.points, new, settings)]
+    vanished, appeared = (
+        [_Part(cells, rows) for rows in parts(cells.points, mask, settings)
+         if np.median(cells.contrast[rows]) >= CONTRAST]
+        for cells, mask in ((before, gone), (after, new))
+    )  # fmt: skip
     places, left = pair_moved(vanished, appeared, settings)
     for part in left:
         kind = "appeared" if part.cells is after else "vanished"
@@ -204,9 +252,9 @@ def find_places(
     return [replace(place, number=i) for i, place in enumerate(places, 1)]
 
 
-def color_distance(lab: np.ndarray) -> np.ndarray:
-    """(...) of Lab differences (..., 3), lightness counted by SHADE."""
-    return np.sqrt((SHADE * lab[..., 0]) ** 2 + lab[..., 1] ** 2 + lab[..., 2] ** 2)
+def color_distance(lab: np.ndarray, shade: float = SHADE) -> np.ndarray:
+    """(...) of Lab differences (..., 3), lightness counted by `shade`."""
+    return np.sqrt((shade * lab[..., 0]) ** 2 + lab[..., 1] ** 2 + lab[..., 2] ** 2)
 
 
 def inside_any(

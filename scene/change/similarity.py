@@ -45,6 +45,12 @@ class Similarity:
             self.scale * first.scale,
         )
 
+    @property
+    def inverse(self) -> "Similarity":
+        """B's points from A's."""
+        turn = self.rotation.T
+        return Similarity(turn, -turn @ self.shift / self.scale, 1 / self.scale)
+
     def view_in_b(self, view: View) -> View:
         """A view of A where it stands in B; depths there are 1 / scale of those here."""
         world = view.world_from_eye.matrix()

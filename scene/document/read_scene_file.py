@@ -8,6 +8,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import MODES
 from shapeshift.runtime_models.splats.plain_splats import AXES
+from shapeshift.scene.cameras.upright import SOURCES, Up, Upright
 from shapeshift.scene.control import EASES
 from shapeshift.scene.document.appearance_rows import read_appearance, read_sky
 from shapeshift.scene.document.scene_file import (
@@ -50,6 +51,7 @@ def read_scene_file(path: str | Path) -> SceneFile:
     view = read_view(file.optional_object("view"))
     views = read_views(file)
     appearance, sky = read_appearance(file), read_sky(file)
+    upright = read_upright(file.optional_object("up"))
     sections = read_sections(file, ("world",))
     file.refuse_unknown_keys()
     items = tuple(read_item(row, path.name) for row in rows)
@@ -69,6 +71,7 @@ def read_scene_file(path: str | Path) -> SceneFile:
         appearance=appearance,
         sky=sky,
         sections=sections,
+        upright=upright,
     )
 
 
@@ -177,6 +180,26 @@ def read_views(file: Fields) -> tuple[NamedView, ...]:
         assert view is not None, "there is a row"
         found.append(NamedView(name, view))
     return tuple(found)
+
+
+def read_upright(row: Fields | None) -> Upright | None:
+    """How the scene's up was found, which `segment` writes."""
+    if row is None:
+        return None
+    ways, name = [], row.line("used", known=SOURCES)
+    for each in row.rows("ways", len(SOURCES), "way"):
+        direction = each.numbers("up", 3)
+        if not abs(math.hypot(*direction) - 1) <= UNIT_SLACK:
+            raise each.error("up", "a direction of length 1")
+        things = tuple(each.texts("things")) if each.has("things") else ()
+        source, sure = each.line("by", known=SOURCES), each.flag("sure", True)
+        ways.append(Up(source, three(direction), sure, things))
+        each.refuse_unknown_keys()
+    row.refuse_unknown_keys()
+    used = next((way for way in ways if way.source == name), None)
+    if used is None:
+        raise row.error("used", "the 'by' of one of its ways")
+    return Upright(tuple(ways), used)
 
 
 def read_state(row: Fields) -> State:

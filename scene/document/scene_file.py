@@ -18,6 +18,7 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
 from shapeshift.scene.appearance import NEUTRAL, Appearance, Sky
 from shapeshift.scene.cameras.framing import frame_points, framing_view, scene_points, view_from
+from shapeshift.scene.cameras.upright import Upright
 from shapeshift.scene.orthographic import orthographic
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
@@ -100,6 +101,7 @@ class SceneFile:
     appearance: Appearance = NEUTRAL  # of all objects, after their own
     sections: tuple[SceneSection, ...] = ()  # of all objects, in the world
     sky: Sky | None = None  # behind everything; None: what the model or the program has there
+    upright: Upright | None = None  # how its up was found; None: +Y is up, and nobody asked
 
     @property
     def all_items(self) -> tuple[SceneItem, ...]:

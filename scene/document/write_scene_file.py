@@ -29,6 +29,14 @@ def write_scene_file(file: SceneFile, path: str | Path) -> None:
         out["appearance"] = appearance_row(file.appearance)
     if file.sky:
         out["sky"] = sky_row(file.sky)
+    if file.upright:
+        ways = [
+            {"by": way.source, "up": list(way.direction)}
+            | ({} if way.sure else {"sure": False})
+            | ({"things": list(way.things)} if way.things else {})
+            for way in file.upright.ways
+        ]
+        out["up"] = {"used": file.upright.used.source, "ways": ways}
     if file.sections:
         out["sections"] = [section_row(one, "world") for one in file.sections]
     if file.background:

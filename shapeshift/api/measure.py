@@ -114,7 +114,8 @@ def change(
     twentieth of their range; 0 mm is a thirty-second of the
     scene's radius.  stop: whose colours and shapes are compared; "": the first that shows no
     values.  values: the stop whose values are; "": the first thermal one, else the first of others.
-    value_range: of such stops that do not say it.  cameras: views of `before`; None is all
+    value_range: of such stops that do not say it.  cameras: views of `before`: only what is in
+    their pictures is compared; None: each scene from where its photos were taken, else from all
     around.  out: a folder, as the command writes it.  Raises UsageError, BadFile where the scenes
     do not fit together.
 
@@ -122,7 +123,7 @@ def change(
             print(place.kind, place.centre, place.amount, place.unit)
     """
     from shapeshift.api.views import choose_views
-    from shapeshift.app.change.draw_pairs import visit_of
+    from shapeshift.app.change.draw_visits import visit_of
     from shapeshift.app.change.find_change import ChangeChoice, find_change
     from shapeshift.app.change.outputs import check_folder, write_change
 

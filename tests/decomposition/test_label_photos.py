@@ -8,13 +8,13 @@ import pytest
 
 pytest.importorskip("pyopencl")
 
-from shapeshift.decomposition.label_photos import PhotoLabelling, best_of, choose_photos
+from shapeshift.decomposition.label_photos import PhotoLabelling, best_of, choose_photos, with_click
 from shapeshift.decomposition.masks.journal import open_journal
 from shapeshift.decomposition.masks.label_maps import SILENT, write_label_map
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs, PhotoPrompt
 from shapeshift.decomposition.masks.work_photos import find_photo, work_photos
-from shapeshift.decomposition.walk_objects import walk_objects
+from shapeshift.decomposition.walk_objects import heights_of, walk_objects
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.runtime_models.model import BadFile, Stop
 from tests.support.decomposition.demo_photos import (
@@ -235,3 +235,37 @@ def test_a_capture_of_other_stops_is_refused(photos, tmp_path):
         work_photos(capture, (Stop("Bone", 0.0), Stop("Skin", 1.0)))
     assert work_photos(capture, (Stop("Bone", 0.0), Stop("RGB", 1.0)))[0].stop.x == 1.0
     assert photos[0].view.size == SIZE
+
+
+def test_heights_tell_the_bench_from_what_stands_on_it(photos, specs):
+    """The truth is the ray tracer's: the bench's top is a plane, the mug stands on it; with nothing
+    flat around there are none."""
+    from shapeshift.decomposition.masks.anchor_walk import nodes_of
+
+    spec = next(spec for spec in specs.objects if spec.name == "mug")
+    view = largest(spec.label)
+    photo, true = photos[view], true_maps()[1][view]
+    nodes = nodes_of(demo().model, np.array([0, 0.6, 1.8], np.float32))
+    left, top, right, bottom = spec.prompts[0].box or (0, 0, 0, 0)
+    prompt = Prompt((left, top, right, bottom))
+    (height,) = heights_of(demo(), photo.view, 0.0, [prompt], nodes)
+    assert height is not None and height.dtype == np.uint8 and height.shape == true.shape
+    box = np.s_[int(top) : int(bottom), int(left) : int(right)]
+    mug, bench = height[box][true[box] == spec.label], height[box][true[box] == 0]
+    assert np.percentile(mug, 20) > np.percentile(bench, 80)
+    none = replace(nodes, means=np.random.default_rng(0).uniform(-1, 1, nodes.means.shape))
+    assert heights_of(demo(), photo.view, 0.0, [prompt], none) == [None]
+    assert heights_of(demo(), photo.view, 0.0, [], nodes) == []
+
+
+def test_a_box_alone_gets_a_click_where_the_thing_is_deepest():
+    """A red ring on blue: the middle of its box is blue; clicks of a person stay as they are."""
+    rows, columns = np.mgrid[:80, :100]
+    away = np.hypot(rows - 40, columns - 50)
+    ring = (away < 28) & (away > 14)
+    image = np.where(ring[..., None], (200, 30, 30), (30, 60, 180)).astype(np.uint8)
+    box = (22.0, 12.0, 79.0, 69.0)
+    (click,) = with_click(image, Prompt(box)).inside
+    assert 17 < np.hypot(click[1] - 40.5, click[0] - 50.5) < 25  # deepest is 21, half a width off
+    said = Prompt(box, np.array([[30.0, 40.0]]))
+    assert with_click(image, said) is said and with_click(image, Prompt(text="a ring")).box is None

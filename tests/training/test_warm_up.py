@@ -78,6 +78,7 @@ def test_shapes_apart_with_base_colours_for_each_stop_are_learned_at_once(device
     assert min(trainer.held_out_psnr(9).values()) > 20  # 13 dB is an empty picture
 
 
+@pytest.mark.slow
 def test_a_capture_of_shapes_apart_is_turned_back_once_and_learned(device, apart, tmp_path):
     whole, file = Trainer(device, apart, SETTINGS), tmp_path / "c.npz"
     for now in whole.steps():

@@ -5,7 +5,8 @@
 Each row is what a person gives in the one of 16 views that shows most of the object, and what comes
 of it: the mask's IoU there, the IoU of the object in 8 other views (those that show 40 of its
 pixels), and the seconds of processor time of the walks.  "true mask" stands for what a network
-would give.  "box, heat, 15 more masks" makes masks of the other views in the same way, prompted by
+would give.  "height" is how high what a pixel shows stands above the plane around the box, out of
+the scene; "15 more masks" makes masks of the other views in the same way, prompted by
 the walk and judged as a segmenter's are: it lost.
 """
 
@@ -29,10 +30,11 @@ from shapeshift.decomposition.masks.anchor_walk import (  # noqa: E402
     nodes_of,
     seeds_of_evidence,
 )
-from shapeshift.decomposition.masks.pixel_walk import PixelWalk  # noqa: E402
+from shapeshift.decomposition.masks.pixel_walk import PixelWalk, walk_together  # noqa: E402
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt  # noqa: E402
 from shapeshift.decomposition.propagate import Support, propagate  # noqa: E402
 from shapeshift.decomposition.shown import ShownAnchors  # noqa: E402
+from shapeshift.decomposition.walk_objects import heights_of  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
@@ -45,7 +47,7 @@ THERMAL = 0.5  # x of that stop
 EYE = (0.0, 0.6, 1.8)  # metres: from where colours of anchors are taken
 MARGIN = 3  # pixels of a person's box around the object
 LEAST_PIXELS = 40
-GIVEN = ("true mask", "box", "box, heat", "box, heat, 15 more masks")
+GIVEN = ("true mask", "box", "box, heat", "box, heat, height", "box, heat, height, 15 more masks")
 COLUMNS = "given,object,mask_iou,object_iou,cpu_s"
 
 
@@ -108,7 +110,12 @@ class Bench:
             box = (columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + 1 + MARGIN,
                    rows.max() + 1 + MARGIN)  # fmt: skip
             image = self.images[first][..., : 3 if given == "box" else 4]
-            mask = PixelWalk().candidates(image, Prompt(box))[0].mask
+            prompt, heights = Prompt(box), None
+            if "height" in given:
+                heights = heights_of(self.shown, self.views[first], 0.0, [prompt], self.nodes)
+            (found,) = walk_together(image, [prompt], heights)
+            assert found is not None, "it has a box"
+            mask = found.mask
         support = Support.none(self.shown.count)
         eyes = self.eyes if "more" in given else self.eyes[: first + 1]
         steps = propagate(support, {first: mask}, eyes, self.shown_in, self.ask)

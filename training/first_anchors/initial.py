@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.upright import turn_of_world
 from shapeshift.scene.captures.capture import LEFT_HANDED, Capture
-from shapeshift.scene.captures.capture_rules import turn_of_world
 from shapeshift.scene.captures.point_clouds import read_las, read_points
 from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.hull import FINEST, visual_hulls

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shapeshift.runtime_models.eyes import EYES, spread_eyes
+from shapeshift.runtime_models.eyes import EYES, LOOKS, spread_eyes
 from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, BadFile
 from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.rotation import normalize
@@ -194,8 +194,10 @@ class UpdateTrainer(Trainer):
         }
         before = self.base.model.provenance
         if EYES in before:  # else the old photos' are not known, and all directions count
-            both = [*before[EYES], *notes_of(self.capture)[EYES]]
-            before = before | {EYES: spread_eyes(np.array(both))}
+            new = notes_of(self.capture)
+            places, looks = ([*before.get(k, ()), *new.get(k, ())] for k in (EYES, LOOKS))
+            kept = {k: v for k, v in before.items() if k != LOOKS}
+            before = kept | spread_eyes(np.array(places), np.array(looks))
         return before | {"updates": [*before.get("updates", []), update]}
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.upright import turn_of_world
 from shapeshift.scene.capture_files import find_file, photo_key
 from shapeshift.scene.capture_found import FileTable
 from shapeshift.scene.captures.capture import LEFT_HANDED, Capture, FoundFiles
-from shapeshift.scene.captures.capture_rules import turn_of_world
 from shapeshift.scene.captures.read_transforms import capture_of
 from shapeshift.scene.captures.scans.posed_frames import (
     PosedFrames,

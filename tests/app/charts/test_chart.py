@@ -239,6 +239,7 @@ def test_families_of_the_whole_table():
     assert family("target=rgba16f") == "pixels"
 
 
+@pytest.mark.slow
 def test_a_whole_chart_is_what_a_budget_finds(package, tmp_path, monkeypatch):
     """Every row of one eye is kept for --target-ms, which then measures nothing."""
     from shapeshift.app.charts import budget_chart

@@ -93,6 +93,7 @@ def alone(balls, two_parts, tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_tasks_make_the_report_and_the_bytes_of_one_process(balls, alone, tmp_path, monkeypatch):
     """Also where the first start is interrupted between two seeds of a trial."""
     out = tmp_path / "fit.shift"

@@ -218,7 +218,9 @@ def parent_of(task: Task) -> subprocess.Popen:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "how", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGKILL]
+)
 def test_nothing_lives_on_when_who_started_it_is_ended(counting, how):
     """Ctrl-C to the program, and kill -9: the task hears of either, keeps its work and ends."""
     task = counting(letters=400)

@@ -96,6 +96,7 @@ def test_without_bodies_the_rest_of_the_job_goes_on(scene, tmp_path, capsys, mon
     assert json.loads(told.out)["touch"] is None and not (tmp_path / "touch.png").exists()
 
 
+@pytest.mark.slow
 def test_a_scene_file_as_it_says(tmp_path, capsys):
     assert run("--scene", touch_film.SCENE, "--out", tmp_path, *QUICK) == 0
     names = {"view0.png", "view1.png", "view2.png", "sheet.png", "bench.json"}

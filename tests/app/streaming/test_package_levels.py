@@ -37,7 +37,7 @@ def clumps(tmp_path):
     return tmp_path / "clumps.shift"
 
 
-@pytest.mark.parametrize("form", ["file", "folder"])
+@pytest.mark.parametrize("form", ["file", pytest.param("folder", marks=pytest.mark.slow)])
 def test_a_package_gets_levels(clumps, tmp_path, capsys, form):
     source = clumps
     if form == "folder":

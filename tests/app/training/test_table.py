@@ -328,6 +328,7 @@ def test_a_comparison_that_was_ended_goes_on(balls, tmp_path, monkeypatch):
     assert models_of(tmp_path / "t" / "splats") == models_of(tmp_path / "whole" / "splats")
 
 
+@pytest.mark.slow
 def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     """tools/training/baselines.py at its smallest: budgets, sizes, seeds, nothing twice."""
     path = Path(__file__).resolve().parents[3] / "tools" / "training" / "baselines.py"

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.poses.find_poses import COLMAP_UP, find_up, length_between, similarity
+from shapeshift.decomposition.poses.find_poses import COLMAP_UP, length_between, similarity
+from shapeshift.scene.cameras.upright import up_of_photos
 from tests.support.scene.textured_room import camera
 
 
@@ -17,15 +18,15 @@ def turned(poses: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def degrees(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))
+    return float(np.degrees(np.arccos(np.clip(np.dot(a, b), -1, 1))))
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_level_cameras_on_one_side_give_up_exactly(seed):
     """They look down from one side only, so the mean of their up vectors leans by 15 degrees."""
     poses, up = turned(np.array([camera(i, 8) for i in range(8)]), seed)
-    found = find_up(poses, [1] * 8)
-    assert degrees(found, up) < 1e-4
+    found = up_of_photos(poses, [1] * 8)
+    assert found.sure and degrees(found.direction, up) < 1e-4
     mean = -poses[:, :3, 1].mean(axis=0)
     assert degrees(mean / np.linalg.norm(mean), up) > 10
 
@@ -38,20 +39,21 @@ def test_photos_held_upright_and_stored_lying_count_as_held(orientation, quarter
     quarter = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1.0]])
     stored = poses.copy()
     stored[:, :3, :3] = poses[:, :3, :3] @ np.linalg.matrix_power(quarter, quarters).T
-    found = find_up(stored, [orientation] * 8)
-    assert degrees(found, np.array([0, 1.0, 0])) < 1e-4
+    found = up_of_photos(stored, [orientation] * 8)
+    assert degrees(found.direction, np.array([0, 1.0, 0])) < 1e-4
 
 
 def test_photos_that_all_look_the_same_way_give_their_mean():
     """Their horizontal axes are one: no plane is through them."""
     pose = camera(0, 8)
-    found = find_up(np.array([pose] * 5), [1] * 5)
-    assert degrees(found, -pose[:3, 1]) < 1e-6
+    found = up_of_photos(np.array([pose] * 5), [1] * 5)
+    assert degrees(found.direction, -pose[:3, 1]) < 1e-6
+    assert not found.sure
 
 
 def test_photos_that_disagree_say_nothing():
     upside_down = camera(0, 2) @ np.diag([-1.0, -1, 1, 1])
-    assert find_up(np.array([camera(0, 2), upside_down]), [1, 1]) is None
+    assert up_of_photos(np.array([camera(0, 2), upside_down]), [1, 1]) is None
 
 
 @pytest.mark.parametrize("up", [(0, 1, 0), (0, -1, 0), (1, 0, 0), (0.6, 0, -0.8), (0, 1, 1e-9)])

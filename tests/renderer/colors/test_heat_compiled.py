@@ -36,6 +36,7 @@ with Renderer(None, "tiles") as renderer:
 """
 
 
+@pytest.mark.slow
 def test_the_first_frame_with_heat_compiles_nothing(tmp_path):
     pytest.importorskip("pyopencl")
     from shapeshift.rasterizer.device import NoDevice, open_device

@@ -173,6 +173,12 @@ BROKEN = {
     "an eye of a word": (edit(provenance={"eyes": [[0, 1, "2"]]}), "three finite numbers"),
     "an eye of NaN": (edit(provenance={"eyes": [[0, 1, float("nan")]]}), "three finite numbers"),
     "an eye too far": (edit(provenance={"eyes": [[0, 1, 2e30]]}), "finite numbers up to 1e+30"),
+    "looks of another kind": (edit(provenance={"looks": 3}), "'looks' is 3; a list with, beside"),
+    "a look without a lens": (edit(provenance={"looks": [[1, 0, 0, 0]]}), "tangents left < right"),
+    "a look turned in": (edit(provenance={"looks": [[1, 0, 0, 0, 1, -1, -1, 1]]}), "left <"),
+    "a look of no turn": (edit(provenance={"looks": [[0, 0, 0, 0, -1, 1, -1, 1]]}), "unit quat"),
+    "a look of NaN": (edit(provenance={"looks": [[1, 0, 0, 0, -1, 1, -1, float("nan")]]}), "unit"),
+    "a look too wide": (edit(provenance={"looks": [[1, 0, 0, 0, -1, 10**400, -1, 1]]}), "unit"),
     "too many eyes": (edit(provenance={"eyes": [[0, 1, 2]] * 65}), "a list of at most 64 places"),
     # heads
     "no heads": (edit(heads={}), "'heads': 'offset' is missing"),

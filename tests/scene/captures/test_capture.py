@@ -11,8 +11,9 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
+from shapeshift.scene.cameras.upright import upright_rotation
 from shapeshift.scene.captures.capture import Capture, Photo
-from shapeshift.scene.captures.capture_rules import spread_stops, upright_rotation
+from shapeshift.scene.captures.capture_rules import spread_stops
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.point_clouds import read_points
 from shapeshift.scene.captures.read_capture import read_capture

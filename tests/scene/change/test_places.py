@@ -5,24 +5,34 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shapeshift.scene.change import seen
 from shapeshift.scene.change.places import (
     LEAST_VIEWS,
     ChangeSettings,
     SurfaceCells,
     cells_of,
     color_distance,
+    exposure_of,
     find_places,
     inside_any,
     lab_of,
-    means,
-    medians,
+    least_change,
+    linear_of,
+    own_surface,
     shape_misfit,
 )
-from shapeshift.scene.change.seen_pair import SeenPair, SeenSide, edge_pixels, samples_of
-from shapeshift.scene.change.similarity import rotation_of
+from shapeshift.scene.change.seen import (
+    SeenSide,
+    SeenVisit,
+    edge_pixels,
+    evidence_at,
+    median_of_views,
+)
+from shapeshift.scene.change.similarity import Similarity, rotation_of
 from tests.support.scene.warm_wall import wall_view
 
 CELL = 0.02
+NOWHERE = Similarity.identity()
 SETTINGS = ChangeSettings(CELL, 0.03, 5.0, 14.0, 12)
 
 
@@ -34,21 +44,39 @@ def side(depth_m, coverage=1.0, value=None) -> SeenSide:
     return SeenSide(np.full((*shape, 3), 0.5), np.full(shape, coverage), depth, values)
 
 
+def visit(views: int, *sides: SeenSide) -> SeenVisit:
+    """Sides seen from places that are 2 cm apart."""
+    eyes = [wall_view((0.02 * i, 0, 1.5)) for i in range(views)]
+    return SeenVisit(eyes, [sides[i % len(sides)] for i in range(views)], NOWHERE, True)
+
+
 @pytest.mark.parametrize(
-    "other, coverage, through",
+    "shown, coverage, told",
     [
-        (1.5, 1.0, 0.0), (1.53, 1.0, 0.0), (1.5301, 1.0, 1.0), (1.47, 1.0, 0.0),
-        (1.4699, 1.0, np.nan), (np.nan, 0.2499, 1.0), (np.nan, 0.25, np.nan),
+        (1.5, 1.0, (1, 0, 0)), (1.53, 1.0, (1, 0, 0)), (1.5301, 1.0, (0, 1, 0)),
+        (1.47, 1.0, (1, 0, 0)), (1.4699, 1.0, (0, 0, 1)), (np.nan, 0.2499, (0, 1, 0)),
+        (np.nan, 0.25, (0, 0, 0)),
     ],
 )  # fmt: skip
-def test_what_the_other_visit_sees_through(other, coverage, through):
-    """Behind by more than 3 cm, or open: gone; nearer by more: hidden; between: the same."""
-    pair = SeenPair(wall_view(), side(1.5), side(other, coverage))
-    samples = samples_of([pair], after=False, least_m=0.03 + 1e-12)
-    assert len(samples.points) == 70 * 94 or len(samples.points) == 72 * 96
-    np.testing.assert_array_equal(samples.through, through)
-    own = samples_of([SeenPair(wall_view(), side(other, coverage), side(1.5))], True, 0.03 + 1e-12)
-    np.testing.assert_array_equal(own.through, through)  # the same the other way round
+def test_what_a_visit_says_of_points(shown, coverage, told):
+    """A wall 3 cm behind is seen through, or nothing; nearer hides; between it is the same."""
+    points = np.array([[0.0, 0, 0], [0.1, 0.1, 0], [0, 0, 9], [50, 0, 0]])  # behind, beside
+    found = evidence_at(points, visit(1, side(shown, coverage)), 0.03 + 1e-12)
+    counts = np.stack([found.same, found.through, found.hidden], axis=1)
+    np.testing.assert_array_equal(counts, [told, told, (0, 0, 0), (0, 0, 0)])
+    assert np.isfinite(found.color[:, 0]).tolist() == [bool(told[0])] * 2 + [False] * 2
+    assert not np.isfinite(found.color[2:]).any() and not np.isfinite(found.value).any()
+
+
+def test_no_points_and_more_than_a_chunk_are_asked(monkeypatch):
+    asked = visit(2, side(1.5, value=20.0))
+    assert len(evidence_at(np.zeros((0, 3)), asked, 0.03).same) == 0
+    points = np.random.default_rng(0).uniform(-0.2, 0.2, (33, 3)) * (1, 1, 0.1)
+    whole = evidence_at(points, asked, 0.03)
+    monkeypatch.setattr(seen, "CHUNK", 16)
+    for name, values in vars(evidence_at(points, asked, 0.03)).items():
+        np.testing.assert_array_equal(values, getattr(whole, name))
+    assert (whole.value[whole.same > 0] == 20).all() and (whole.same == 2).any()
 
 
 def test_pixels_at_a_step_of_the_depth_do_not_count():
@@ -62,27 +90,65 @@ def test_pixels_at_a_step_of_the_depth_do_not_count():
     assert edge_pixels(depth)[[1, 2, 3, 2], [0, 0, 0, 1]].all()
 
 
-def test_medians_and_means_of_rows():
+def test_medians_of_views():
     rng = np.random.default_rng(0)
-    row, values = rng.integers(0, 7, 200), rng.normal(size=200)
-    values[rng.random(200) < 0.3] = np.nan
-    values[row == 4] = np.nan
-    found = medians(row, values, 8)
-    wanted = [np.nanmedian(values[row == i]) if np.isfinite(values[row == i]).any() else np.nan
-              for i in range(8)]  # fmt: skip
-    np.testing.assert_allclose(found, wanted)
-    np.testing.assert_allclose(means(row, row * 2.0, 8), [0, 2, 4, 6, 8, 10, 12, 0])
+    stack = rng.normal(size=(7, 40, 3))
+    stack[rng.random(stack.shape) < 0.5] = np.nan
+    stack[:, :2] = np.nan
+    wanted = [[np.median(c) if len(c := row[np.isfinite(row)]) else np.nan for row in point]
+              for point in stack.transpose(1, 2, 0)]  # fmt: skip
+    np.testing.assert_allclose(median_of_views(stack), wanted)
+    assert np.isnan(median_of_views(stack[:0])).all()
 
 
-def test_a_cell_wants_three_views():
-    for views in (LEAST_VIEWS - 1, LEAST_VIEWS):
-        pairs = [
-            SeenPair(wall_view((0.02 * i, 0, 1.5)), side(1.5), side(1.5)) for i in range(views)
-        ]
-        samples = samples_of(pairs, False, 0.03)
-        cells = cells_of(samples, samples, 0.05)
-        assert (len(cells) > 0) == (views == LEAST_VIEWS)
-    assert (cells.views == LEAST_VIEWS).all() and (cells.through == 0).all()
+@pytest.mark.parametrize("views", [LEAST_VIEWS - 1, LEAST_VIEWS])
+def test_three_views_of_either_visit_are_evidence(views):
+    many, few = visit(6, side(1.5)), visit(views, side(1.5))
+    own = own_surface(few, SETTINGS)
+    assert (len(own.points) > 0) == (views == LEAST_VIEWS)
+    known, gone = own_surface(many, SETTINGS), visit(views, side(np.nan, 0.0))
+    cells = cells_of(known, own_surface(gone, SETTINGS), gone, SETTINGS)
+    assert np.isfinite(cells.through).any() == (views == LEAST_VIEWS)
+    assert (cells.through[np.isfinite(cells.through)] == 1).all()
+    assert (cells.contrast == np.inf).all()  # nothing lies behind
+
+
+def test_what_own_views_see_through_is_fog():
+    """Three of six views show something 50 cm before the wall that the others look through."""
+    fog = visit(6, side(1.0), side(1.5))
+    own = own_surface(fog, SETTINGS)
+    assert len(own.points) and (np.abs(own.points[:, 2]) < 0.1).all()  # the wall alone
+    assert (own.all_points[:, 2] > 0.3).any()  # both were seen
+
+
+def test_another_exposure_is_no_other_colour():
+    """Light of 1.5, 1.4 and 1.6 times: all cells alike, but for a third that is painted."""
+    rng = np.random.default_rng(0)
+    own = rng.uniform(0.2, 0.5, (300, 3))
+    factor = np.array([1.5, 1.4, 1.6])
+    other = (linear_of(own) * factor).clip(0, 1)
+    other = np.where(other <= 0.0031308, 12.92 * other, 1.055 * other ** (1 / 2.4) - 0.055)
+    other[:100] = rng.uniform(0.3, 0.6, (100, 3))
+    found = exposure_of(own, other)
+    np.testing.assert_allclose(found, factor, rtol=0.02)
+    np.testing.assert_allclose(lab_of(other[100:], factor), lab_of(own[100:]), atol=1e-6)
+    np.testing.assert_array_equal(exposure_of(own[:99], other[:99]), 1)  # too few to tell
+    np.testing.assert_array_equal(exposure_of(own, np.full((300, 3), np.nan)), 1)
+
+
+@pytest.mark.parametrize("contrast, found", [(6.0, True), (5.99, False), (np.inf, True)])
+def test_a_surface_before_its_own_colour_is_not_said_to_be_gone(contrast, found):
+    new = patch((0.0, 0.0, 0.0), through=1.0, away_m=0.1, contrast=contrast)
+    assert [p.kind for p in find_places(FLOOR, both(FLOOR, new), SETTINGS)] == ["appeared"] * found
+
+
+def test_a_colour_a_cell_beside_is_the_same_colour():
+    """A stripe that lies a cell beside is no change; a painted area is one."""
+    points = np.stack([np.arange(30) * CELL, np.zeros(30), np.zeros(30)], axis=1)
+    lab, other = np.zeros((2, 30, 3))
+    lab[10, 1], other[11, 1], other[20:, 2] = 40, 40, 30
+    found = color_distance(least_change(other - lab, lab, other, points, points))
+    assert (found[:16] == 0).all() and (found[24:] == 30).all()
 
 
 def test_lab_of_known_colours():
@@ -111,7 +177,7 @@ def patch(centre, size=(8, 8), **fields) -> SurfaceCells:
     usual = {
         "views": 9 * one, "through": 0 * one, "away_m": 0.001 * one,
         "color": one[:, None] * (0.5, 0.5, 0.5), "color_change": np.zeros((len(points), 3)),
-        "value": 20 * one, "value_change": 0 * one,
+        "value": 20 * one, "value_change": 0 * one, "contrast": 40 * one,
     }  # fmt: skip
     made = {k: np.broadcast_to(fields[k], usual[k].shape) if k in fields else v
             for k, v in usual.items()}  # fmt: skip

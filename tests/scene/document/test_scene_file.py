@@ -14,6 +14,7 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.appearance import Appearance, Sky
+from shapeshift.scene.cameras.upright import Up, Upright
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import (
     FORMAT,
@@ -78,6 +79,8 @@ FULL = SceneItem(
     reactions=REACTIONS,
     two_axes=TwoAxes(0.1, 0.4, 0.9),
 )
+LEANING = Up("photos", (0.0, HALF, HALF), sure=False)
+ON_PLANES = Up("planes", (0.6, 0.8, 0.0), things=("mug", "cup"))
 TABLE = SceneItem(name="background", model="table.ply", static=True, collider="table.obj", x=0.5)
 
 
@@ -95,6 +98,7 @@ def full(folder: Path) -> SceneFile:
         ),
         appearance=Appearance(opacity=0.25),
         sky=Sky((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9)),
+        upright=Upright((Up("assumed", (0.0, 1.0, 0.0)), LEANING, ON_PLANES), ON_PLANES),
     )
 
 
@@ -163,10 +167,12 @@ WRONG = [
     (("floor_y",), "low", "metres"),
     (("floor_y",), 10001, "metres"),
     (("objects", 0, "pose", "position"), [0, 0, -10001], "up to 10000"),
-    (("view",), [], "braces"),
-    (("view", "eye"), [0, 1], "3 finite numbers"),
+    (("view",), [], "braces"), (("view", "eye"), [0, 1], "3 finite numbers"),
     (("view", "target"), [0, 5, 2], "straight above"),
     (("view", "fov_y"), 4, "radians"),
+    (("up",), [0, 1, 0], "braces"), (("up", "used"), "stated", "'by' of one of its ways"),
+    (("up", "used"), "hearsay", "'assumed'"), (("up", "ways"), [], "'by' of one of its ways"),
+    (("up", "ways", 1, "up"), [0, 2, 0], "length 1"), (("up", "ways", 2, "things"), "mug", "list"),
     (("background",), "table.ply", "braces"),
     (("background", "model"), "", "path"),
     (("objects",), {}, "a list"),

@@ -70,6 +70,7 @@ class TrueSegmenter:
     name = "the truth"
     reads_text = False
     takes_boxes = True
+    wants_click = False
     encoded = 0
     asked = 0
 

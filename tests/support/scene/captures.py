@@ -7,7 +7,7 @@ import numpy as np
 import pycolmap
 from PIL import Image
 
-from shapeshift.scene.captures.capture_rules import upright_rotation
+from shapeshift.scene.cameras.upright import upright_rotation
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View, look_at
 
 RANDOM = np.random.default_rng(7)

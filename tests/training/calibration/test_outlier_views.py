@@ -42,6 +42,7 @@ def test_no_good_photo_is_named(balls):
     assert found_in(balls) == []
 
 
+@pytest.mark.slow
 def test_wrong_poses_and_another_exposure_are_named(balls, tmp_path):
     photos = list(balls.photos)
     wrong = {3, 11}  # two of twenty poses of RGB: 8 degrees beside

@@ -194,6 +194,16 @@ def pixels_off(trainer: Trainer, true) -> float:
     return float(np.mean(off))
 
 
+def test_refined_poses_go_on_with_the_same_bits(device, balls, tmp_path):
+    settings = replace(SETTINGS, iterations=40)
+    refined, kept = run_keeping(Trainer(device, balls[0], settings), tmp_path, 21)
+    assert pixels_off(refined, balls[1]) != pixels_off(
+        Trainer(device, *balls[:1], settings), balls[1]
+    )
+    assert bits(run(Trainer(device, balls[0], settings, *kept))) == bits(refined)
+
+
+@pytest.mark.slow
 def test_wrong_poses_come_nearer_and_pictures_are_better(device, balls, tmp_path):
     wrong, true = balls
     plain = run(Trainer(device, wrong, replace(SETTINGS, poses="stated")))

@@ -3,7 +3,7 @@
 import argparse
 import csv
 import importlib.util
-import subprocess
+import runpy
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -39,7 +39,7 @@ WAYS = {
 
 @pytest.fixture(scope="module")
 def balls(tmp_path_factory) -> Capture:
-    made = make_balls(tmp_path_factory.mktemp("balls"), size=100, views=20, test_views=2)
+    made = make_balls(tmp_path_factory.mktemp("balls"), size=68, views=20, test_views=2)
     return replace(made, points=made.points[:: len(made.points) // FIRST][:FIRST])
 
 
@@ -51,7 +51,12 @@ def run(trainer: Trainer, steps: int | None = None) -> Trainer:
     return trainer
 
 
-@pytest.mark.parametrize("way", WAYS)
+LONG = ("no attributes", "one base colour")
+
+
+@pytest.mark.parametrize(
+    "way", [pytest.param(way, marks=[pytest.mark.slow] * (way in LONG)) for way in WAYS]
+)
 def test_a_way_to_grow_gives_the_same_bits_whole_and_resumed(device, balls, way, tmp_path):
     settings = replace(BASE, **WAYS[way])
     whole = Trainer(device, balls, settings)
@@ -148,12 +153,25 @@ def test_a_checkpoint_with_one_channel_of_light_goes_on_with_one(device, balls, 
     np.testing.assert_allclose(device.download(drawn.color), shown, rtol=0, atol=2e-5)
 
 
-def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
-    root, out = Path(__file__).resolve().parents[3], tmp_path / "light.csv"
-    program = [sys.executable, "tools/colors/light.py", str(balls.folder), "--out", str(out)]
+def start(words: list[str], monkeypatch) -> None:
+    """A program of tools/, in this process."""
+    root = Path(__file__).resolve().parents[3]
+    monkeypatch.chdir(root)
+    monkeypatch.setattr(sys, "argv", words)
+    monkeypatch.setattr(sys, "path", [*sys.path])  # which it adds to
+    try:
+        runpy.run_path(words[0], run_name="__main__")
+    except SystemExit as ended:
+        assert not ended.code, ended.code
+
+
+@pytest.mark.slow
+def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path, monkeypatch):
+    out = tmp_path / "light.csv"
+    program = ["tools/colors/light.py", str(balls.folder), "--out", str(out)]
     # So many that photos are known to be alike, and light is learned: before, it is all zeros.
     program += ["--iterations", "160", "--max-anchors", "300"]
-    subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)
+    start(program, monkeypatch)
     rows = list(csv.DictReader(out.read_text().splitlines()[2:]))
     assert [row["modality"] for row in rows] == 2 * ["RGB", "Thermal", "mean"]
     size = [int(row["package_bytes"]) for row in rows]
@@ -162,12 +180,13 @@ def test_the_table_of_light_has_both_ways_from_their_packages(balls, tmp_path):
     assert all(float(row["psnr_db"]) > 10 for row in rows)
 
 
-def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path):
-    root, out = Path(__file__).resolve().parents[3], tmp_path / "growth.csv"
+@pytest.mark.slow
+def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path, monkeypatch):
+    out = tmp_path / "growth.csv"
     ways = ["no growth", "default"]
-    program = [sys.executable, "tools/training/growth.py", str(balls.folder), "--out", str(out)]
+    program = ["tools/training/growth.py", str(balls.folder), "--out", str(out)]
     program += ["--iterations", "90", "--grow-every", "30", "--max-anchors", "400", "--ways", *ways]
-    subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)
+    start(program, monkeypatch)
     lines = out.read_text().splitlines()
     assert lines[0].startswith("# python3 tools/training/growth.py ")
     rows = list(csv.DictReader(lines[2:]))

@@ -139,6 +139,7 @@ def test_runs_of_both_forms_learn_alike_and_each_keeps_its_bits(device, as_gpu, 
     np.testing.assert_allclose(gpu, cpu, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_growing_works_in_the_gpu_forms(as_gpu, balls):
     changes = {"grow": True, "grow_every": 20, "iterations": 120}
     few = replace(balls, points=balls.points[::100])  # which leaves room

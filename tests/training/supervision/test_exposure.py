@@ -297,6 +297,7 @@ def uneven(capture, folder, gains: np.ndarray):
     return read_capture(folder)
 
 
+@pytest.mark.slow
 def test_a_training_finds_the_brightness_of_its_photos(device, balls, tmp_path):
     """Planted gains of a tenth come back to a third of that; even heat stays as it is."""
     for name in ("rgb", "thermal"):

@@ -1,6 +1,8 @@
 """What stands still behind a turntable: found, told from what stands before, and cut out."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -115,16 +117,24 @@ def carried(photos: list[LoadedPhoto], where: np.ndarray) -> list[LoadedPhoto]:
     return out
 
 
-def photos_of(folder: Path, kind: str, seed: int, count: int = 28) -> list[LoadedPhoto]:
-    make_stranger(folder, kind, seed, (80, 60), count)
-    return load_photos(read_capture(folder), "train", 1, "ignore")
+@pytest.fixture(scope="module")
+def photos_of(tmp_path_factory) -> Callable[[str], list[LoadedPhoto]]:
+    """Of a kind 28 photos, traced once."""
+
+    @cache
+    def photos(kind: str) -> list[LoadedPhoto]:
+        folder = tmp_path_factory.mktemp(kind)
+        make_stranger(folder, kind, 1, (80, 60), 28)
+        return load_photos(read_capture(folder), "train", 1, "ignore")
+
+    return photos
 
 
 @pytest.mark.parametrize("what", ["rim", "bonnet"])
 @pytest.mark.parametrize("kind", ["room", "corridor", "aerial"])
-def test_what_a_camera_carries_before_it_is_said_and_kept(tmp_path, kind, what):
+def test_what_a_camera_carries_before_it_is_said_and_kept(photos_of, kind, what):
     """A photo without it would be wrong: behind the rim there is something."""
-    photos = carried(photos_of(tmp_path, kind, 1), rims(60, 80)[what])
+    photos = carried(photos_of(kind), rims(60, 80)[what])
     found = still_background(photos)
     assert found.share > 0.2 and not found.pictures
     (said,) = found.warnings()
@@ -132,21 +142,21 @@ def test_what_a_camera_carries_before_it_is_said_and_kept(tmp_path, kind, what):
     assert said.startswith(f"{found.share:.0%} of the photos' pixels")
 
 
-def test_one_photo_again_and_again_hides_nothing(tmp_path):
-    photos = photos_of(tmp_path, "turntable", 1)
+def test_one_photo_again_and_again_hides_nothing(photos_of):
+    photos = photos_of("turntable")
     same = [replace(photo, rgba=photos[0].rgba) for photo in photos]
     assert still_share(same) == 1.0
     assert not still_background(same).pictures
 
 
 @pytest.mark.parametrize("kind", ["room", "turntable"])
-def test_dirt_and_vignette_of_a_lens_change_nothing(tmp_path, kind):
+def test_dirt_and_vignette_of_a_lens_change_nothing(photos_of, kind):
     """Dark corners have one colour, specks are few."""
     y, x = np.mgrid[:60, :80]
     away = np.hypot(x - 40, y - 30)
     light = np.clip(1.6 - away / 35, 0, 1)  # black from 1.6 of the height away
     specks = RNG(0).random((60, 80)) < 0.02
-    photos = photos_of(tmp_path, kind, 1)
+    photos = photos_of(kind)
     dirty = []
     for photo in photos:
         rgba = photo.rgba.copy()
@@ -157,17 +167,17 @@ def test_dirt_and_vignette_of_a_lens_change_nothing(tmp_path, kind):
 
 
 @pytest.mark.parametrize("more, found", [(0.0, True), (1e-9, False)])
-def test_enough_must_be_hidden_at_times(tmp_path, monkeypatch, more, found):
-    photos = photos_of(tmp_path, "turntable", 1)
+def test_enough_must_be_hidden_at_times(photos_of, monkeypatch, more, found):
+    photos = photos_of("turntable")
     (picture,) = still_background(photos).pictures.values()
     assert picture.hidden > 1.5 * still.HIDDEN
     monkeypatch.setattr(still, "HIDDEN", picture.hidden + more)
     assert bool(still_background(photos).pictures) is found
 
 
-def test_outlines_must_belong_to_one_object(tmp_path):
+def test_outlines_must_belong_to_one_object(photos_of):
     """Poses of other photos: nothing is where all of them show something."""
-    photos = photos_of(tmp_path, "turntable", 1)
+    photos = photos_of("turntable")
     views = [photo.view for photo in photos]
     apart = [replace(p, view=views[(5 * i) % len(views)]) for i, p in enumerate(photos)]
     assert still_background(photos).pictures

@@ -190,13 +190,21 @@ def test_half_the_photos_by_chance_need_not_be_still():
         assert (still_picture(list(photos)).hidden > 0.5) == hidden
 
 
+@pytest.fixture(scope="module")
+def turntable(tmp_path_factory):
+    """(photos, where the tracer meets no solid, where a subject) of a turntable."""
+    folder = tmp_path_factory.mktemp("turntable")
+    place, _ = make_stranger(folder, "turntable", 2, (160, 120), 32)
+    photos = load_photos(read_capture(folder), "train", 1, "auto")
+    masks = np.stack([mask_of(photo.view, place, 0) for photo in photos])
+    return photos, masks == 0, masks >= 0.5
+
+
 @pytest.mark.parametrize("camera", ["as traced", "noise", "JPEG"])
-def test_it_is_the_wall_that_the_tracer_drew(tmp_path, camera):
+def test_it_is_the_wall_that_the_tracer_drew(turntable, camera):
     """A photo in which the tracer meets no solid shows the wall there: known from outside."""
-    place, _ = make_stranger(tmp_path, "turntable", 2, (160, 120), 32)
-    photos = load_photos(read_capture(tmp_path), "train", 1, "auto")
+    photos, missed, true = turntable
     pixels, rng = [photo.rgba[..., :3] for photo in photos], RNG(0)
-    missed = np.stack([mask_of(photo.view, place, 0) == 0 for photo in photos])
     first = missed.argmax(axis=0)[None, ..., None]
     wall = np.take_along_axis(np.stack(pixels), first, axis=0)[0].astype(int)
     if camera == "noise":
@@ -210,7 +218,6 @@ def test_it_is_the_wall_that_the_tracer_drew(tmp_path, camera):
     assert (away[behind] <= found.tolerance + 1).mean() > 0.93
     # What three in ten photos show is found, but where the wall has the subject's colours.
     assert found.known[missed.mean(axis=0) >= 0.3].mean() > 0.95
-    true = np.stack([mask_of(photo.view, place, 0) >= 0.5 for photo in photos])
     masks = np.stack([subject_mask(p, found) for p in pixels])
     overlap = (masks & true).sum(axis=(1, 2)) / (masks | true).sum(axis=(1, 2))
     assert np.median(overlap) > 0.93

@@ -122,7 +122,8 @@ def compared(saved: SceneFile, file: SceneFile) -> tuple[bool, bool]:
     if saved is file:
         return False, False
     changed = edits.changes(saved, file)
-    names = ("floor_y", "view", "views", "gravity_m_s2", "appearance", "sky", "sections")
+    names = ("floor_y", "view", "views", "gravity_m_s2", "appearance", "sky", "sections",
+             "upright")  # fmt: skip
     scene = any(getattr(file, name) != getattr(saved, name) for name in names)
     return bool(changed) or scene, scene or any(change.fields != {"x"} for change in changed)
 

@@ -8,7 +8,7 @@ from shapeshift.renderer.settings import RenderSettings
 from tests.support.renderer.poison_judge import judge
 from tests.support.splat_scenes import alone, front_view, random_layers
 
-SEEDS = 300
+SEEDS = 100
 MANY = 8000
 WAYS = {
     "default": {},

@@ -1,4 +1,4 @@
-"""Two visits drawn from the same cameras: colours, depths, degrees."""
+"""Two visits, each drawn from where it was photographed: colours, depths, degrees."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,11 +15,14 @@ from shapeshift.app.inspection.draw_values import (
     measured_scene,
 )
 from shapeshift.renderer.surface import SOLID
-from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.eyes import eyes_of, looks_of
+from shapeshift.runtime_models.model import Model, Stop
 from shapeshift.scene.cameras.framing import fit_distance, view_from
-from shapeshift.scene.change.seen_pair import SeenPair, SeenSide
+from shapeshift.scene.cameras.own_cameras import FAR, NEAR
+from shapeshift.scene.change.places import LEAST_VIEWS
+from shapeshift.scene.change.seen import SeenSide, SeenVisit
 from shapeshift.scene.change.similarity import Similarity
-from shapeshift.scene.pose import View
+from shapeshift.scene.pose import MOST_SIDE, Pose, View
 from shapeshift.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
 Progress = Callable[[str, float], None]  # what is done, part 0..1
 FOV_Y = 0.75  # radians
 # Elevations in degrees, and cameras around at each: as things are photographed that stand.
+MOST_VIEWS = 32  # of the photos' places: more say little that is new
+SAME_EYE = 1e-3  # of the way between the farthest cameras: so near, it is the same one
 RINGS = ((12.0, 10), (34.0, 10), (60.0, 6))
 
 
@@ -95,36 +100,62 @@ def rings_around(centre: np.ndarray, radius: float, size: tuple[int, int]) -> li
     return views
 
 
-def draw_side(
-    renderer: "Renderer", visit: Visit, views: list[View], a_from_b: Similarity, heat: bool,
-    what: str, progress: Progress,
-) -> list[SeenSide]:  # fmt: skip
-    """A visit in views of A's world; heat: with its values.  what: it is called to progress."""
+def photographed_views(model: Model, size: tuple[int, int]) -> list[View]:
+    """From where a model's photos were taken, at most MOST_VIEWS, far from one another, with as
+    many pixels as a size (W, H); none: it does not say.
+    """
+    views = []
+    for eye, look in list(zip(eyes_of(model), looks_of(model), strict=False))[:MOST_VIEWS]:
+        left, right, down, up = map(float, look[4:])
+        width = np.sqrt(size[0] * size[1] * (right - left) / (up - down))
+        sides = (max(round(width), 1), max(round(size[0] * size[1] / width), 1))
+        if max(sides) > MOST_SIDE:
+            continue  # a slit
+        pose = Pose(eye, look[:4] / np.linalg.norm(look[:4]))
+        views.append(View(pose, (left, right, down, up), NEAR, FAR, sides))
+    return views
+
+
+def own_views(
+    visit: Visit, given: list[View] | None, size: tuple[int, int]
+) -> tuple[list[View], bool]:
+    """From where to look at a visit, in its own world, and whether its photos were taken from
+    there: what it says itself, those of the given where it was photographed, all given, or rings.
+    """
+    model = visit.document.models[0]
+    if views := photographed_views(model, size):
+        return views, True
+    if given is None:
+        return rings_around(*visit.document.bounds(), size), False
+    eyes, at = eyes_of(model), np.array([view.world_from_eye.position for view in given])
+    if len(eyes):
+        off = np.linalg.norm(at[:, None] - eyes, axis=2).min(axis=1)
+        own = np.flatnonzero(off <= SAME_EYE * np.ptp(eyes, axis=0).max())
+        if len(own) >= LEAST_VIEWS:
+            return [given[i] for i in own[:MOST_VIEWS]], True
+    return given, False
+
+
+def see(
+    renderer: "Renderer", visit: Visit, views: tuple[list[View], bool], a_from_own: Similarity,
+    heat: bool, what: str, progress: Progress,
+) -> SeenVisit:  # fmt: skip
+    """A visit drawn in views of its own world; heat: with its values.  what: it is called to
+    progress.
+    """
     sides = []
-    own = [a_from_b.view_in_b(view) for view in views]
     shape = visit.shape
-    for i, view in enumerate(own):
-        progress(f"drawing {what}", i / len(own))
+    for i, view in enumerate(views[0]):
+        progress(f"drawing {what}", i / len(views[0]))
         renderer.update(shape)
         renderer.draw([view])
         rgba = renderer.image(0).astype(np.float64)
         color = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
-        depth = renderer.surface(view).depth(SOLID).astype(np.float64) * a_from_b.scale
+        depth = renderer.surface(view).depth(SOLID).astype(np.float64)
         sides.append(SeenSide(np.clip(color, 0, 1), rgba[..., 3], depth))
     if heat and visit.measured is not None:
-        for i, view in enumerate(own):
-            progress(f"drawing the heat of {what}", i / len(own))
+        for i, view in enumerate(views[0]):
+            progress(f"drawing the heat of {what}", i / len(views[0]))
             seen = draw_values(renderer, visit.measured, view)
             sides[i] = replace(sides[i], value=seen.values)
-    return sides
-
-
-def draw_pair(
-    renderer: "Renderer", before: Visit, after: Visit, view: View, a_from_b: Similarity
-) -> SeenPair:
-    """Both visits in one view of A's world."""
-    silent: Progress = lambda what, part: None  # noqa: E731
-    itself = Similarity.identity()
-    first = draw_side(renderer, before, [view], itself, True, "A", silent)
-    second = draw_side(renderer, after, [view], a_from_b, True, "B", silent)
-    return SeenPair(view, first[0], second[0])
+    return SeenVisit(views[0], sides, a_from_own, views[1])
