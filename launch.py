@@ -74,7 +74,8 @@ def hand_over(python, arguments):
 
 def pytest_words(arguments):
     """What pytest is started with: in two processes where all tests run and there are two cores."""
-    together = set(arguments) <= WHOLE_SUITE and (os.cpu_count() or 1) >= 2
+    choosing = [a for a in arguments if a not in WHOLE_SUITE and not a.startswith("--durations=")]
+    together = not choosing and (os.cpu_count() or 1) >= 2
     return ["-m", "pytest", *(TWO_PROCESSES if together else []), *arguments]
 
 

@@ -14,22 +14,24 @@ from shapeshift.decomposition.completion.complete import (
     only_background,
 )
 from shapeshift.decomposition.completion.plane import (
-    CELL,
-    ROOM,
-    AnchorLooks,
     Plane,
     looks_of,
     support_plane,
 )
 from shapeshift.decomposition.completion.verify import PhotoView
 from shapeshift.decomposition.partition import LabelledView
+from shapeshift.decomposition.proxies.ground import (
+    ground_mesh,
+    seen_depths,
+    seen_planes,
+)
 from shapeshift.decomposition.proxies.silhouettes import SilhouetteScore, score_silhouettes
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.parts import part_of
+from shapeshift.scene.colliders.carve import Sight
 from shapeshift.scene.colliders.collider import Collider, Making, collider_of_mesh, mesh_of_splats
-from shapeshift.scene.colliders.collider_wrap import join_meshes
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume
 from shapeshift.scene.colliders.cut_apart import apart
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
@@ -131,18 +133,22 @@ def assemble(
     shadows: bool = False,
     background: tuple[float, float, float] = (0.0, 0.0, 0.0),
     making: Making | None = None,
+    sights: Sequence[Sight] = (),
 ) -> Assembled:
     """Proxies, ground and completed background of a labelled model.
 
     objects: the labels that get a proxy, with a mesh file of the user's where there is one, which
-    is a candidate, too.  completed: whether the background is filled.  Raises BadFile, ValueError.
+    is a candidate, too.  completed: whether the background is filled.  sights: where photos were
+    taken from, small; what is solid is carved by what they see.  Raises BadFile, ValueError.
     """
     if model.labels is None:
         raise ValueError("the model has no labels of objects; partition it first.")
     making = making or Making()
     looks, x = looks_of(model), model.stops[0].x
     found = {label: support_plane(looks, model.labels, label) for label in objects}
+    seen = seen_depths(device, model, sights, x, making)
     planes = {label: plane for label, plane in found.items() if isinstance(plane, Plane)}
+    planes = seen_planes(planes, seen, looks.spacing_m)
     proxies, failed = {}, {}
     for done, (label, given) in enumerate(objects.items()):
         making.report("making what is touched of objects", done / max(len(objects), 1))
@@ -171,8 +177,9 @@ def assemble(
     ]
     hollow = replace(making, hollow=True, faces=BACKGROUND_FACES)
     ground = ground_mesh(
-        only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing
-    )
+        only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing,
+        seen,
+    )  # fmt: skip
     return Assembled(whole, proxies, ground, tuple(told), failed, planes)
 
 
@@ -209,135 +216,6 @@ def corners_of(proxy: Proxy, model: AnchorModel, label: int) -> np.ndarray:
     """(V, 3) metres, the model's frame: of all pieces of what is touched of an object."""
     _, at = part_of(model, label)
     return np.concatenate([np.asarray(each, np.float64) for each in proxy.collider.parts]) + at
-
-
-# What the physics touches of the background: flat where things stood, a skin around the rest.
-#
-# The skin around splats is bumpy by some millimetres, and open where a thing was taken out: what
-# stands on it would rock, or fall through.
-
-THICK = 4.0  # sides of a cell: of the slab below a plane
-SUNK = 2.0  # sides of a cell that the skin near a plane is kept below it: out of all contacts
-NEAR = 1.5  # sides of a cell above and below, in which the skin counts as the plane's
-SAME_ANGLE, SAME_OFFSET = 0.999, 1.0  # cosine, sides of a cell: planes that are one
-
-
-def ground_mesh(
-    background: AnchorModel,
-    looks: AnchorLooks,
-    labels: np.ndarray,
-    planes: Sequence[Plane],
-    x: float,
-    making: Making,
-    standing: Sequence[tuple[Plane, np.ndarray]] = (),
-) -> TriangleMesh:
-    """The background's mesh, in the model's frame: slabs under the planes, and the skin.
-
-    background: without the objects.  looks, labels (A,): of the whole model, so that a slab lies
-    under the things, too.  standing: the plane that each object stands on, and the corners (V, 3)
-    of what is touched of it; no skin is left within them, or the object would jump out of it.
-    Raises BadFile where nothing can be touched.
-    """
-    skin = mesh_of_splats(*Evaluator(background).geometry(x), making)
-    side = CELL * looks.spacing_m
-    vertices, slabs = skin.vertices.astype(np.float64), []
-    for plane in distinct(planes, side):
-        low, covered = covered_cells(looks, labels, plane, side)
-        slabs.append(slab(plane, low, covered, side))
-        cells = ((vertices @ plane.axes().T - low) / side).astype(int)
-        inside = np.asarray(((cells >= 0) & (cells < covered.shape)).all(1))
-        inside[inside] = covered[tuple(cells[inside].T)]
-        height = plane.height(vertices)
-        low_skin = inside & (np.abs(height) < NEAR * side)
-        vertices[low_skin] -= (height[low_skin, None] + SUNK * side) * plane.normal
-    for plane, corners in standing:
-        within = is_within(vertices, corners, side)
-        height = plane.height(vertices[within])
-        vertices[within] -= np.maximum(height + SUNK * side, 0)[:, None] * plane.normal
-    return join_meshes([TriangleMesh(vertices.astype(np.float32), skin.faces), *slabs])
-
-
-def is_within(places: np.ndarray, corners: np.ndarray, margin: float) -> np.ndarray:
-    """(N,) bool: the places (N, 3) in the convex hull of corners (V, 3), or so many metres off it.
-
-    Fur and carpets make a skin that stands above the plane around a thing and reaches into it.
-    """
-    from scipy.spatial import ConvexHull
-
-    low, high = corners.min(0) - margin, corners.max(0) + margin
-    near = np.flatnonzero(((places > low) & (places < high)).all(1))
-    equations = ConvexHull(corners).equations  # (F, 4) outward normals
-    inside = (places[near] @ equations[:, :3].T + equations[:, 3] < margin).all(1)
-    found = np.zeros(len(places), bool)
-    found[near[inside]] = True
-    return found
-
-
-def distinct(planes: Sequence[Plane], side: float) -> list[Plane]:
-    """One of several that are nearly the same."""
-    found: list[Plane] = []
-    for plane in planes:
-        same = (
-            plane.normal @ other.normal > SAME_ANGLE
-            and abs(plane.offset - other.offset) < SAME_OFFSET * side
-            for other in found
-        )
-        if not any(same):
-            found.append(plane)
-    return found
-
-
-def covered_cells(
-    looks: AnchorLooks, labels: np.ndarray, plane: Plane, side: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """(2,) metres along the plane's axes, and the cells (X, Y) bool from there that carry."""
-    from scipy import ndimage
-
-    height = plane.height(looks.places)
-    on = looks.there & (np.abs(height) < side) & ((labels == 0) | (height < side))
-    flat = looks.places[on] @ plane.axes().T
-    low = flat.min(0) - ROOM * side
-    shape = np.ceil((flat.max(0) - low) / side).astype(int) + ROOM
-    cells = np.zeros(shape, bool)
-    cells[tuple(((flat - low) / side).astype(int).T)] = True
-    cells = ndimage.binary_fill_holes(ndimage.binary_closing(cells, iterations=2))
-    pieces, count = ndimage.label(cells)
-    sizes = np.bincount(pieces.ravel(), minlength=count + 1)
-    sizes[0] = 0
-    return low, without_diagonals(sizes[pieces] >= 0.05 * sizes.max())
-
-
-def without_diagonals(cells: np.ndarray) -> np.ndarray:
-    """The cells with more taken where two touch at a corner alone: else no solid has that edge."""
-    cells = cells.copy()
-    while True:
-        a, b, c, d = cells[:-1, :-1], cells[1:, :-1], cells[:-1, 1:], cells[1:, 1:]
-        rising, falling = a & d & ~b & ~c, b & c & ~a & ~d
-        if not (rising.any() or falling.any()):
-            return cells
-        cells[1:, :-1] |= rising
-        cells[:-1, :-1] |= falling
-
-
-def slab(plane: Plane, low: np.ndarray, cells: np.ndarray, side: float) -> TriangleMesh:
-    """A closed plate under the cells (X, Y) bool, its upper face on the plane."""
-    wide = np.pad(cells, 1)
-    width = cells.shape[1] + 1
-    x, y = np.nonzero(cells)
-    corner = np.stack([x * width + y, (x + 1) * width + y, (x + 1) * width + y + 1,
-                       x * width + y + 1], 1)  # fmt: skip
-    below = (cells.shape[0] + 1) * width
-    faces = [corner[:, [0, 1, 2]], corner[:, [0, 2, 3]]]
-    faces += [corner[:, [0, 2, 1]] + below, corner[:, [0, 3, 2]] + below]
-    for k, (i, j) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):  # the side from corner k on
-        rim = ~wide[x + 1 + i, y + 1 + j]
-        a, b = corner[rim, k], corner[rim, (k + 1) % 4]
-        faces += [np.stack([a, a + below, b + below], 1), np.stack([a, b + below, b], 1)]
-    grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in cells.shape), indexing="ij"), -1)
-    flat = (low + grid.reshape(-1, 2) * side) @ plane.axes() + plane.offset * plane.normal
-    vertices = np.concatenate([flat, flat - THICK * side * plane.normal])
-    used, rows = np.unique(np.concatenate(faces), return_inverse=True)
-    return TriangleMesh(vertices[used].astype(np.float32), rows.reshape(-1, 3).astype(np.int32))
 
 
 # The mesh around what photos show of an object, cut where it stood.

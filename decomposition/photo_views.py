@@ -15,11 +15,14 @@ from shapeshift.decomposition.partition import LabelledView, gather_evidence
 from shapeshift.decomposition.segment_scene import Segmented, factor_of
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.evidence import SILENT
-from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.runtime_models.model import AnchorModel, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.colliders.carve import Sight
 
 MOST_VIEWS = 24  # that verify and score: well spread, they say what all would
+MOST_SIGHTS, SIGHT_SIDE = 80, 160  # photos that carve what is free, pixels of their longest side
 
 
 def photo_views(
@@ -53,6 +56,18 @@ def photo_views(
         labelled = LabelledView(view, stop.x, labels, photo.path)
         views.append(PhotoView(labelled, pixels if fits else None))
     return views
+
+
+def sights_of(capture: Capture, stops: tuple[Stop, ...]) -> list[Sight]:
+    """MOST_SIGHTS photos, evenly, in few pixels; of those of the first stop with measured depth."""
+    sights = []
+    for photo in evenly(list(capture.photos), MOST_SIGHTS):
+        factor = max(-(-max(photo.view.size) // SIGHT_SIDE), 1)
+        measured = None
+        if photo.depth is not None and stop_of(photo, stops).x == stops[0].x:
+            measured = load_depth(photo, factor)
+        sights.append(Sight(photo.view.divided(factor), measured))
+    return sights
 
 
 def evenly(photos: list[Photo], most: int) -> list[Photo]:

@@ -30,7 +30,7 @@ class DepthFrame:
 
     frame: RasterFrame
     surface: "Array"  # (N, 8) float32
-    metres: "Array"  # (H, W) float32, the sum of alpha T z: depth times coverage
+    metres: "Array"  # (H, W) float32, the sum of alpha T z: depth times coverage; or the quantile
 
 
 def surface(
@@ -107,8 +107,13 @@ def rasterize_depth(
     size: tuple[int, int],
     background: tuple[float, float, float] = (0.0, 0.0, 0.0),
     form: str | None = None,
+    light_left: float | None = None,
 ) -> DepthFrame:
-    """What `rasterize` draws, and depth."""
+    """What `rasterize` draws, and depth.
+
+    light_left: in place of its sum the depth behind which no more than that share of the light is
+    left, 0 where there is none: thin fog before a wall does not move it.  It has no gradient.
+    """
     width, height = size
     number = tiles.grid[0] * tiles.grid[1]
     image, transmittance = device.empty((3, height, width)), device.empty((height, width))
@@ -116,7 +121,12 @@ def rasterize_depth(
     form = form or device.kind
     file, group, _ = FORMS[form]
     blocks = room_for_blocks(device, tiles, form)
-    kernel = device.program(file, **WITH_DEPTH, **defines_of(device, form))["rasterize"]
+    defines = (
+        WITH_DEPTH
+        | ({} if light_left is None else {"LIGHT_LEFT": float(light_left)})
+        | defines_of(device, form)
+    )
+    kernel = device.program(file, **defines)["rasterize"]
     device.launch(
         kernel, number * group, group,
         width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,

@@ -32,6 +32,8 @@ class Options:
     from 0 to 1.  Default: what the scene file says for each."""
     seconds: float | None = None
     """How long.  Default: two seconds more than the script."""
+    rough: bool = False
+    """Begin at once: what has no collider yet is touched as one hull, not cut into pieces."""
     pictures: int = 0
     """A picture every so many steps of 1/90 s; 0: none."""
     size: Annotated[str, SIZE] = "640x360"
@@ -62,7 +64,7 @@ def run(options: Options) -> int:
     if not 0 < seconds <= LONGEST_S:
         raise UsageError(f"--seconds is {seconds:g}; above 0 and at most a day is wanted.")
     steps = math.ceil(seconds * HZ - 1e-6)
-    simulation = make_simulation(file, acts, options.x)
+    simulation = make_simulation(file, acts, options.x, options.rough)
     every = options.pictures
     paths = [options.out / f"{i:05d}.png" for i in range(0, steps + 1, every)] if every else []
     result = options.out / RESULT
@@ -90,7 +92,7 @@ def refuse_model(path: Path, command: str = "simulate moves the objects") -> Non
         )
 
 
-def make_simulation(file, acts: tuple, x: str = ""):
+def make_simulation(file, acts: tuple, x: str = "", rough: bool = False):
     """The scene with its models, bodies and physics.  Raises BadFile, UsageError."""
     from shapeshift.app.document import file_at
     from shapeshift.app.opening import PATIENCE_S, progress_after, sentence
@@ -105,7 +107,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
     with progress_after(PATIENCE_S) as shown:
         file, models = read_models(file, Reading(progress=shown))
         file = file_at(file, models, x) if x else file
-        colliders = colliders_of(file, models, shown)
+        colliders = colliders_of(file, models, shown, rough)
     world = World(file, models, colliders, hz=HZ)
     begin(world)
     print_findings(models)

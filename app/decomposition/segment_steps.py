@@ -60,7 +60,7 @@ def completed(
     """
     from shapeshift.app.training.evaluate import trained_downscale
     from shapeshift.decomposition.assemble import assemble
-    from shapeshift.decomposition.photo_views import photo_views, row_evidence
+    from shapeshift.decomposition.photo_views import photo_views, row_evidence, sights_of
     from shapeshift.runtime_models.model import AnchorModel
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.document.scene_file import HULLS
@@ -78,6 +78,7 @@ def completed(
         shadows=settings.shadows,
         background=default_background(found.model, capture.background or (0.0, 0.0, 0.0)),
         making=Making(progress=lambda what, part: settings.progress(what, int(100 * part), 100)),
+        sights=sights_of(capture, found.model.stops),
     )  # fmt: skip
     names = {part.spec.label: part.spec.name for part in found.parts}
     for sentence in sentences_of(made, names):

@@ -134,7 +134,7 @@ def open_xr(path: Path, options: ReadingOptions, x: str = "") -> tuple[Document,
     file, models, scene = open_scene_file(path, options)
     file = file_at(file, models, x) if x else file
     with progress_after(PATIENCE_S) as progress:
-        colliders = colliders_of(file, models, progress)
+        colliders = colliders_of(file, models, progress, rough=True)  # exact ones come
     world = World(file, models, colliders, hz=HZ)
     begin(world)
     for finding in world.findings:

@@ -19,10 +19,13 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import Camera, project
 from shapeshift.rasterizer.raster import rasterize_rgba
+from shapeshift.rasterizer.surface import rasterize_depth, surface
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.pose import View
+
+LEFT = 0.7  # of the light: a surface of splats has a thickness, and one looks at its skin
 
 # Pictures of a model with the OpenCL tiles, one view after the other.
 
@@ -62,6 +65,29 @@ class ModelPictures:
         picture = self._rasterize(view, color).astype(np.float64)
         seen = picture[..., 3] > 0
         return np.where(seen, picture[..., 0] / np.where(seen, picture[..., 3], 1), 0.0)
+
+    def depth(self, view: View, x: Controls, marked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(H, W) metres along the view behind which LEFT of the light is left, Inf where more is;
+        and (H, W) the share of each pixel that the marked splats (N,) show.
+        """
+        width, height = view.size
+        if self._empty:
+            return np.full((height, width), np.inf, np.float32), np.zeros((height, width))
+        self._decode(x)
+        color = np.zeros((len(self._means), 3), np.float32)
+        color[:, 0] = marked
+        means, scales, wxyz, opacity = self._geometry
+        colors = self._device.upload(color)
+        camera = Camera(*view.pinhole(), view.size, view.near)
+        projected = project(self._device, means, scales, wxyz, opacity, colors, camera)
+        tiles = bin_tiles(self._device, projected, view.size)
+        surfaces = surface(self._device, means, scales, wxyz, camera, projected)
+        drawn = rasterize_depth(
+            self._device, projected, tiles, surfaces, view.size, light_left=LEFT
+        )
+        metres = self._device.download(drawn.metres)
+        share = self._device.download(drawn.frame.image)[0].copy()
+        return np.where(metres > 0, metres, np.float32(np.inf)), share
 
     def _decode(self, x: Controls) -> None:
         """Geometry at x, kept on the device."""

@@ -33,7 +33,8 @@ inline Depths depth_under(const float8 f, floatp dx, floatp dy) {
 }
 #endif
 
-// SURFACE: with a depth a splat (surface.cl), metres become the sum of alpha T z.
+// SURFACE: with a depth a splat (surface.cl), metres become the sum of alpha T z; with LIGHT_LEFT
+// the depth of the splat behind which no more light than that is left, 0 where there is none.
 __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
@@ -74,7 +75,12 @@ __kernel void rasterize(RASTERIZE_TAKES, __global uint* drawn_blocks) {
         G[k] = fma(w, s[GREEN], G[k]);
         B[k] = fma(w, s[BLUE], B[k]);
 #ifdef SURFACE
-        Z[k] = fma(w, fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7), Z[k]);
+        const floatp z = fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7);
+#ifdef LIGHT_LEFT
+        Z[k] = select(Z[k], z, (T[k] > LIGHT_LEFT) & (T[k] - w <= LIGHT_LEFT));
+#else
+        Z[k] = fma(w, z, Z[k]);
+#endif
 #endif
         // T (1 - alpha).
         T[k] -= w;

@@ -73,7 +73,12 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
 #endif
 #ifdef SURFACE
       const float8 f = vload8(splat_of[j], surface);
-      depth += w * fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7);
+      const float z = fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7);
+#ifdef LIGHT_LEFT
+      if (T > LIGHT_LEFT && T - w <= LIGHT_LEFT) depth = z;
+#else
+      depth += w * z;
+#endif
 #endif
       // T (1 - alpha).
       T -= w;

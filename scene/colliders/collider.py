@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.evaluate import Evaluator
-from shapeshift.runtime_models.fit_harmonics import spread_directions
 from shapeshift.runtime_models.model import BadFile, Model, ScaffoldModel
-from shapeshift.runtime_models.rotation import normalize, rotation_matrices
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.colliders.collider_cache import content_key, read_cached, write_cached
 from shapeshift.scene.colliders.collider_pieces import Pieces, hull_faces, read_pieces
-from shapeshift.scene.colliders.collider_wrap import CELLS, is_watertight, join_meshes, volume, wrap
+from shapeshift.scene.colliders.collider_wrap import is_watertight, join_meshes, volume, wrap
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume, solid_parts
+from shapeshift.scene.colliders.fill_splats import fill_splats, hull_points, nothing_to_touch
 from shapeshift.scene.colliders.read_mesh import read_mesh
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh, sample_faces
 
@@ -36,6 +35,7 @@ Progress = Callable[[str, float], None]
 class Collider:
     parts: tuple[np.ndarray, ...]  # each (V, 3) float32 metres, object frame; 1 to 16 of them
     mesh: TriangleMesh  # watertight, the same frame
+    rough: bool = False  # one hull that stands in until the pieces are made
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,7 @@ class Making:
     most_parts: int = MOST_PARTS
     hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
     kept: bool = True  # False: nothing is read from the user's cache or written to it
+    rough: bool = False  # what was made before, else one hull, in a tenth of a second; never cut
     progress: Progress | None = None  # (what is being done, part done 0..1); may raise to end it
 
     def report(self, what: str, part: float) -> None:
@@ -66,7 +67,9 @@ def collider_of_splats(
     """
     making = making or Making()
     columns = (means, scales, wxyz, opacity)
-    return cached_or_made(making, columns, lambda: mesh_of_splats(*columns, making))
+    return cached_or_made(
+        making, columns, lambda: mesh_of_splats(*columns, making), lambda: hull_points(*columns)
+    )
 
 
 def collider_of_model(
@@ -97,7 +100,10 @@ def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:
     given = pieces.skin if pieces else read_mesh(path)
     if making.hollow:  # the physics takes any triangles that stay where they are
         return Collider(around(given), given)
-    return cached_or_made(making, (given.vertices, given.faces), lambda: closed_mesh(given, making))
+    return cached_or_made(
+        making, (given.vertices, given.faces), lambda: closed_mesh(given, making),
+        lambda: given.vertices,
+    )  # fmt: skip
 
 
 def collider_of_pieces(pieces: Pieces) -> Collider:
@@ -110,9 +116,10 @@ def collider_of_pieces(pieces: Pieces) -> Collider:
 
 
 def cached_or_made(
-    making: Making, columns: tuple[np.ndarray, ...], make: Callable[[], TriangleMesh]
-) -> Collider:
-    """From a cache if it was made before, else made now and kept."""
+    making: Making, columns: tuple[np.ndarray, ...], make: Callable[[], TriangleMesh],
+    hull: Callable[[], np.ndarray],
+) -> Collider:  # fmt: skip
+    """From a cache if it was made before, else made now and kept; a rough one of points (V, 3)."""
     if not (making.faces >= 12 and 1 <= making.most_parts <= 64):
         raise ValueError(
             f"a collider of {making.faces} faces and {making.most_parts} parts is asked for; at "
@@ -121,6 +128,9 @@ def cached_or_made(
     settings = f"{VERSION} {making.faces} {making.most_parts} {making.hollow}"
     key = content_key(settings, *columns) if making.kept else ""
     made = read_cached(key) if making.kept else None
+    if made is None and making.rough and not making.hollow:
+        parts, mesh = one_hull(hull())
+        return Collider(parts, mesh, True)
     if made is None:
         mesh = make()
         parts, finished = around(mesh), True
@@ -131,6 +141,16 @@ def cached_or_made(
             write_cached(key, made)
     making.report("making a collider", 1.0)
     return Collider(*made)
+
+
+def one_hull(points: np.ndarray) -> tuple[tuple[np.ndarray, ...], TriangleMesh]:
+    """The hull of points (V, 3), nowhere thinner than an engine can hold, as the only piece."""
+    mesh = TriangleMesh(points.astype(np.float32), np.zeros((0, 3), np.int32))
+    parts = solid_parts([points], mesh, 1)
+    if not parts:  # a single place
+        mesh = box_around(points)
+        return (mesh.vertices,), mesh
+    return parts, TriangleMesh(parts[0], hull_faces(parts[0]))
 
 
 def around(mesh: TriangleMesh) -> tuple[np.ndarray, ...]:
@@ -149,10 +169,7 @@ def mesh_of_splats(
     making.report("looking for what is solid", 0.0)
     filling = fill_splats(means, scales, wxyz, opacity)
     if not len(filling.points):
-        raise BadFile(
-            f"none of {len(means):,} splats is opaque enough to be touched; name a mesh file as "
-            "the object's collider, or choose another x."
-        )
+        raise BadFile(nothing_to_touch(len(means)))
     if filling.splats < FEWEST_SPLATS or not filling.cell_m > 0:
         return box_around(filling.points)
     skin = wrap(filling.points, filling.cell_m, making.faces, making.report, making.hollow)
@@ -195,182 +212,3 @@ def box_around(points: np.ndarray) -> TriangleMesh:
 def parts_volume(collider: Collider) -> float:
     """Cubic metres of all parts together; where two overlap, that counts twice."""
     return sum(hull_volume(hull) for hull in collider.parts)
-
-
-# Points that fill the splats of an object, without floaters: what a collider is wrapped around.
-
-OPAQUE = 0.3  # opacity; a fainter splat counts where several together stop as much light
-FAINT = 0.02  # a fainter one never counts
-WIDEST = 0.25  # of the object's longest side; a wider splat is haze
-NEIGHBOURS = 8
-LONELY = 3.0  # times the usual distance to its neighbours: a floater
-LONELIER = 2.0  # times the distance that its neighbours have to theirs
-BESIDE = 2.5  # times its own size: with neighbours so near it is none
-SPACING = 1.3  # cells are no smaller than this times the distance between splats
-COARSEST = 24  # cells along the longest side, however few splats there are
-MOST_LOOKED_AT = 300_000  # splats for distances
-NEEDLE = 4.0  # cells from its centre that a splat reaches where it is alone
-CLASSES = (1, 12, 48, 192, 768)  # points a splat gets, by its size in cells
-
-
-@dataclass(frozen=True)
-class Filling:
-    points: np.ndarray  # (M, 3) float64 metres
-    cell_m: float  # what the points are dense enough for
-    splats: int  # that they come from
-
-
-NOTHING = Filling(np.zeros((0, 3)), 0.0, 0)
-
-
-def fill_splats(
-    means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
-) -> Filling:
-    """Points within one sigma of the splats that count.  (N, 3) metres twice, (N, 4), (N,)."""
-    known = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & np.isfinite(wxyz).all(1)
-    rows = np.flatnonzero(known & (opacity >= FAINT))
-    if not len(rows):
-        return NOTHING
-    solid = solid_or_all(opacity[rows])
-    kept = in_the_object(means[rows], solid)
-    rows = rows[kept]
-    solid = solid_or_all(opacity[rows])
-    longest = np.ptp(means[rows[solid]], axis=0).max()
-    slender = scales[rows].max(1) <= WIDEST * longest
-    if (slender & solid).any():
-        rows, solid = rows[slender], solid[slender]
-    rows, solid, spacing = without_lonely(means, scales, rows, solid)
-    if not len(rows):
-        return NOTHING
-    reach = np.ptp(means[rows], axis=0) + 2 * np.median(scales[rows].max(1))
-    cell_m = float(max(reach.max() / CELLS, min(SPACING * spacing, reach.max() / COARSEST)))
-    if not cell_m > 0:
-        return Filling(means[rows].astype(np.float64), 0.0, len(rows))
-    axes = rotation_matrices(normalize(wxyz[rows].astype(np.float64))) * scales[rows, None, :]
-    centres = means[rows].astype(np.float64)
-    points = scatter(centres, axes, scales[rows], cell_m)
-    dense = keep_dense(points, opacity[rows], solid, centres, cell_m)
-    return Filling(dense, cell_m, len(rows))
-
-
-def solid_or_all(opacity: np.ndarray) -> np.ndarray:
-    """(n,) bool: the opaque ones; where all of them are faint, what is there counts."""
-    solid = opacity >= OPAQUE
-    return solid if solid.any() else np.ones(len(opacity), bool)
-
-
-def in_the_object(means: np.ndarray, solid: np.ndarray) -> np.ndarray:
-    """(n,) bool: not far outside of where nearly all of the solid ones are."""
-    low, high = np.percentile(means[solid], (1, 99), axis=0)
-    room = 0.25 * (high - low).max() + 0.25 * (high - low)
-    return ((means >= low - room) & (means <= high + room)).all(1)
-
-
-def without_lonely(
-    means: np.ndarray, scales: np.ndarray, rows: np.ndarray, solid: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """The rows and their `solid` without floaters, and the metres from a splat to the next.
-
-    A solid one needs solid neighbours; a faint one any, as it only counts where several add up.
-    """
-    centres = means[rows].astype(np.float64)
-    near = np.zeros(len(rows), bool)
-    near[solid], usual, spacing = neighboured(centres[solid], scales[rows[solid]])
-    if not solid.all():
-        near[~solid] = neighboured(centres, scales[rows], usual)[0][~solid]
-    return rows[near], solid[near], spacing
-
-
-def neighboured(
-    centres: np.ndarray, scales: np.ndarray, usual: float | None = None
-) -> tuple[np.ndarray, float, float]:
-    """(n,) bool: not lonely among themselves; the usual metres to neighbours, to the nearest one.
-
-    centres (n, 3) metres, scales (n, 3); usual: what others have as the usual distance.
-    """
-    from scipy.spatial import cKDTree
-
-    step = -(-len(centres) // MOST_LOOKED_AT)
-    tree = cKDTree(centres[::step])
-    count = min(NEIGHBOURS + 1, tree.n)
-    if count < 2:
-        return np.ones(len(centres), bool), 0.0, 0.0
-    away, which = (found[:, 1:] for found in tree.query(centres, k=count))
-    mean = away.mean(1)
-    usual = float(np.median(mean)) if usual is None else usual
-    of_theirs = mean[::step][which]  # (n, count - 1)
-    near = (mean <= LONELY * usual) & (mean <= LONELIER * np.median(of_theirs, axis=1))
-    near |= mean <= BESIDE * scales.max(1)
-    return near, usual, float(np.median(away[:, 0])) / step ** (1 / 3)
-
-
-def scatter(
-    means: np.ndarray, axes: np.ndarray, scales: np.ndarray, cell_m: float
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For each class of sizes: splats (n,), and their points (n, k, 3), at most a cell apart."""
-    order = np.sort(scales.astype(np.float64), axis=1)
-    wanted = 4 * np.pi * order[:, 2] * order[:, 1] / cell_m**2 + order[:, 2] * 4 / cell_m
-    kind = np.searchsorted(CLASSES[:-1], wanted)
-    found = []
-    for number, count in enumerate(CLASSES):
-        rows = np.flatnonzero(kind == number)
-        if len(rows):
-            ball = spread_directions(count) * radii(count)[:, None]
-            found.append((rows, means[rows, None] + ball @ np.swapaxes(axes[rows], 1, 2)))
-    return found
-
-
-def radii(count: int) -> np.ndarray:
-    """(count,) sigmas from the centre: two of three points on the outside, the rest within."""
-    if count == 1:
-        return np.zeros(1, np.float32)
-    return np.where(np.arange(count) % 3 == 2, 0.5, 1.0).astype(np.float32)
-
-
-def keep_dense(
-    points: list[tuple[np.ndarray, np.ndarray]],
-    opacity: np.ndarray,
-    solid: np.ndarray,
-    means: np.ndarray,
-    cell_m: float,
-) -> np.ndarray:
-    """(M, 3) the points of solid splats, and of faint ones in cells where they add up."""
-    found = [at[solid[rows]].reshape(-1, 3) for rows, at in points]
-    of = [np.repeat(rows[solid[rows]], at.shape[1]) for rows, at in points]
-    faint = [(rows[~solid[rows]], at[~solid[rows]]) for rows, at in points]
-    splat = np.concatenate([np.repeat(rows, at.shape[1]) for rows, at in faint])
-    if len(splat):
-        places = np.concatenate([at.reshape(-1, 3) for _, at in faint])
-        cells = ((places - places.min(0)) / cell_m).astype(np.int64)
-        size = cells.max(0) + 1
-        cell = (cells[:, 0] * size[1] + cells[:, 1]) * size[2] + cells[:, 2]
-        _, cell = np.unique(cell, return_inverse=True)
-        once = np.unique(cell * (len(opacity) + 1) + splat)  # a splat counts once in a cell
-        stopped = -np.log1p(-np.clip(opacity[once % (len(opacity) + 1)], 0, 0.99))
-        total = np.bincount(once // (len(opacity) + 1), stopped, cell.max() + 1)
-        enough = total[cell] >= -np.log1p(-OPAQUE)
-        found.append(places[enough])
-        of.append(splat[enough])
-    return without_needles(np.concatenate(found), np.concatenate(of), means, cell_m)
-
-
-def without_needles(
-    points: np.ndarray, splat: np.ndarray, means: np.ndarray, cell_m: float
-) -> np.ndarray:
-    """(m, 3) the points without ends of long splats that stand out where no other splat is.
-
-    points (M, 3), the splat (M,) of each, means (N, 3) of splats: metres.
-    """
-    from scipy import ndimage
-
-    if not len(points):
-        return points
-    cells = ((points - points.min(0)) / cell_m).astype(np.int64)
-    shape = cells.max(0) + 1
-    cell = np.ravel_multi_index(cells.T, shape)
-    lowest, highest = np.full(shape, len(means), np.int32), np.full(shape, -1, np.int32)
-    np.minimum.at(lowest.reshape(-1), cell, splat)
-    np.maximum.at(highest.reshape(-1), cell, splat)
-    alone = ndimage.minimum_filter(lowest, 3) == ndimage.maximum_filter(highest, 3)
-    far = np.linalg.norm(points - means[splat], axis=1) > NEEDLE * cell_m
-    return points[~(far & alone.reshape(-1)[cell])]

@@ -17,13 +17,16 @@ BACKGROUND_FACES = 10_000  # it stays where it is: the physics looks only at tho
 
 
 def colliders_of(
-    file: SceneFile, models: Mapping[str, Model], progress: Progress | None = None
+    file: SceneFile,
+    models: Mapping[str, Model],
+    progress: Progress | None = None,
+    rough: bool = False,
 ) -> dict[str, Collider]:
     """The collider of each object that has one, by its name; kept in the user's cache.
 
-    Raises BadFile that names the object.
+    rough: one hull where no pieces were made before.  Raises BadFile that names the object.
     """
-    making = Making(progress=progress)
+    making = Making(progress=progress, rough=rough)
     made: dict[tuple, Collider] = {}
     out: dict[str, Collider] = {}
     for item in file.all_items:

@@ -291,7 +291,7 @@ def is_closed(faces: np.ndarray) -> bool:
     """Whether as many faces (F, 3) run along every edge one way as the other."""
     if not len(faces):
         return False
-    start, end = faces.reshape(-1).astype(np.int64), faces[:, [1, 2, 0]].reshape(-1)
+    start, end = (faces[:, k].reshape(-1).astype(np.int64) for k in ([0, 1, 2], [1, 2, 0]))
     most = int(faces.max()) + 1
     return np.array_equal(np.sort(start * most + end), np.sort(end * most + start))
 

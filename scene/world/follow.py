@@ -68,7 +68,11 @@ def rename(world: World, wanted: Mapping[str, SceneItem]) -> None:
 
 def change(world: World, item: SceneItem, model: Model, collider) -> None:
     """One object becomes what its item says now."""
-    new = changed(world.objects[item.name].item, item)
+    old = world.objects[item.name]
+    new = changed(old.item, item)
+    if old.collider is not None and collider is not None and collider is not old.collider:
+        if not new & set(BODY):
+            other_pieces(world, old, model, collider)
     if not new:
         return
     label = world.objects[item.name].drawn.label
@@ -97,6 +101,16 @@ def stand_in(world: World, old: RigidObject, item: SceneItem, model: Model, coll
     world.add(item, model, collider, old.drawn.label)
     world.move_object(item.name, old.pose)
     world.control(item.name, old.reaction_state.x)
+
+
+def other_pieces(world: World, old: RigidObject, model: Model, collider) -> None:
+    """Exact pieces in the place of a rough hull, on their way as it was."""
+    speeds = world.physics.velocity(old.body_id) if old.moves else None
+    stand_in(world, old, old.item, model, collider)
+    new = world.objects[old.item.name]
+    if speeds is not None and new.body is not None:
+        world.physics.set_velocity(new.body, *speeds)
+    world.objects[old.item.name] = replace(new, reaction_state=old.reaction_state)
 
 
 def changed(before: SceneItem, after: SceneItem) -> set[str]:

@@ -55,15 +55,17 @@ def simulate(
     *,
     seconds: float | None = None,
     x: X | None = None,
+    rough: bool = False,
     progress: Progress | None = None,
 ) -> Iterator[Step]:
     """The objects of a scene file in motion, step by step of 1/90 s: gravity, contacts, reactions.
 
     scene: a scene file, or one that was opened and rearranged (`with_object`).  script: JSON lines
     of hands, grabs, rays and controls with times (docs/scene.md); None: all just falls.  seconds:
-    None is two more than the script.  x: where all sliders stand at the start.  progress: of the
-    colliders, which are made once and kept in the user's cache.  The same scene and script give the
-    same steps for ever.  Raises BadFile, UsageError before the first step.
+    None is two more than the script.  x: where all sliders stand at the start.  rough: what has
+    no collider yet is touched as one hull, at once.  progress: of the colliders, which are made
+    once and kept in the user's cache.  The same scene, script and colliders give the same steps for
+    ever.  Raises BadFile, UsageError before the first step.
 
         for step in ss.simulate("room.scene.json", seconds=2):
             print(step.seconds, step.events)
@@ -82,7 +84,7 @@ def simulate(
         seconds = (acts[-1].t if acts else 0.0) + AFTER_S
     if not 0 < seconds <= LONGEST_S:
         raise UsageError(f"seconds is {seconds:g}; above 0 and at most a day is wanted.")
-    simulation = Simulation(world_of(scene, progress), acts)
+    simulation = Simulation(world_of(scene, progress, rough), acts)
     return steps_of(scene, simulation, math.ceil(seconds * HZ - 1e-6))
 
 
@@ -112,7 +114,7 @@ def colliders(
         return make_colliders(options, lambda said: None, progress or (lambda what, part: None))
 
 
-def world_of(scene: OpenedScene, progress: Progress | None):
+def world_of(scene: OpenedScene, progress: Progress | None, rough: bool = False):
     """The bodies and physics of a scene file, each object's x as the scene has it."""
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document import edits
@@ -124,7 +126,7 @@ def world_of(scene: OpenedScene, progress: Progress | None):
     for obj in scene.objects:
         file = edits.change(file, obj.name, x=obj.x)
     models = {obj.name: obj.model for obj in scene.objects}
-    world = World(file, models, colliders_of(file, models, progress), hz=HZ)
+    world = World(file, models, colliders_of(file, models, progress, rough), hz=HZ)
     begin(world)
     return world
 

@@ -137,7 +137,7 @@ def test_our_own_stand_in_is_taken_again():
 
 @posix
 @pytest.mark.skipif(not Path("/proc/self/mountinfo").exists(), reason="needs Linux's namespaces")
-@pytest.mark.parametrize("kind", ["read-only", "full"])
+@pytest.mark.parametrize("kind", ["read-only", pytest.param("full", marks=pytest.mark.slow)])
 def test_pictures_are_drawn_whatever_the_home_is(tmp_path, kind):
     """A real file system that takes nothing, in a name space of its own."""
     home, out = tmp_path / "small", tmp_path / "out"

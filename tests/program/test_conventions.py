@@ -13,6 +13,7 @@ import pytest
 from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, SplatLayers, Stop
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.stereo import eyes_apart, stereo_pair
+from tests.support.sources import nodes_of
 
 HALF = np.sqrt(0.5)
 HERE = Pose(np.zeros(3), np.array([1.0, 0, 0, 0]))
@@ -174,7 +175,7 @@ def definitions() -> list[tuple[str, ast.AST]]:
         (str(path.relative_to(ROOT)), node)
         for folder in PRODUCT
         for path in sorted((ROOT / folder).rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in nodes_of(path)
         if isinstance(node, kinds)
     ]
 

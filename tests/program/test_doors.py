@@ -8,7 +8,7 @@ import ast
 import os
 import re
 import time
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
 from tests.support.hostile.gate_fuzz import MOST_BYTES, MOST_S, Outcome, fuzz
 from tests.support.hostile.gate_seeds import seeds
+from tests.support.sources import nodes_of
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("runtime_models", "rasterizer", "scene", "renderer", "training", "decomposition", "vr",
@@ -43,11 +44,6 @@ def sources() -> list[Path]:
     )
     paths = [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))]
     return [path for path in paths if words.search(path.read_text("utf-8"))]
-
-
-@cache
-def nodes_of(path: Path) -> tuple[ast.AST, ...]:
-    return tuple(ast.walk(ast.parse(path.read_text("utf-8"))))
 
 
 def targets() -> set[str]:

@@ -12,6 +12,7 @@ import pytest
 import tests.support.hostile.poisoned_folder as poisoned_folder
 from shapeshift.app import first_start
 from shapeshift.app.cli import COMMANDS
+from tests.support.sources import nodes_of
 from tests.support.splat_scenes import random_layers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -211,7 +212,7 @@ def test_every_python_that_is_started_leaves_the_current_folder_out():
     """Each list that begins with an interpreter goes on with -P or -I."""
     checked = 0
     for path in [ROOT / "launch.py", *(p for name in SHIPPED for p in (ROOT / name).rglob("*.py"))]:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes_of(path):
             if isinstance(node, ast.List) and node.elts:
                 first = ast.unparse(node.elts[0])
                 if first in ("sys.executable", "python", "str(python)", "PYTHON", "str(PYTHON)"):

@@ -282,7 +282,7 @@ def test_help_of_the_tests_installs_nothing(launch, no_set_up, capsys, words):
 def test_the_whole_suite_runs_in_two_processes_and_a_choice_of_it_in_one(launch, monkeypatch):
     """Slow tests have two cores for themselves: some watch a runtime, or the clock."""
     monkeypatch.setattr(launch.os, "cpu_count", lambda: 2)
-    for words in ([], ["-q"], ["-x", "-v"]):
+    for words in ([], ["-q"], ["-x", "-v"], ["-q", "--durations=20"]):
         given = ["-n", "2", "--dist", "loadfile", "--no-loadscope-reorder", *words]
         assert launch.pytest_words(words) == ["-m", "pytest", *given]
     for words in (["-n", "0"], ["--slow", "-q"], ["tests/scene", "-k", "x"], ["--pdb"]):

@@ -4,6 +4,8 @@ import ast
 import re
 from pathlib import Path
 
+from tests.support.sources import nodes_of
+
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("app", "decomposition", "rasterizer", "renderer", "runtime_models", "scene", "training",
            "vr")  # fmt: skip
@@ -31,7 +33,7 @@ def test_every_file_is_written_by_these_functions():
 def writes(path: Path) -> list[int]:
     """The lines that open a file for writing, or hand a name to something that does."""
     found = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes_of(path):
         if not isinstance(node, ast.Call):
             continue
         words = [a.value for a in node.args if isinstance(a, ast.Constant)]

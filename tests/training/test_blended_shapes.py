@@ -78,6 +78,7 @@ def cross_fade_db(model: AnchorModel, views: list[View]) -> float:
     return float(np.mean(found))
 
 
+@pytest.mark.slow
 def test_the_picture_between_light_and_heat_comes_nearer_to_their_cross_fade(device, shared):
     """Three seeds: 35.7 to 47.3 dB, 44.1 to 48.7, 35.6 to 47.0; stops lose 0.35 dB at most.
 

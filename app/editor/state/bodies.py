@@ -1,11 +1,13 @@
 """The world behind the window: colliders of the document's objects, made in a thread, then bodies.
 
-The picture does not wait for it: a scene is there to be seen before it can be touched.
+The picture does not wait for it: a scene is there to be seen before it can be touched.  Objects are
+touched as rough hulls first, and by their exact pieces when those are made.
 """
 
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from shapeshift.app.editor.state.files.edited_file import EditedFile, ModelKey, key_of
@@ -39,6 +41,7 @@ class Bodies:
         self._ground: tuple = ()  # floor and gravity of the world
         self._future: Future | None = None
         self._stale = True  # the world does not know of the last edits yet
+        self._told: set[str] = set()  # notes of this scene
         self._given_up = False  # there can be no world: the scene is there to be seen and edited
         self._unwanted = threading.Event()  # ends the thread at its next word
         self._thread: threading.Thread | None = None
@@ -98,7 +101,8 @@ class Bodies:
         """Once a frame; True while colliders are being made."""
         if self._future is not None and self._future.done():
             future, self._future = self._future, None
-            key, self._made[key], problem = future.result()
+            key, made, problem, rough = future.result()
+            self._take(key, made, rough)
             self.problem = problem or self.problem
         try:
             self._catch_up(edited)
@@ -107,21 +111,49 @@ class Bodies:
             self._given_up = self.world is None
         return self.busy
 
+    def _take(self, key: tuple, made: "Collider | None", rough: "Collider | None") -> None:
+        """A collider, in the place of the rough one that stood in for it."""
+        self._made[key] = made
+        for name, (made_of_it, before) in self._of.items():
+            if rough is not None and before is rough and made is not None:
+                self._of[name], self._stale = (made_of_it, made), True
+
     def _catch_up(self, edited: EditedFile) -> None:
-        if self.busy or not self._stale or self._given_up:
+        if self.busy or self._given_up:
             return
         file = edited.file
         touched = [item for item in file.all_items if item.collider is not None]
-        missing = [item for item in touched if not self._is_made(item)]
-        if missing:
-            self._start(edited, missing[0])
-            return
+        if self._stale:
+            missing = [item for item in touched if not self._is_made(item)]
+            if missing:
+                self._start(edited, missing[0], None)
+                return
+            self._bring_up_to_date(file, edited, touched)
+        if self.world is not None and not self._stale:
+            found = ((item, self._collider(item)) for item in touched)
+            rough = [(item, made) for item, made in found if made is not None and made.rough]
+            if rough:
+                self._start(edited, *rough[0])
+
+    def _bring_up_to_date(
+        self, file: SceneFile, edited: EditedFile, touched: list[SceneItem]
+    ) -> None:
         found = {item.name: self._collider(item) for item in touched}
         colliders = {name: made for name, made in found.items() if made is not None}
+        if self.world is not None and self.world.holds and self._changes(colliders):
+            return  # what a hand holds would be lost to it: when it lets go
         self._of = {i.name: (made_of(i), colliders[i.name]) for i in touched if i.name in colliders}
         if touched or self.world is not None:
             self._to_world(file, edited, colliders)
         self._stale = False
+
+    def _changes(self, colliders: Mapping[str, "Collider"]) -> bool:
+        """Whether an object of the world gets its exact pieces now."""
+        objects = self.living.objects
+        return any(
+            before is not None and before.rough and colliders.get(name) is not before
+            for name, before in ((name, obj.collider) for name, obj in objects.items())
+        )
 
     def _to_world(
         self, file: SceneFile, edited: EditedFile, colliders: Mapping[str, "Collider"]
@@ -138,7 +170,10 @@ class Bodies:
         else:
             known = len(self.world.findings)
             follow(self.world, file, models, colliders)
-        self.notes += [sentence(finding) for finding in self.world.findings[known:]]
+        told = (sentence(finding) for finding in self.world.findings[known:])
+        fresh = [words for words in told if words not in self._told]  # a body may come again
+        self._told.update(fresh)
+        self.notes += fresh
 
     def _is_made(self, item: SceneItem) -> bool:
         return self._of_before(item) is not None or making_of(item) in self._made
@@ -153,10 +188,16 @@ class Bodies:
         made, collider = self._of.get(item.name, (None, None))
         return collider if made == made_of(item) else None
 
-    def _start(self, edited: EditedFile, item: SceneItem) -> None:
-        """Makes one collider in a thread that the program's end does not wait for."""
+    def _start(self, edited: EditedFile, item: SceneItem, rough: "Collider | None") -> None:
+        """Makes one collider in a thread that the program's end does not wait for.
+
+        rough: what it is touched as so far; None: nothing, and a rough one is made.
+        """
         future = self._future = Future()
         file, model, unwanted = edited.file, edited.model(item), self._unwanted
+        for key, made in self._made.items():
+            if rough is not None and made is rough and item.collider == HULLS:
+                item = replace(item, x=key[-1])  # of the shape that the rough one has
         self._making = (said("{name}: making a collider", name=item.name), 0.0)
 
         def report(what: str, part: float) -> None:
@@ -166,7 +207,7 @@ class Bodies:
 
         def work() -> None:
             try:
-                future.set_result((making_of(item), *make(file, item, model, report)))
+                future.set_result((making_of(item), *make(file, item, model, report, rough), rough))
             except Unwanted:
                 future.cancel()
             except BaseException as error:  # handed to the window's thread, which raises it again
@@ -191,15 +232,17 @@ def making_of(item: SceneItem) -> tuple:
 
 
 def make(
-    file: SceneFile, item: SceneItem, model: Model, report: Progress
+    file: SceneFile, item: SceneItem, model: Model, report: Progress, rough: "Collider | None"
 ) -> "tuple[Collider | None, str]":
-    """The collider, or None and why there is none."""
+    """The rough collider, with one the exact; or None, with one that one, and why."""
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.colliders.collider_files import one_collider
 
+    rest = "It cannot be touched." if rough is None else "It is touched as one hull."
+    instead = rough and replace(rough, rough=False)  # is not tried again
     try:
-        return one_collider(file, item, model, Making(progress=report)), ""
+        return one_collider(file, item, model, Making(progress=report, rough=rough is None)), ""
     except BadFile as error:
-        return None, f"{error} It cannot be touched."
+        return instead, f"{error} {rest}"
     except MemoryError:
-        return None, f"'{item.name}' needs more memory for its collider than there is."
+        return instead, f"'{item.name}' needs more memory for its collider than there is. {rest}"

@@ -3,17 +3,10 @@
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.assemble import (
-    SNAP,
-    choose_proxy,
-    distinct,
-    is_within,
-    pressed,
-    slab,
-    without_diagonals,
-)
+from shapeshift.decomposition.assemble import SNAP, choose_proxy, pressed
 from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.partition import LabelledView
+from shapeshift.decomposition.proxies.ground import distinct, is_within, slab, without_diagonals
 from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
 from shapeshift.scene.colliders.collider import Collider, box_around
 from shapeshift.scene.colliders.collider_wrap import is_watertight, volume

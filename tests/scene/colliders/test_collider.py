@@ -33,6 +33,7 @@ from tests.support.scene.collider_shapes import Cloud, distances, shapes, solid,
 from tests.support.splats.scaffold_scenes import random_raw, write_run
 
 FRESH = Making(kept=False)
+ROUGH = Making(kept=False, rough=True)
 
 
 def check_hulls(collider: Collider, most: int = 16) -> None:
@@ -195,17 +196,50 @@ def test_few_and_flat_splats_have_a_collider(soon, count, kind):
     means[:, {"point": [0, 1, 2], "line": [1, 2], "plane": [1], "cloud": []}[kind]] = 0.5
     wxyz = np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1))
     scales = np.full((count, 3), (0.0, 1e-30, 0.003)[count % 3], np.float32)
-    made = collider_of_splats(means, scales, wxyz, np.ones(count, np.float32), FRESH)
-    check_hulls(made)
-    assert solid(made).is_volume
+    for making in (FRESH, ROUGH):
+        made = collider_of_splats(means, scales, wxyz, np.ones(count, np.float32), making)
+        check_hulls(made)
+        assert solid(made).is_volume and made.rough == making.rough
+        assert making is FRESH or len(made.parts) == 1
 
 
 def test_nothing_to_touch_is_one_sentence():
     cloud = splatted(shapes()["sphere"], 100)
     for count, opacity in ((0, 1), (100, 0), (100, -1), (100, np.nan)):
         columns = [column[:count] for column in cloud.columns[:3]]
-        with pytest.raises(BadFile, match="opaque enough to be touched"):
-            collider_of_splats(*columns, np.full(count, opacity, np.float32), FRESH)
+        for making in (FRESH, ROUGH):
+            with pytest.raises(BadFile, match="opaque enough to be touched"):
+                collider_of_splats(*columns, np.full(count, opacity, np.float32), making)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "cube", "two spheres"])
+def test_a_rough_collider_is_the_hull_of_all(name):
+    """With floaters and damage; a splat reaches 3 % of its size over the surface, 64 corners of a
+    ball lose 6 % of it and are blown up to the same volume.  Nothing is cut, nothing kept.
+    """
+    shape = shapes()[name]
+    cloud = splatted(shape, 5000, floaters=0.01)
+    made = collider_of_splats(*cloud.columns, Making(rough=True))
+    check_hulls(made, 1)
+    want = shape.convex_hull.volume
+    assert made.rough and 0.97 * want < parts_volume(made) < 1.2 * want
+    assert uncovered(made, shape) < 0.03 * shape.extents.max()
+    again = collider_of_splats(*cloud.columns, Making(rough=True))
+    assert again.rough
+
+
+def test_in_place_of_a_rough_collider_what_was_made_before_is_taken():
+    columns = splatted(shapes()["sphere"], 500).columns
+    exact = collider_of_splats(*columns)
+    again = collider_of_splats(*columns, Making(rough=True))
+    assert not again.rough and np.array_equal(again.parts[0], exact.parts[0])
+
+
+def test_a_rough_place_is_made_as_it_is():
+    """One hull of a room would fill it."""
+    columns = splatted(shapes()["sphere"], 500).columns
+    made = collider_of_splats(*columns, Making(kept=False, rough=True, hollow=True))
+    assert not made.rough and len(made.mesh.faces) > 100
 
 
 def test_told_ends_it_and_leaves_no_process():

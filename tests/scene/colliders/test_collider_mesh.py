@@ -90,6 +90,15 @@ def test_what_is_closed_already_stays():
     assert solid(found).volume == pytest.approx(ball.volume, rel=1e-5)
 
 
+def test_a_mesh_of_many_corners_is_told_to_be_closed(count=6000):
+    """With 46,341 vertices and more, products of two of their numbers leave 32 bits."""
+    box = trimesh.creation.box()
+    faces = (box.faces[None] + 8 * np.arange(count)[:, None, None]).reshape(-1, 3)
+    faces = faces.astype(np.int32)
+    assert is_closed(faces) and is_watertight(faces)
+    assert not is_closed(faces[1:]) and not is_watertight(faces[1:])
+
+
 def test_an_open_mesh_is_not_closed():
     ball = trimesh.creation.icosphere(1)
     assert is_closed(ball.faces) and not is_closed(ball.faces[1:])

@@ -1,6 +1,7 @@
 """Colliders of places: a room that one is in stays open, what stands on a floor is filled."""
 
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from shapeshift.scene.colliders.collider import (
     mesh_of_splats,
 )
 from shapeshift.scene.colliders.collider_wrap import is_watertight, volume
-from shapeshift.scene.colliders.convex_parts import run_coacd
+from shapeshift.scene.colliders.convex_parts import run_coacd, thick
 from shapeshift.scene.world.physics import Physics
 from shapeshift.scene.world.physics_shapes import engine
 from tests.support.scene.collider_shapes import Cloud, refined, splatted
@@ -77,6 +78,21 @@ def test_a_mesh_file_of_a_place_stays_as_it_is(tmp_path):
     assert len(made.mesh.faces) == 10
     assert np.ptp(made.mesh.vertices, axis=0) == pytest.approx((4, 2.4, 3))
     assert len(made.parts) == 1
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 27_000])
+def test_points_are_thickened_in_memory_that_grows_as_they_do(count):
+    """A background has so many corners: a (V, V) matrix of them would be 5.8 GB."""
+    points = np.random.default_rng(0).normal(size=(count, 3)) * (1, 1, 1e-4)
+    tracemalloc.start()
+    made = thick(points, 1e-3)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 20 * points.nbytes + 20_000
+    ways = {1: 3, 2: 2, 3: 1}.get(count, 1)  # a point is thickened every way, a plane across
+    assert len(made) == count * 2**ways
+    axes = np.linalg.eigh(np.cov(made.T))[1].T
+    assert min(np.ptp(made @ axis) for axis in axes) >= 1e-3 * (1 - 1e-6)
 
 
 def test_without_the_packages_there_is_one_sentence(monkeypatch, tmp_path):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from shapeshift.app.editor.texts import table as texts_table
 from shapeshift.renderer.debug.debug import REASON_TEXTS
+from tests.support.sources import nodes_of
 
 ROOT = Path(__file__).resolve().parents[3]
 EDITOR, HEADSET = ROOT / "app" / "editor", ROOT / "app" / "headset"
@@ -107,7 +108,7 @@ def literals(node: ast.AST) -> Iterator[str]:
 def said_in(path: Path) -> set[str]:
     """Texts that a file hands to one of SAYING."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes_of(path):
         if isinstance(node, ast.FunctionDef):
             found |= rows_in(node)
         found |= set(key_groups(node))
@@ -200,7 +201,7 @@ def deeds_in_source() -> set[str]:
     """What edits are called, where that stands in the call; {} for what is filled in."""
     found: set[str] = set()
     for path in sources():
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes_of(path):
             name = getattr(getattr(node, "func", None), "attr", None)
             name = name or getattr(getattr(node, "func", None), "id", None)
             if not isinstance(node, ast.Call) or name not in DEED_PLACES:
@@ -232,7 +233,7 @@ def unsaid_texts() -> list[str]:
     """Texts that go to ImGui as they stand in the code, and so in English alone."""
     found = []
     for path in (p for top in (EDITOR / "panels", HEADSET, *BESIDE) for p in top.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes_of(path):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
                 continue
             owner = node.func.value

@@ -41,17 +41,19 @@ def obj(name: str, x: float = 0.0, collider: str | None = HULLS) -> SceneItem:
     return SceneItem(name=name, model="a.ply", x=x, collider=collider)
 
 
-def cube() -> Collider:
+def cube(rough: bool = False) -> Collider:
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)
-    return Collider((corners * 0.1,), TriangleMesh(corners, np.array([[0, 1, 2]], np.int32)))
+    faces = np.array([[0, 1, 2]], np.int32)
+    return Collider((corners * 0.1,), TriangleMesh(corners, faces), rough)
 
 
 @pytest.fixture
 def made(monkeypatch) -> list:
-    """What was asked for, (name, x); it is there at once."""
+    """What was asked for, (name, x); it is there at once, as one that was made before."""
     asked = []
 
     def one_collider(file, item, model, making):
+        assert making.rough
         asked.append((item.name, item.x))
         if item.name == "bad":
             raise BadFile("object 'bad': there is nothing to touch.")
@@ -128,6 +130,54 @@ def test_without_physics_a_scene_can_be_seen_and_edited(made, monkeypatch):
     bodies.follow(of)  # is no refusal of the edit
     until_there(bodies, of)
     assert bodies.problem == "" and bodies.world is None
+
+
+def test_rough_hulls_come_first_and_exact_pieces_in_their_place(monkeypatch):
+    """In motion, held by nobody, at the x of then; the one that cannot be cut keeps its hull."""
+    asked, cut = [], threading.Event()
+
+    def one_collider(file, item, model, making):
+        asked.append((item.name, making.rough, item.x))
+        if making.rough:
+            return cube(True)
+        assert cut.wait(30)
+        if item.name == "bad":
+            raise BadFile("object 'bad': the package coacd does not load.")
+        return cube()
+
+    monkeypatch.setattr(collider_files, "one_collider", one_collider)
+    bodies, of = Bodies(), edited(obj("a"), obj("bad", x=0.5))
+    end = time.monotonic() + 30
+    while bodies.world is None and time.monotonic() < end:
+        bodies.poll(of)
+        time.sleep(0.001)
+    world = bodies.living
+    assert bodies.busy and all(each.collider.rough for each in world.objects.values())
+    of.history = of.history.record(edits.set_x(of.file, "a", 0.25), "x")
+    bodies.follow(of)
+    world.paused = False
+    for _ in range(9):
+        world.step()
+    world.move_hand("right", world.objects["a"].pose)
+    world.grab_body("right", "a", world.objects["a"].pose.position)
+    cut.set()
+    while bodies.busy and time.monotonic() < end:
+        bodies.poll(of)
+        time.sleep(0.001)
+    assert world.objects["a"].collider.rough and world.held("right") == "a"
+    world.release("right")
+    before = {n: (o.pose.position, world.physics.velocity(o.body)[0]) for n, o in
+              world.objects.items()}  # fmt: skip
+    until_there(bodies, of)
+    assert sorted(asked) == [
+        ("a", False, 0.0), ("a", True, 0.0), ("bad", False, 0.5), ("bad", True, 0.5)
+    ]  # fmt: skip
+    assert bodies.world is world and world.objects["a"].reaction_state.x == 0.25
+    for name, each in world.objects.items():
+        assert not each.collider.rough
+        np.testing.assert_allclose(each.pose.position, before[name][0], atol=1e-6)
+        np.testing.assert_allclose(world.physics.velocity(each.body)[0], before[name][1], atol=1e-6)
+    assert "touched as one hull" in bodies.problem and before["bad"][1][1] < -0.5
 
 
 def test_another_scene_ends_what_is_being_made(monkeypatch):
