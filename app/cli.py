@@ -3,10 +3,10 @@
 import contextlib
 import importlib
 import os
-import signal
 import sys
-from collections.abc import Iterator
+from typing import Any
 
+from shapeshift.app.interrupts import answer_endings, uninterrupted
 from shapeshift.app.paths import leave_current_folder
 from shapeshift.app.terminal import clean_streams, drop_output, print_text, say
 
@@ -96,6 +96,7 @@ COMMANDS = {
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
+CLAIMING = ("demo", "film", "fit", "lod", "poses", "segment", "style", "table", "train", "update")
 OPEN_ENDED = ("view", "vr", "serve", "cluster")  # they last as long as somebody looks
 BAD_INPUT = 2  # exit code
 FAULT = 3
@@ -188,21 +189,6 @@ def report_fault(command: str, error: Exception) -> int:
     return FAULT
 
 
-@contextlib.contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Ctrl-C waits until the end of this: numpy takes one while it is imported for a broken
-    installation.  launch.py has held it back since Python started.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-
-
 def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.caches import settle_caches_for
     from shapeshift.app.command_line import parse, wants_help
@@ -223,14 +209,24 @@ def run_command(command: str, arguments: list[str]) -> int:
     settle_caches_for(command)
     if command in OPEN_ENDED:
         return module.run(options)
-    with lines(command):
+    with lines(command), claim_of(command, options):
         return module.run(options)
+
+
+def claim_of(command: str, options: Any) -> contextlib.AbstractContextManager[None]:
+    """Long work has its --out for itself; the parts of a film share one."""
+    if command not in CLAIMING or getattr(options, "only", ""):
+        return contextlib.nullcontext()
+    from shapeshift.app.commands.claims import claimed
+
+    return claimed(options.out, command)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The program's exit code; without arguments, those of this process."""
     if arguments is None:  # the program itself, not a part of another
         arguments = sys.argv[1:]
+        answer_endings()
         leave_current_folder()
     try:
         with clean_streams():

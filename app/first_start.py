@@ -250,6 +250,8 @@ def call_venv(lock: int | None) -> None:
     if venv.returncode != 0:
         release = ".".join(map(str, sys.version_info[:2]))
         why = next((line.strip() for line in reversed(said) if line.strip()), "no reason given")
+        if re.search(r"No space left|Errno 28", " ".join(said)):
+            stop(f"The disk of {VENV} is full; make room and start again.")
         stop(
             f"Python could not make a virtual environment in {VENV} ({printable(why)}); install "
             f"its venv module (Debian: apt-get install python{release}-venv) or delete that folder."

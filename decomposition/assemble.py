@@ -58,17 +58,24 @@ class Proxy:
 
 
 def candidates_of(
-    mesh: TriangleMesh, plane: Plane | None, making: Making, given: Path | None = None
+    mesh: TriangleMesh,
+    plane: Plane | None,
+    making: Making,
+    given: Path | None = None,
+    cut: bool = True,
 ) -> dict[str, Collider]:
     """Colliders by name: CoACD's pieces, one hull, the primitives, and a mesh file of the user's.
 
     mesh: the object's, as standing_mesh() makes it; plane: on which it stands, in the same frame.
-    Raises BadFile for a mesh file that cannot be used.
+    cut: False leaves out the pieces, which take seconds.  Raises BadFile for a mesh file that
+    cannot be used.
     """
-    parts, _ = cut_into_parts(mesh, making.most_parts, making.report, LIMIT_S)
-    if plane is not None:
-        parts = tuple(part for part in pressed(parts, plane) if hull_volume(part) > 0)
-    found = {PIECES: Collider(parts, mesh)}
+    found: dict[str, Collider] = {}
+    if cut:
+        parts, _ = cut_into_parts(mesh, making.most_parts, making.report, LIMIT_S)
+        if plane is not None:
+            parts = tuple(part for part in pressed(parts, plane) if hull_volume(part) > 0)
+        found[PIECES] = Collider(parts, mesh)
     up = (0.0, 1.0, 0.0) if plane is None else plane.normal
     found |= {shape: collider_of_shape(mesh, shape, up) for shape in SHAPES}
     if given is not None:
@@ -200,8 +207,16 @@ def proxy_of(
     mesh = standing_mesh(part, model.stops[0].x, own[model.labels == label], here, making)
     world_from_part = np.eye(4)
     world_from_part[:3, 3] = at
-    candidates = candidates_of(mesh, here, making, given)
     pictures = most_of([view.labelled for view in views], label)
+    simple = candidates_of(mesh, here, making, given, cut=False)
+    best = choose_proxy(simple, world_from_part, label, pictures)[0]
+    # Pieces follow the mesh: where that is hardly better, they would not be chosen.
+    whole = Collider((), mesh)
+    bound = score_silhouettes(whole, world_from_part, label, pictures, as_mesh=True)
+    score = best.score
+    if score.views and score.recall >= LEAST_RECALL and score.iou >= bound.iou - AS_GOOD:
+        return best
+    candidates = candidates_of(mesh, here, making, given)
     return choose_proxy(candidates, world_from_part, label, pictures)[0]
 
 

@@ -13,6 +13,7 @@ from shapeshift.runtime_models.shapes import four, three
 from shapeshift.scene.cameras.upright import (
     ASSUMED,
     LEVEL,
+    UNIT_M,
     Up,
     Upright,
     believed,
@@ -23,6 +24,7 @@ from shapeshift.scene.document.scene_file import FirstView, SceneFile, SceneItem
 from shapeshift.scene.pose import Pose
 
 MOST_PLACES = 50_000  # of plain splats, among which planes are looked for
+EXTENT = (2, 98)  # percent of a thing's anchors, between which it is so long
 LEAST_OPACITY = 0.1  # of a splat, to be there at all
 
 
@@ -75,6 +77,24 @@ def upright_scene(
     upright = Upright(tuple(ways), used)
     file = replace(file, upright=upright)
     return (turned(file, found.model, upright.turn) if used.off() > LEVEL else file), told
+
+
+def scale_sentence(found: Segmented, metres: str) -> str:
+    """Who says how long a metre is, or how large its things would be if nobody does."""
+    if metres:
+        return f"Scale: metres are those of {metres}."
+    model, sizes = found.model, []
+    assert model.labels is not None, "it is labelled"
+    places = np.asarray(model.anchors if isinstance(model, AnchorModel) else model.means)
+    for part in found.parts:
+        if part.rows:
+            low, high = np.percentile(places[model.labels == part.spec.label], EXTENT, axis=0)
+            sizes.append((float((high - low).max()), part.spec.name))
+    few = ", ".join(f"{name} {size:.2g} m" for size, name in sorted(sizes)[-3:])
+    return (
+        f"Scale: nobody says how long a metre is; as it stands the largest would be {few} long. "
+        f"Give a length: '{UNIT_M}' in the capture's file, metres of one unit, and train again."
+    )
 
 
 def turned(file: SceneFile, model: AnchorModel | SplatLayers, turn: np.ndarray) -> SceneFile:

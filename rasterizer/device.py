@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     import pyopencl as cl
     from pyopencl.array import Array
 
+# Called each time a device has been opened: the compiler in its driver takes signals over.
+opened: list[Callable[[], None]] = []
 GPU = "SHAPESHIFT_GPU"  # in the environment: which GPU, where several processes share them
 INSTALL = (
     "on Debian or Ubuntu run `apt-get install pocl-opencl-icd` (fastest on a CPU), elsewhere "
@@ -198,6 +201,8 @@ def _opened(device: "cl.Device") -> Device:
 
     context = cl.Context([device])
     queue = cl.CommandQueue(context)
+    for each in opened:
+        each()
     return Device(
         context,
         queue,

@@ -6,12 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.checkpoint import contents_of
 from shapeshift.training.drawing import Color, DrawnView
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.optimizer import Adam
@@ -77,6 +79,11 @@ class Run(ABC):
     elapsed: float  # seconds that the steps took, by clock_of, without reading photos
     densified_at: int  # iteration of the last change of what is counted
     run_length: int | None  # iterations in all; None until a timed run's is known
+
+    @cached_property
+    def contents(self) -> dict[str, list]:
+        """What its photos are, for a run that goes on; read when it is asked for."""
+        return contents_of(self.capture)
 
     @property
     @abstractmethod

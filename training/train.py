@@ -10,6 +10,7 @@ from shapeshift.scene.cameras.framing import frame_points
 from shapeshift.scene.cameras.photo_view import photo_view
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.calibration.pose_refinement import PoseGradient, PoseRefinement
+from shapeshift.training.checkpoint import CONTENTS, refuse_other_capture
 from shapeshift.training.density.densify import (
     DensificationStats,
     NewAnchors,
@@ -169,7 +170,10 @@ class Trainer(Run):
         )
 
     def restore(self, state: dict[str, np.ndarray], notes: dict) -> None:
-        """Everything as it was when the checkpoint was written."""
+        """Everything as it was when the checkpoint was written.  Raises BadFile where that was a
+        run of other photos.
+        """
+        refuse_other_capture(self.capture, notes[CONTENTS])
         self.voxel, self.origin = notes["voxel"], notes["origin"]
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
         self.set_start(notes.get("start_s", 0.0))
@@ -195,7 +199,7 @@ class Trainer(Run):
             "rate_scale": self.rate_scale, "run_length": self.run_length,
             "first_loss": self.guard.first_loss, "settings": self.settings.as_dict(),
             "lr_warmup_start": self.lr_warmup.start, "start_s": self.start_s,
-            "anchor_cap": self.anchor_cap,
+            "anchor_cap": self.anchor_cap, CONTENTS: self.contents,
         }  # fmt: skip
         known = self.stats.state() | self.visibility.state() | self.exposures.state()
         more = self.poses.state() | self.min_scale.state()

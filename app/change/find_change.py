@@ -1,6 +1,5 @@
 """What changed between two scenes: the work of the command and of ss.change."""
 
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ import numpy as np
 from shapeshift.app.change.draw_visits import Progress, Visit, own_views, see
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.colors.palette import LUMINANCE
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.colmap.colmap_child import run_child
 from shapeshift.scene.change.places import (
@@ -306,7 +306,7 @@ def _by_features(
             arrays[f"{side}{i}"] = (np.clip(gray, 0, 1) * 255 + 0.5).astype(np.uint8)
             arrays[f"p{side}{i}"] = visit.points(row).astype(np.float32)
     arrays["counts"] = np.array(counts)
-    with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
+    with temporary_folder() as folder:
         given, wanted = Path(folder, "pictures.npz"), Path(folder, "found.npz")
         np.savez(given, **arrays)  # type: ignore[arg-type]  # its stubs take switches alone
         log = Path(folder, "log.txt")

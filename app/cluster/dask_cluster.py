@@ -2,7 +2,6 @@
 
 import os
 import secrets
-import tempfile
 import time
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -26,7 +25,7 @@ from shapeshift.app.cluster.run_task import (
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.errors import UsageError
 from shapeshift.app.terminal import say
-from shapeshift.runtime_models.files.whole_file import open_locked
+from shapeshift.runtime_models.files.whole_file import open_locked, temporary_folder
 from shapeshift.runtime_models.program import ROOT, install_words, is_installed
 
 if TYPE_CHECKING:
@@ -154,9 +153,8 @@ def quiet_dask() -> Iterator[Path]:
         "distributed.diagnostics.nvml": False, "distributed.worker.daemon": False,
     }  # fmt: skip
     logging.getLogger("distributed").setLevel(QUIET)
-    with tempfile.TemporaryDirectory(prefix="shapeshift-dask-", ignore_cleanup_errors=True) as own:
-        with dask.config.set(settings):
-            yield Path(own)
+    with temporary_folder() as own, dask.config.set(settings):
+        yield own
 
 
 def node_options(host: str, security: "Security | None") -> dict[str, Any]:

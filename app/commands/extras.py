@@ -9,7 +9,6 @@ import os
 import subprocess
 import sys
 import sysconfig
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -71,6 +70,7 @@ def install(names: list[str]) -> None:
     from shapeshift.app.first_start import one_at_a_time, pip_reason, run_pip
     from shapeshift.app.progress import working
     from shapeshift.runtime_models.files.user_cache import cache_folder
+    from shapeshift.runtime_models.files.whole_file import temporary_folder
 
     refuse_environment()
     packages = sorted({package for name in names for package in EXTRAS[name].packages})
@@ -78,15 +78,15 @@ def install(names: list[str]) -> None:
     try:
         log = cache_folder("extras") / LOG
         with (
-            tempfile.TemporaryDirectory(prefix="shapeshift-extras-") as temporary,
+            temporary_folder() as temporary,
             one_at_a_time() as lock,
             working(f"installing {what}") as report,
         ):
-            kept = Path(temporary) / "installed.txt"
+            kept = temporary / "installed.txt"
             kept.write_text("\n".join(installed_versions()), encoding="utf-8")
             words = ["install", "--constraint", str(kept), *packages]
             code = run_pip(
-                words, lock, log, Path(sys.executable), temporary,
+                words, lock, log, Path(sys.executable), str(temporary),
                 lambda line: report(f"installing {what}: {line}"), LOOK_EVERY_S,
             )  # fmt: skip
             if code != 0:

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from shapeshift.decomposition.poses.write_posed import PoseReport
 
 FRAMES = "frames"  # of a video, below --out, as long as the search is not done
-OURS = {"images", "masks", "sparse", "poses.json", "capture.json", "poses.work", FRAMES}
+FRAMES_OF = "frames.txt"  # beside it: of which video, and how many were asked for
+OURS = {"images", "masks", "sparse", "poses.json", "capture.json", "poses.work", FRAMES, FRAMES_OF}
 MOST_NAMED = 10  # photos in a sentence
 
 
@@ -62,6 +63,7 @@ def run(options: Options) -> int:
     from shapeshift.decomposition.poses.find_poses import WORK, find_poses
     from shapeshift.decomposition.poses.photo_list import list_photos
     from shapeshift.decomposition.poses.video_frames import VIDEOS
+    from shapeshift.runtime_models.files.whole_file import discard_folder
 
     settings = settings_of(options)
     if not options.every >= 1:
@@ -86,7 +88,8 @@ def run(options: Options) -> int:
             say(f"{full(options.out / WORK)} keeps what is done; the same command goes on there.")
             raise
     if video:
-        shutil.rmtree(options.out / FRAMES)
+        discard_folder(options.out / FRAMES)
+        (options.out / FRAMES_OF).unlink(missing_ok=True)
     if options.json:
         from dataclasses import asdict
 
@@ -137,7 +140,7 @@ def refuse_target(options: Options) -> None:
     """What --out holds must be an unfinished search, nothing, or given up.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.poses.find_poses import WORK
-    from shapeshift.scene.captures.read_capture import has_poses
+    from shapeshift.runtime_models.files.whole_file import sweep
 
     out, photos = options.out, options.photos
     if out.resolve() in (photos.resolve(), *photos.resolve().parents):
@@ -146,6 +149,7 @@ def refuse_target(options: Options) -> None:
         raise UsageError(f"--out is {out}, which is a file; name a folder.")
     if not out.is_dir():
         return
+    sweep(out)  # parts of a run that was killed
     there = {path.name for path in out.iterdir()}
     strange = sorted(there - OURS)
     if strange:
@@ -154,18 +158,30 @@ def refuse_target(options: Options) -> None:
         for name in there:
             path = out / name
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
-    elif has_poses(out) or (there and WORK not in there and FRAMES not in there):
+    elif there and not there & {WORK, FRAMES, FRAMES_OF}:  # else a search that is not done
         raise UsageError(f"{out} holds a capture; name another --out or add --overwrite.")
 
 
 def frames_of(options: Options, progress) -> Path:
-    """The folder of the video's frames; what a run before took out is used again."""
-    from shapeshift.decomposition.poses.video_frames import take_frames
-    from shapeshift.runtime_models.files.whole_file import make_folders, whole_folder
+    """The folder of the video's frames; what a run before took out is used again.
 
-    folder = options.out / FRAMES
+    Raises UsageError where that run was of another video.
+    """
+    from shapeshift.app.errors import UsageError
+    from shapeshift.decomposition.poses.video_frames import take_frames
+    from shapeshift.runtime_models.files.hashes import hash_file
+    from shapeshift.runtime_models.files.whole_file import make_folders, whole_folder, write_whole
+
+    folder, note = options.out / FRAMES, options.out / FRAMES_OF
+    wanted = f"{hash_file(options.photos)} {options.frames}".encode()
+    if folder.is_dir() and not (note.is_file() and note.read_bytes() == wanted):
+        raise UsageError(
+            f"--out is {options.out}, which has frames of another video or --frames; give those "
+            "again, or --overwrite to begin anew."
+        )
     if not folder.is_dir():
         make_folders(options.out.parent, options.out.name)
+        write_whole(note, wanted)
         with whole_folder(folder) as part:
             take_frames(options.photos, part, options.frames, progress)
     return folder

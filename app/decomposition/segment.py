@@ -121,7 +121,7 @@ def cut(
     from shapeshift.app.decomposition.segment_steps import CompletionSettings, at_rest, completed
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
-    from shapeshift.decomposition.upright_scene import planes_under, upright_scene
+    from shapeshift.decomposition.upright_scene import planes_under, scale_sentence, upright_scene
     from shapeshift.scene.document.write_scene_file import write_scene_file
 
     counts: dict[int, Counts] = {}
@@ -147,7 +147,7 @@ def cut(
     if options.complete:
         file, found, planes = completed(device, file, found, capture, how)
     file, told = upright_scene(file, found, capture.ups, planes or planes_under(found))
-    for sentence in told:
+    for sentence in (*told, scale_sentence(found, capture.metres)):
         notice(sentence)
     write_model(found.model, path)
     if options.complete:

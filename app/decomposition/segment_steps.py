@@ -1,7 +1,6 @@
 """The end of launch.py segment: what is touched of every object, and what stood behind it."""
 
 import hashlib
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -249,6 +248,7 @@ def find_by_segmenter(
     from shapeshift.decomposition.masks.sam_files import open_segmenter
     from shapeshift.decomposition.partition import LabelledView
     from shapeshift.decomposition.segment_scene import segment
+    from shapeshift.runtime_models.files.whole_file import discard_folder
 
     segmenter = open_segmenter(folder)
     if not segmenter.reads_text and any(spec.text for spec in specs.objects):
@@ -274,7 +274,7 @@ def find_by_segmenter(
         shown.device, shown.model, pictures, specs.objects, len(capture.photos),
         lambda done, count: progress("evidence of photos", done, count),
     )  # fmt: skip
-    shutil.rmtree(work)
+    discard_folder(work)
     return found, labels.counts
 
 

@@ -16,7 +16,7 @@ from shapeshift.app.drawing import is_our_png, make_folder, save_png
 from shapeshift.app.errors import UsageError
 from shapeshift.app.film.film_plan import FilmPlan
 from shapeshift.runtime_models.files.json_fields import control_row, saved_object
-from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.files.whole_file import sweep, write_whole
 from shapeshift.scene.pose import View
 from shapeshift.scene.stereo import stereo_pair
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 LEGEND = "frames.json"  # what the frames are of
 MOST_BYTES = 64 << 20
 BLOCK = 1 << 20
+PNG_HEAD = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"  # width and height follow
+PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class FrameFolder:
 
     path: Path
     streams: tuple[str, ...] = ()
+    size: tuple[int, int] | None = None  # pixels of a frame; None: any
 
     def frame(self, number: int) -> Path:
         return self.path / f"{number:05d}.png"
@@ -49,8 +52,11 @@ class FrameFolder:
         return [*(self.stream(name, number) for name in self.streams), self.frame(number)]
 
     def lacking(self, numbers: Sequence[int]) -> list[int]:
-        """Those that are still to be drawn: files are whole or not there."""
-        return [n for n in numbers if not all(path.is_file() for path in self.files(n))]
+        """Those that are still to be drawn.
+
+        Files are whole or not there; a disk that lost its power leaves others, too.
+        """
+        return [n for n in numbers if not all(is_whole(p, self.size) for p in self.files(n))]
 
     def begin(self, key: str, facts: dict, overwrite: bool) -> None:
         """Makes it ready for frames of the film with this key ("": of none); those of another go.
@@ -69,6 +75,8 @@ class FrameFolder:
 
     def _clear(self, overwrite: bool) -> None:
         """Takes away the frames of another film."""
+        for folder in (self.path, *(self.path / name for name in self.streams)):
+            sweep(folder)  # parts of a run that was killed
         found = [p for p in sorted(self.path.rglob("*")) if p.is_file() and p.name != LEGEND]
         if not found:
             return
@@ -96,6 +104,19 @@ class FrameFolder:
                 path.unlink(missing_ok=True)
         if not any(self.path.iterdir()):
             self.path.rmdir()
+
+
+def is_whole(path: Path, size: tuple[int, int] | None) -> bool:
+    """Whether a PNG begins and ends as one does, and has that size."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(PNG_HEAD) + 8)
+            file.seek(-len(PNG_END), os.SEEK_END)
+            whole = head.startswith(PNG_HEAD) and file.read() == PNG_END
+    except OSError:
+        return False
+    found = int.from_bytes(head[-8:-4], "big"), int.from_bytes(head[-4:], "big")
+    return whole and size in (None, found)
 
 
 def film_key(plan: FilmPlan, scene: Path, drawing: dict) -> str:
@@ -147,6 +168,10 @@ class FrameForm:
     supersample: int = 1  # pixels a side of the picture that make one of the film's
     streams: tuple[str, ...] = ()
     depth_unit: float = 0.001  # metres a step of the depth stream
+
+    def pixels(self, size: tuple[int, int]) -> tuple[int, int]:
+        """Of a frame, where one eye's picture has that size."""
+        return size[0] * (2 if self.eye_distance > 0 else 1), size[1]
 
 
 def draw_frames(

@@ -112,7 +112,7 @@ def run(options: Options) -> int:
     plan = plan_of(options, document, path, cameras, (clock, size, style))
     plan.controls(0)  # refuses a stop that is none, before anything is written
     form = form_of(options, plan)
-    folder = FrameFolder(frames_path(options.out), form.streams)
+    folder = FrameFolder(frames_path(options.out), form.streams, form.pixels(plan.size))
     begin(options, plan, form, folder)
     if plan.note:
         say(plan.note)

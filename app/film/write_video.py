@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.app.errors import UsageError
-from shapeshift.runtime_models.files.whole_file import whole_file
+from shapeshift.runtime_models.files.whole_file import temporary_folder, whole_file
 from shapeshift.runtime_models.program import install_words
 
 Done = Callable[[int], None]
@@ -81,7 +80,7 @@ def write_video(
     """A video of PNG files, whole or not at all; `done` hears of each frame."""
     if not codec:
         return write_moving_picture(path, frames, fps, done)
-    with tempfile.TemporaryDirectory(prefix="shapeshift-film-") as folder:
+    with temporary_folder() as folder:
         held = Path(folder) / f"film{path.suffix.lower()}"  # FFmpeg wants a name, to write twice
         encode(held, frames, fps, codec, done)
         with whole_file(path) as file, held.open("rb") as video:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
+from shapeshift.app.interrupts import ENDINGS, answered, leave_terminal
 from shapeshift.app.opening import DrawingOptions
 from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
@@ -297,19 +298,17 @@ def interrupting(xr_app) -> Iterator[None]:
 
     Torn down in the middle of a frame, runtimes and drivers crash.
     """
-    before = signal.getsignal(signal.SIGINT)
 
     def ask(number, stack) -> None:
+        leave_terminal(number)
         xr_app.interrupted = True
-        signal.signal(signal.SIGINT, before)
+        restore()
 
-    signal.signal(signal.SIGINT, ask)
-    if sys.platform != "win32":
-        signal.siginterrupt(signal.SIGINT, False)  # runtimes with a service do not call again
-    try:
+    with answered(ask) as restore:
+        if sys.platform != "win32":
+            for each in ENDINGS:  # runtimes with a service do not call again
+                signal.siginterrupt(each, False)
         yield
-    finally:
-        signal.signal(signal.SIGINT, before)
     if xr_app.interrupted:
         raise KeyboardInterrupt
 

@@ -41,6 +41,11 @@ def capture_facts(path: Path) -> dict | None:
         ],
         "points": 0 if capture.points is None else len(capture.points),
         "files": [asdict(row) for row in capture.files],
+        "metres": capture.metres or None,
+        "up": [
+            {"by": way.source, "degrees": round(way.off(), 2), "sure": way.sure}
+            for way in capture.ups
+        ],
         "doubts": list(capture.doubts),
     }  # fmt: skip
 
@@ -59,6 +64,9 @@ def print_capture(facts: dict) -> None:
         what = f"by formula, {stop['formula']}" if stop["formula"] else photos
         print_text(f"{stop['x']:.3f}  {stop['name']} ({stop['kind']}): {what}")
     print_files([FoundFiles(**row) for row in facts["files"]], stderr=False)
+    ways = ", ".join(f"{way['by']} {way['degrees']:.1f}" for way in facts["up"])
+    print_text(f"Up, degrees from what is taken: {ways}.")
+    print_text(f"Metres: {facts['metres'] or 'nobody says how long one is'}.")
     for doubt in facts["doubts"]:
         print_text(doubt)
 

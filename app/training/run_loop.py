@@ -1,12 +1,12 @@
 """How every training runs: its offset and words before, its loop with progress and Ctrl-C."""
 
-import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from shapeshift.app.interrupts import answered, leave_terminal
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from shapeshift.training.train import Trainer
 
 INTERRUPTED = 130  # exit code
-SAVE_EVERY = 60.0  # seconds between checkpoints
+FIRST_SAVE_S, SAVE_EVERY_S = 10.0, 60.0  # until the first checkpoint, and between those later
 READING = "reading photos, finding the first points"
 LOOKS = 10  # at held-out photos in a run
 
@@ -61,20 +61,20 @@ def describe(trainer: "Trainer") -> str:
 
 @contextmanager
 def interrupts() -> Iterator[list]:
-    """A list that a first Ctrl-C puts something into; a second one interrupts as usual."""
+    """A list that a first Ctrl-C, SIGTERM or SIGHUP puts something into; a second one interrupts as
+    usual.
+    """
     asked: list = []
 
     def note(signum, frame) -> None:
+        leave_terminal(signum)
         if asked:
             raise KeyboardInterrupt
         asked.append(signum)
         say("Stopping; the work is kept.  Ctrl-C again to stop at once.")
 
-    before = signal.signal(signal.SIGINT, note)
-    try:
+    with answered(note):
         yield asked
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def train(
@@ -82,14 +82,15 @@ def train(
 ) -> bool:
     """The run with its progress on standard error; True when Ctrl-C ended it early.
 
-    save_checkpoint: called every SAVE_EVERY seconds; returns why nothing was written, or "".
+    save_checkpoint: called after FIRST_SAVE_S and then every SAVE_EVERY_S seconds; returns why
+    nothing was written, or "".
     """
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
     from shapeshift.app.progress import progress_bar
 
     columns = ("{task.description}", "{task.fields[psnr]}", "{task.fields[loss]}")
-    look, saved, troubled = 1 / LOOKS, time.monotonic(), False
+    look, save_at_s, troubled = 1 / LOOKS, time.monotonic() + FIRST_SAVE_S, False
     most = "" if trainer.settings.seconds is None else f" of {trainer.settings.seconds:g}"
     with (
         interrupts() as asked,
@@ -116,10 +117,10 @@ def train(
             if now.fraction >= look and trainer.settled:
                 look += 1 / LOOKS
                 bar.update(task, psnr=decibels(trainer.held_out_psnr()))
-            if save_checkpoint is not None and time.monotonic() - saved > SAVE_EVERY:
+            if save_checkpoint is not None and time.monotonic() >= save_at_s:
                 if failed := save_checkpoint():
                     bar.console.print(failed, soft_wrap=True)
-                saved = time.monotonic()
+                save_at_s = time.monotonic() + SAVE_EVERY_S
             if asked and trainer.settled:
                 return True
     return False

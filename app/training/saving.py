@@ -21,6 +21,11 @@ LESS = "fewer --max-anchors, or a larger --downscale, need less"
 
 def check_writable(out: Path) -> None:
     """Raises UsageError where nothing can be written: before the training, not after it."""
+    from shapeshift.training.checkpoint import checkpoint_path
+
+    checkpoint = checkpoint_path(out)
+    if checkpoint.is_dir():
+        raise UsageError(f"--out {out}: {checkpoint} is a folder; move it away.")
     there = next(folder for folder in out.absolute().parents if folder.exists())
     try:
         with tempfile.TemporaryFile(dir=there):

@@ -218,13 +218,24 @@ def train_splats(
         write_list,
     )
 
-    out = options.out
-    refuse_other_folder(out)  # now, not after the training
+    out, files = options.out, files_of(capture, options.out, ".ply")
+    if not is_unfinished(out, files):
+        refuse_other_folder(out)  # now, not after the training
     run = splats_run(share_of(settings, capture), options.asked | options.splats)
-    outcome = train_each(device, capture, run, files_of(capture, out, ".ply"), options, room)
+    outcome = train_each(device, capture, run, files, options, room)
     names = [made.file.name for made in outcome.runs.values()]
     write_list(capture.stops[: len(names)], names, out)
     return outcome
+
+
+def is_unfinished(out: Path, files: list[Path]) -> bool:
+    """Whether a folder holds what a run left that was killed: models with checkpoints, no list."""
+    from shapeshift.runtime_models.files.whole_file import sweep
+
+    if not out.is_dir():
+        return False
+    sweep(out)
+    return all(path in files and checkpoint_of(out, path).is_file() for path in out.iterdir())
 
 
 def train_separate(

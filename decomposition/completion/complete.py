@@ -155,9 +155,12 @@ def seams(grid: PlaneCells, foot: Footprint) -> np.ndarray:
 
 def correlate(cells: np.ndarray, others: np.ndarray) -> np.ndarray:
     """(2X - 1, 2Y - 1): sum of cells(c) others(c + step), steps from 1 - X and 1 - Y."""
-    from scipy.signal import fftconvolve
+    from scipy import fft  # scipy.signal has this, and takes two seconds to import
 
-    return fftconvolve(others.astype(float), cells.astype(float)[::-1, ::-1])
+    whole = np.add(others.shape, cells.shape) - 1
+    size = [fft.next_fast_len(int(n), real=True) for n in whole]
+    product = fft.rfft2(others.astype(float), size) * fft.rfft2(cells[::-1, ::-1] * 1.0, size)
+    return fft.irfft2(product, size)[: whole[0], : whole[1]]
 
 
 def shifted(cells: np.ndarray, step: np.ndarray) -> np.ndarray:

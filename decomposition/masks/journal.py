@@ -5,7 +5,6 @@ decided, and FOLDER/LABEL/NUMBER.png are the masks.
 """
 
 import json
-import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import numpy as np
 from shapeshift.decomposition.masks.label_maps import read_grey, write_label_map
 from shapeshift.decomposition.masks.segmenter import Candidate
 from shapeshift.runtime_models.files.json_fields import saved_object
-from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
+from shapeshift.runtime_models.files.whole_file import make_folders, whole_folder, write_whole
 from shapeshift.runtime_models.model import BadFile
 
 INPUTS, DECISIONS = "inputs.json", "decisions.json"
@@ -61,7 +60,7 @@ def open_journal(folder: Path, inputs: dict[str, object]) -> Journal:
     Raises BadFile where the folder holds what is no journal.
     """
     journal = Journal(folder)
-    if folder.exists():
+    if folder.exists() or folder.is_symlink():
         refuse_other(folder)
         if saved_object(folder / INPUTS, MOST_BYTES) == inputs:
             for path in folder.glob(f"*/{DECISIONS}"):
@@ -70,17 +69,18 @@ def open_journal(folder: Path, inputs: dict[str, object]) -> Journal:
                     journal.taken[int(path.parent.name)] = rows
                     journal.resumed += len(rows)
             return journal
-        shutil.rmtree(folder)
-    make_folders(folder.parent, folder.name)
-    write_whole(folder / INPUTS, json.dumps(inputs, indent=1).encode())
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with whole_folder(folder) as new:  # with its inputs, or not at all
+        write_whole(new / INPUTS, json.dumps(inputs, indent=1).encode())
     return journal
 
 
 def refuse_other(folder: Path) -> None:
     """Nothing that is not ours is removed.  Raises BadFile."""
-    ours = folder.is_dir() and not folder.is_symlink() and (folder / INPUTS).is_file()
-    names = [path.name for path in folder.iterdir()] if ours else []
-    if not ours or any(name != INPUTS and not name.isdecimal() for name in names):
+    ours = folder.is_dir() and not folder.is_symlink()
+    names = {path.name for path in folder.iterdir()} if ours else set()
+    known = not names or INPUTS in names  # an empty one was being made, or removed
+    if not (ours and known and all(name == INPUTS or name.isdecimal() for name in names)):
         raise BadFile(
             f"{folder} is where unfinished masks are kept, and holds something else; move it away."
         )

@@ -43,6 +43,7 @@ ENOUGH = 0.9  # of the photos
 # From so many photos on, poses are found by several threads, whose sums differ in the last bits
 # from run to run; below, adjustment is short and the same photos give the same bytes.
 THREADED = 100
+GUIDED = "guided"  # a file in the folder of the work: see clear_others
 BLOCK = 8  # photos by photos whose matches are written at once: progress, and what a kill loses
 
 
@@ -65,6 +66,7 @@ def find(job: dict) -> None:
         if guided is not rung["guided"]:
             guided = rung["guided"]
             report(watch="two_view_geometries", stage="matches", of=job["pairs"])
+            clear_others(pycolmap, database, work / GUIDED, guided)
             match(pycolmap, database, job, guided)
         models = solve(pycolmap, database, job, rung, count)
         found = max((rank(model) for model in models), default=(0, 0))
@@ -120,11 +122,23 @@ def camera_of(pycolmap: Any, database: Path, names: list[str]) -> int:
     return next((cameras[name] for name in names if name in cameras), -1)
 
 
+def clear_others(pycolmap: Any, database: Path, mark: Path, guided: bool) -> None:
+    """Pairs that are known are left as they are: those of the other kind go, also of a run before.
+
+    mark: a file that is there as long as guided matches may be in the database.
+    """
+    if guided and not mark.exists():
+        mark.touch()
+    elif guided or not mark.exists():
+        return  # they are of this kind, or there are none
+    with pycolmap.Database.open(str(database)) as base:
+        base.clear_matches()
+        base.clear_two_view_geometries()
+    if not guided:
+        mark.unlink()
+
+
 def match(pycolmap: Any, database: Path, job: dict, guided: bool) -> None:
-    if guided:  # pairs that are known are left as they are, so these go
-        with pycolmap.Database.open(str(database)) as base:
-            base.clear_matches()
-            base.clear_two_view_geometries()
     options = pycolmap.FeatureMatchingOptions()
     options.num_threads, options.use_gpu, options.guided_matching = job["threads"], False, guided
     verify = pycolmap.TwoViewGeometryOptions()
@@ -238,10 +252,11 @@ def arm(seconds: float, memory: int) -> None:
 
 def main(what: str, path: str, seconds: str, memory: str) -> None:
     try:
-        import pycolmap  # noqa: F401
+        import pycolmap
     except ImportError as why:
         sys.stderr.write(str(why))
         sys.exit(ABSENT)
+    pycolmap.logging.logtostderr = True  # else it leaves files in the temporary folder
     arm(float(seconds), int(memory))
     job = json.loads(Path(path).read_text())
     {"find": find, "write": write}[what](job)

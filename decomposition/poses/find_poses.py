@@ -14,6 +14,7 @@ import numpy as np
 
 from shapeshift.decomposition.poses.photo_list import PhotoList
 from shapeshift.decomposition.poses.write_posed import PoseReport, write_posed
+from shapeshift.runtime_models.files.hashes import hash_file
 from shapeshift.runtime_models.files.memory import PART, machine_memory
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
@@ -153,6 +154,7 @@ def describe(photos: PhotoList, work: Path, settings: PoseSettings, masks: Path 
         "threads": settings.threads or os.cpu_count() or 1,
         "measured": settings.length.photo if settings.length else "",
         "ends": settings.length.ends if settings.length else [],
+        "contents": {photo.name: hash_file(photos.root / photo.name) for photo in photos.photos},
     }  # fmt: skip
 
 
@@ -168,13 +170,23 @@ def start_job(work: Path, job: dict) -> Path:
     """The file of the job.  Raises BadFile where another one is unfinished in the folder."""
     path = work / "job.json"
     text = json.dumps(job, indent=1).encode()
-    if path.is_file() and path.read_bytes() != text:
+    if path.is_file() and (before := path.read_bytes()) != text:
         raise BadFile(
-            f"{work} has an unfinished search with other photos or options; give those again, or "
-            "--overwrite to begin anew."
+            f"{work} has an unfinished search with other photos or options"
+            f"{what_changed(before, job)}; give those again, or --overwrite to begin anew."
         )
     write_whole(path, text)
     return path
+
+
+def what_changed(before: bytes, job: dict) -> str:
+    """Which photo is another one under the same name; "" where it is something else."""
+    try:
+        contents = json.loads(before)["contents"]
+        name = next(n for n, now in job["contents"].items() if contents.get(n, now) != now)
+    except (ValueError, LookupError, TypeError, AttributeError, StopIteration):
+        return ""
+    return f" ({name} is another picture)"
 
 
 def copy_masks(photos: PhotoList, masks: Path, work: Path) -> Path:

@@ -5,12 +5,11 @@ looks whole.
 """
 
 import json
-import shutil
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from shapeshift.decomposition.poses.photo_list import PhotoList
-from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
+from shapeshift.runtime_models.files.whole_file import discard_folder, make_folders, write_whole
 from shapeshift.runtime_models.stop import USUAL_PALETTE
 from shapeshift.scene.cameras.colmap_cameras import camera_bytes, image_bytes
 from shapeshift.scene.captures.capture_rules import is_grey
@@ -73,9 +72,9 @@ def write_posed(
         text = json.dumps({"modalities": said}, indent=1, ensure_ascii=False)
         write_whole(out / "capture.json", text.encode())
     target = make_folders(out, "sparse/0")
-    for name, data in sorted(tables.items(), reverse=True):  # readers look for images.bin
-        write_whole(target / name, data)
-    shutil.rmtree(work)
+    for name in sorted(tables, key="images.bin".__eq__):  # what makes it a capture comes last
+        write_whole(target / name, tables[name])
+    discard_folder(work)
 
 
 def modalities_said(photos: PhotoList, placed: set[str], images: Path) -> list[dict]:

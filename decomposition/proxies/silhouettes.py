@@ -24,41 +24,50 @@ class SilhouetteScore:
     iou: float
 
 
-def silhouette(view: View, parts: Sequence[np.ndarray]) -> np.ndarray | None:
+def silhouette(
+    view: View, parts: Sequence[np.ndarray], faces: Sequence[np.ndarray] | None = None
+) -> np.ndarray | None:
     """(H, W) bool: pixels whose centre one of the convex pieces (V, 3), world metres, covers.
 
-    None where a corner lies behind the near plane.
+    faces: (F, 3) of each, of pieces that are not convex.  None where a corner lies behind the near
+    plane.
     """
     from PIL import Image, ImageDraw
 
     eye_from_world, fx, fy, cx, cy = view.pinhole()
     picture = Image.new("1", (view.size[0] * FINER, view.size[1] * FINER))
     pen = ImageDraw.Draw(picture)
-    for part in parts:
+    for part, rows in zip(parts, faces or map(hull_faces, parts), strict=True):
         x, y, z = (np.c_[part, np.ones(len(part))] @ eye_from_world.T).T[:3]
         if not (z > view.near).all():
             return None
         pixels = np.stack([fx * x / z + cx, fy * y / z + cy], 1) * FINER - 0.5
-        for face in hull_faces(part):
+        for face in rows:
             pen.polygon([tuple(corner) for corner in pixels[face]], fill=1)
     return np.array(picture)[FINER // 2 :: FINER, FINER // 2 :: FINER]
 
 
 def score_silhouettes(
-    collider: Collider, world_from_part: np.ndarray, label: int, views: Sequence[LabelledView]
+    collider: Collider,
+    world_from_part: np.ndarray,
+    label: int,
+    views: Sequence[LabelledView],
+    as_mesh: bool = False,
 ) -> SilhouetteScore:
-    """The proxy of the object of that label; world_from_part (4, 4).
+    """The proxy of the object of that label; world_from_part (4, 4).  as_mesh: by its mesh.
 
     Pixels where another object is seen say nothing: it may stand before this one.
     """
     turn, move = world_from_part[:3, :3], world_from_part[:3, 3]
-    parts = [part.astype(np.float64) @ turn.T + move for part in collider.parts]
+    pieces = (collider.mesh.vertices,) if as_mesh else collider.parts
+    parts = [part.astype(np.float64) @ turn.T + move for part in pieces]
+    faces = [collider.mesh.faces] if as_mesh else [hull_faces(part) for part in parts]
     seen = both = either = count = 0
     for each in views:
         mask = each.labels == label
         if mask.sum() < LEAST_PIXELS:
             continue
-        covered = silhouette(each.view, parts)
+        covered = silhouette(each.view, parts, faces)
         if covered is None:
             continue
         known = mask | (each.labels == 0)

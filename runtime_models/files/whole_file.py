@@ -12,6 +12,7 @@ import secrets
 import shutil
 import stat
 import sys
+import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -92,6 +93,30 @@ def whole_folder(path: Path) -> Iterator[Path]:
             remove(part)
             if handle is not None:
                 os.close(handle)
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder among the temporary files for this user alone; what a killed program left of such
+    goes with the next one.
+    """
+    root = Path(tempfile.gettempdir())
+    sweep(root)
+    folder, handle = new_part_folder(root, 0o700)
+    try:
+        yield folder
+    finally:
+        remove(folder)
+        if handle is not None:
+            os.close(handle)
+
+
+def discard_folder(path: Path) -> None:
+    """Removes a folder in one moment; what a kill leaves of it has a name that `sweep` knows."""
+    sweep(path.parent)
+    part = part_name(path.parent)
+    os.replace(path, part)
+    remove(part)
 
 
 def open_lines(path: Path) -> IO[str]:
@@ -188,11 +213,11 @@ def new_part(folder: Path) -> tuple[Path, int]:
         os.close(handle)
 
 
-def new_part_folder(folder: Path) -> tuple[Path, int | None]:
+def new_part_folder(folder: Path, rights: int = 0o777) -> tuple[Path, int | None]:
     """(path, handle) of a new folder, locked; no handle where folders cannot be."""
     while True:
         part = part_name(folder)
-        part.mkdir()
+        part.mkdir(rights)
         if not LOCKS:
             return part, None
         handle = os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

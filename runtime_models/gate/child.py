@@ -24,8 +24,9 @@ LARGEST_REQUEST = 1 << 40  # bytes: who asks is the program itself
 
 def main(program: str) -> None:
     """Serves until the pipe ends."""
-    if hasattr(signal, "SIGINT"):  # Ctrl-C is for the parent, which ends this process
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # for the parent, which ends this process
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     heed_limits()
     given, answers = private_pipes()
     if os.name != "nt":  # Windows goes on naming a parent that is gone

@@ -9,20 +9,19 @@ sentence.
 import atexit
 import os
 import queue
-import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from shapeshift.runtime_models.files.memory import VARIABLE
 from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.runtime_models.gate.doors import DOORS, Door
 from shapeshift.runtime_models.gate.limits import MEMORY, TIME, resident
 from shapeshift.runtime_models.gate.wire import receive, send
@@ -296,24 +295,18 @@ def in_utf8(path: Path) -> Iterator[str]:
     if is_utf8(str(path)):
         yield str(path)
         return
-    try:
-        folder = Path(tempfile.mkdtemp(prefix="shapeshift-"))
-    except OSError as why:
-        raise no_link(path, why) from None
-    try:
-        if is_utf8(path.name):
-            (link := folder / "beside").symlink_to(path.parent, target_is_directory=True)
-            link /= path.name
-        else:
-            link = folder / f"file{path.suffix if is_utf8(path.suffix) else ''}"
-            link.symlink_to(path)
-    except OSError as why:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise no_link(path, why) from None
-    try:
+    with ExitStack() as held:
+        try:
+            folder = held.enter_context(temporary_folder())
+            if is_utf8(path.name):
+                (link := folder / "beside").symlink_to(path.parent, target_is_directory=True)
+                link /= path.name
+            else:
+                link = folder / f"file{path.suffix if is_utf8(path.suffix) else ''}"
+                link.symlink_to(path)
+        except OSError as why:
+            raise no_link(path, why) from None
         yield str(link)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)  # of links: what they lead to stays
 
 
 def no_link(path: Path, why: OSError) -> BadFile:

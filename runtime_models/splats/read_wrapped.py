@@ -5,16 +5,14 @@ of them count for the outer file.
 """
 
 import gzip
-import shutil
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from shapeshift.runtime_models.files.memory import Account
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.runtime_models.files.zip_files import DAMAGED, KNOWN, member_names, opened_zip
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.package_files import MANIFEST
@@ -109,15 +107,6 @@ def form_of(path: Path) -> Format | None:
     if form is not None and form.has_mark is None:  # by its name alone
         return None if is_zip_of_one(head, path) or is_gzip(head, path) else form
     return form
-
-
-@contextmanager
-def temporary_folder() -> Iterator[Path]:
-    folder = tempfile.mkdtemp(prefix="shapeshift-")
-    try:
-        yield Path(folder)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)  # Windows keeps what is still mapped
 
 
 def plain_name(name: str) -> str:

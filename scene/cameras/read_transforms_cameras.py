@@ -67,8 +67,10 @@ def cameras_of(
         turn = ours_from_world(reading)
     else:
         usual = COLMAP_UP if opencv_axes(entries[0]) else None
-        world = CaptureWorld.of(np.array(cameras), (0, 0, 1), data.get("up"), where, usual)
+        world = CaptureWorld.of(np.array(cameras), (0, 0, 1), data, where, usual)
         turn = flipped(reading) @ world.ours_from_file
+        for camera in cameras:
+            camera[:3, 3] *= world.unit_m
     views, names = [], []
     for entry, camera, at in zip(entries, cameras, frames, strict=True):
         views.append(view_of(entry, turn @ camera, file.parent, reading, notes, at))

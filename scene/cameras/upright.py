@@ -4,13 +4,14 @@ Structure from motion knows no up, and files that state none are read by the axi
 them.  Here what there is to find is found, and one rule says which of it is believed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees, hypot, inf
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shapeshift.runtime_models.files.json_fields import Fields
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import three
 
@@ -19,6 +20,7 @@ DISAGREE = 5.0  # degrees between two ways that is worth a word
 LEANS = 45.0  # degrees: photos that all look one way lean as far; a plane so far off is a wall
 LEVEL = 1.0  # degrees: what is found so near to what was taken confirms it
 ROUNDING = 1e-6  # degrees, so that a threshold itself is still within it
+UNIT_M = "unit_m"  # a file's key, and in a capture's notes: metres of one unit of its world
 CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they say nothing
 CLEAR_PLANE = 0.5  # of the second singular value that the third may have: rows lie in a plane
 LEAST_TURN = 0.1  # of the first singular value in the second: photos look in different directions
@@ -229,6 +231,12 @@ def doubts_of_up(ups: Sequence[Up], ours_from_file: np.ndarray) -> tuple[str, ..
         f"[{x:.3f}, {y:.3f}, {z:.3f}] in its own axes; the first is kept. `segment` looks for "
         "what things stand on and turns a scene upright; 'up' in its file settles it for training.",
     )
+
+
+def unit_from(entry: Mapping, where: str) -> float:
+    """Metres of one unit of the file's world.  Raises BadFile."""
+    wanted = "metres of one unit of its world, a number above 0 up to 1e6,"
+    return Fields(entry, where).number(UNIT_M, 1.0, wanted, 1e-9, 1e6)
 
 
 def ways_sentence(ways: Sequence[Up], used: Up) -> str:

@@ -77,6 +77,7 @@ class Capture:
     doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
     formulas: tuple[Stop, ...] = ()  # stops of values by formula of its stops', without photos
     files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
+    metres: str = ""  # who says how long a metre is in it; "": nobody
     ups: tuple[Up, ...] = ()  # what was taken to point up, first, and what the photos say of it
 
     def of(self, modality: str, split: str) -> list[Photo]:

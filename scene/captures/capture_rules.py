@@ -17,9 +17,11 @@ from shapeshift.scene.cameras.photo_view import subject_distance
 from shapeshift.scene.cameras.upright import (
     ASSUMED,
     STATED,
+    UNIT_M,
     Up,
     doubts_of_up,
     turn_of_world,
+    unit_from,
     up_of_cameras,
     up_of_photos,
 )
@@ -46,6 +48,7 @@ TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, fr
 # Worlds of COLMAP's axes are turned as 3DGS PLY files are, whatever their photos say: splats
 # trained elsewhere from the same model then lie where the capture is.
 COLMAP_UP = (0.0, -1.0, 0.0)
+OWN_FORM = "shapeshift-capture"  # is in metres
 PLAIN_BORDER = 0.5  # share of a photo's border that must have exactly one colour
 
 
@@ -59,31 +62,31 @@ class CaptureWorld:
     # what lies there (survey coordinates); zeros nearly always.
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ups: tuple[Up, ...] = ()  # in our axes: what was taken, and what the photos say
+    unit_m: float = 1.0  # metres of one unit of the file's world
+
+    metres: str = ""  # who says how long a metre is in it; "": nobody yet
 
     @staticmethod
     def of(
-        world_from_cameras: np.ndarray,
-        otherwise: tuple,
-        up: object,
-        where: str,
-        usual: object = None,
+        cameras: np.ndarray, otherwise: tuple, said: Mapping, where: str, usual: tuple | None = None
     ) -> "CaptureWorld":
-        """`up` if the file gives one, else `usual`, else as the photos (N, 4, 4; OpenCV axes) tell:
-        the world axis nearest to their mean, or `otherwise` where they disagree.
+        """By the 'up' and 'unit_m' that a file has `said`; without 'up' by `usual`, else as photos
+        (N, 4, 4; world from camera, OpenCV axes) tell: the world axis nearest to their mean, or
+        `otherwise` where they disagree.
         """
+        up, unit_m = said.get("up"), unit_from(said, where)
         taken = Up(ASSUMED if up is None else STATED, (0.0, 1.0, 0.0))
         up = usual if up is None else up
-        up = up_of_cameras(world_from_cameras, otherwise) if up is None else up
-        turn = turn_of_world(up, is_left_handed(world_from_cameras, where), where)
-        ours = turn[:3, :3] @ world_from_cameras[:, :3]
-        photos = up_of_photos(ours)
-        # + 0.0: never -0.0
+        up = up_of_cameras(cameras, otherwise) if up is None else up
+        turn = turn_of_world(up, is_left_handed(cameras, where), where)
+        ours = turn[:3, :3] @ cameras[:, :3]
+        origin, photos = near_origin(ours[:, :, 3] * unit_m), up_of_photos(ours)
+        own = "its own form" if said.get("format") == OWN_FORM else ""
         return CaptureWorld(
-            turn,
-            three(np.asarray(up, np.float64) + 0.0),
-            near_origin(ours[:, :, 3]),
-            (taken,) if photos is None else (taken, photos),
-        )
+            turn, three(np.asarray(up, np.float64) + 0.0), origin,  # + 0.0: never -0.0
+            (taken,) if photos is None else (taken, photos), unit_m,
+            "its own word" if unit_m != 1 else own or "survey coordinates" * any(origin),
+        )  # fmt: skip
 
     @property
     def left_handed(self) -> bool:
@@ -91,7 +94,7 @@ class CaptureWorld:
 
     def turned(self, matrix: np.ndarray) -> np.ndarray:
         out = self.ours_from_file @ matrix
-        out[:3, 3] -= self.origin
+        out[:3, 3] = out[:3, 3] * self.unit_m - self.origin
         return out
 
     def capture(
@@ -129,8 +132,10 @@ class CaptureWorld:
             if not any(p.modality == stop.name and p.split == "train" for p in photos):
                 raise BadFile(f"{folder}: modality {shown(stop.name)} has no photos to train on")
         if points is not None:
-            points = points @ self.ours_from_file[:3, :3].T - np.array(self.origin)
+            points = points @ self.ours_from_file[:3, :3].T * self.unit_m - np.array(self.origin)
             points = points.astype(np.float32)
+        notes.pop(UNIT_M, None)  # of a capture that this one was made of
+        notes |= {UNIT_M: self.unit_m} if self.unit_m != 1 else {}
         if any(self.origin):
             notes[ORIGIN] = self.origin
             x, y, z = self.origin
@@ -145,6 +150,7 @@ class CaptureWorld:
             notes,
             doubts + more,
             formulas,
+            metres=self.metres or "its depth photos" * any(p.depth is not None for p in photos),
             ups=self.ups,
         )
 

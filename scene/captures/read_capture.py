@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.json_fields import Fields, read_json
+from shapeshift.runtime_models.files.json_fields import Fields, read_json, saved_object
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.cameras.colmap_cameras import camera_pose, other_lengths
 from shapeshift.scene.capture_files import find_file
@@ -186,7 +186,7 @@ def read_colmap(folder: Path) -> Capture:
     paths = [find_file(root, name, ("",)).path for name in names]
     stops, modality_of = modalities(said, posed, paths, folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
-    world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up"), str(folder), COLMAP_UP)
+    world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said, str(folder), COLMAP_UP)
     there = [os.path.isfile(path) for path in paths]
     missing = [str(path) for path, found in zip(paths, there, strict=True) if not found]
     refuse_all_missing(missing, len(posed), str(model))
@@ -227,7 +227,14 @@ def read_colmap(folder: Path) -> Capture:
     capture = world.capture(
         folder, stops, photos, points, colors, background, guessed, doubts=doubts
     )
-    return replace(capture, files=table.sorted_rows())
+    metres = capture.metres or length_of_poses(folder)
+    return replace(capture, files=table.sorted_rows(), metres=metres)
+
+
+def length_of_poses(folder: Path) -> str:
+    """The length by which `poses` found the scale; "" where it was given none."""
+    said = saved_object(folder / "poses.json", 1 << 20).get("scale")
+    return said[:200] if isinstance(said, str) and not said.startswith("arbitrary") else ""
 
 
 def modalities(

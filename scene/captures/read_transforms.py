@@ -115,7 +115,7 @@ def capture_of(
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
         (0, 0, 1),
-        data.get("up"),
+        data,
         where,
         COLMAP_UP if opencv_axes(entries[0]) else None,
     )

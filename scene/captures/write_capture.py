@@ -9,9 +9,9 @@ from shapeshift.runtime_models.files.npy import write_arrays
 from shapeshift.runtime_models.files.whole_file import whole_file, write_whole
 from shapeshift.runtime_models.package.write_package import describe_stop
 from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.capture_rules import OWN_FORM
 from shapeshift.scene.captures.radiometric.no_value import SAID_NOTHING
 
-FORMAT = "shapeshift-capture"
 VERSION = 1
 
 
@@ -22,7 +22,7 @@ def write_capture(capture: Capture) -> Path:
     """
     folder = capture.folder
     data = {
-        "format": FORMAT,
+        "format": OWN_FORM,
         "version": VERSION,
         "convention": "opengl",
         "up": [0, 1, 0],

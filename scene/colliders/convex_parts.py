@@ -2,13 +2,13 @@
 
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.program import package_words
 from shapeshift.scene.colliders.coacd_run import ABSENT
@@ -133,7 +133,7 @@ def run_coacd(
 
     Raises BadFile where it is not installed.
     """
-    with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
+    with temporary_folder() as folder:
         given, wanted = Path(folder, "mesh.npz"), Path(folder, "hulls.npz")
         centre = mesh.vertices.mean(0, dtype=np.float64)
         size = float(np.ptp(mesh.vertices, axis=0).max()) or 1.0

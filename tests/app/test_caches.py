@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -177,3 +178,102 @@ def test_networks_are_run_without_a_word_to_their_makers(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=env, capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
     assert not any(tmp_path.rglob("*onnxruntime*"))
+
+
+# A cache that somebody has damaged
+
+START = """
+import os, signal, sys
+from shapeshift.app import caches
+caches.settle_caches()
+caches.note_start()
+if "abort" in {end!r}:  # the compiler in a device's driver takes signals over
+    from shapeshift.rasterizer.device import open_device
+    open_device()
+print("ready", flush=True)
+{end}
+"""
+
+
+def start(end: str) -> subprocess.Popen:
+    """Another start of the program, which ends so."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", START.format(end=end)], cwd=ROOT, stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert child.stdout.readline() == "ready\n", child.communicate()[1]
+    return child
+
+
+@posix
+@pytest.mark.parametrize(
+    ("end", "anew"),
+    [("os.abort()", True), ("os.kill(os.getpid(), signal.SIGSEGV)", True),
+     ("os.kill(os.getpid(), signal.SIGKILL)", False), ("sys.exit(3)", False), ("", False)],
+)  # fmt: skip
+def test_after_a_start_that_a_library_ended_kernels_are_compiled_anew(capsys, end, anew):
+    start(end).communicate(timeout=60)
+    kernel = cache_folder("pocl") / "kernel.so"
+    kernel.write_bytes(b"damaged")
+    (cache_folder("starts") / "0-dead").touch()  # one that was killed
+    caches.mend_caches()
+    assert not list(cache_folder("starts").iterdir())
+    said = capsys.readouterr().err
+    assert kernel.exists() is not anew and ("kernels are compiled anew" in said) is anew
+    caches.mend_caches()  # once
+    assert capsys.readouterr().err == ""
+
+
+@posix
+def test_a_start_that_goes_on_is_left_alone():
+    alive = start("sys.stdin.read()")
+    (mark,) = cache_folder("starts").iterdir()
+    mark.write_text("as if it had been ended")
+    assert not caches.tidy_starts() and mark.exists()
+    alive.communicate(timeout=60)
+    assert not mark.exists()
+
+
+@posix
+@pytest.mark.parametrize("data", [b"x" * 4096, b"SQLite format 3\0" + b"y" * 4096, None])
+def test_a_damaged_database_of_callers_is_made_anew(tmp_path, capsys, data):
+    import sqlite3
+
+    path = tmp_path / "home/.cache/pytools/pdict-v5-pyopencl-invoker-cache-v42.sqlite"
+    path.parent.mkdir(parents=True)
+    if data is None:
+        with sqlite3.connect(path) as base:
+            base.execute("create table a (b)")
+    else:
+        path.write_bytes(data)
+    caches.mend_caches()
+    assert path.exists() is (data is None)
+    assert ("was damaged; it is made anew" in capsys.readouterr().err) is (data is not None)
+
+
+@posix
+def test_what_the_driver_leaves_at_each_start_goes(monkeypatch):
+    folder = cache_folder("pocl")
+    old, new, full = (folder / f"tempfile_{name}" for name in ("old", "new", "full"))
+    for path in (old, new):
+        path.touch()
+    full.write_bytes(b"1")
+    for path in (old, full):
+        os.utime(path, (0, 0))
+    caches.mend_caches()
+    assert not old.exists() and new.exists() and full.exists()
+
+
+@posix
+@pytest.mark.parametrize(("free", "used"), [(caches.FREE - 1, False), (caches.FREE, True)])
+def test_a_disk_with_little_room_is_no_place_for_kernels(monkeypatch, capsys, free, used):
+    here = cache_base()
+    real = caches.shutil.disk_usage
+
+    def usage(path):
+        return SimpleNamespace(free=free) if str(path).startswith(str(here)) else real(path)
+
+    monkeypatch.setattr(caches.shutil, "disk_usage", usage)
+    caches.settle_caches()
+    assert (cache_base() == here) is used
+    assert ("cannot be used (No space left on device)" in capsys.readouterr().err) is not used

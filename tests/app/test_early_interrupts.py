@@ -1,4 +1,6 @@
-"""Ctrl-C before the program can answer: it waits, and is answered as ever."""
+"""Ctrl-C before the program can answer: it waits, and is answered as ever; SIGTERM and SIGHUP
+are answered as Ctrl-C is.
+"""
 
 import os
 import signal
@@ -9,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from shapeshift.app.first_start import is_ready
+from shapeshift.app.interrupts import ENDINGS, answer_endings, leave_terminal
+from shapeshift.app.training.run_loop import interrupts
 from tests.support.models import random_package
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,3 +86,70 @@ def test_the_environment_and_the_tests_can_be_interrupted(monkeypatch):
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     assert held == [False, False, False, True]  # environment, tests, environment, program
+
+
+@pytest.fixture
+def settled():
+    """The handlers of the tests come back."""
+    before = {each: signal.getsignal(each) for each in ENDINGS}
+    yield
+    for each, handler in before.items():
+        signal.signal(each, handler)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_program_is_interrupted_by_what_ends_others(settled, name):
+    number = getattr(signal, name)
+    answer_endings()
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(number)
+    signal.signal(number, signal.SIG_IGN)  # as nohup leaves it
+    answer_endings()
+    signal.raise_signal(number)
+
+
+@pytest.mark.parametrize("number", ENDINGS)
+def test_a_training_is_asked_once_and_interrupted_by_the_second(settled, number, capsys):
+    answer_endings()
+    with interrupts() as asked:
+        signal.raise_signal(number)
+        assert asked == [number] and "the work is kept" in capsys.readouterr().err
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt):  # as before it
+        signal.raise_signal(number)
+
+
+def test_after_its_terminal_was_closed_a_program_can_still_write(monkeypatch):
+    """Of a terminal whose other side is gone each write is an error; files are left as they are."""
+    other, terminal = os.openpty()
+    kept, written = os.pipe()
+    with os.fdopen(terminal, "wb", 0) as screen, os.fdopen(written, "wb", 0) as file:
+        monkeypatch.setattr(sys, "__stderr__", screen)
+        monkeypatch.setattr(sys, "__stdout__", file)
+        monkeypatch.setattr(sys, "__stdin__", None)
+        os.close(other)
+        with pytest.raises(OSError):
+            os.write(terminal, b"lost")
+        leave_terminal(signal.SIGTERM)
+        with pytest.raises(OSError):
+            os.write(terminal, b"lost")
+        leave_terminal(signal.SIGHUP)
+        assert os.write(terminal, b"lost") == 4
+        file.write(b"kept")
+        assert os.read(kept, 10) == b"kept"
+    os.close(kept)
+
+
+def test_a_command_that_is_terminated_ends_as_after_ctrl_c(scene):
+    code = (
+        "import os, signal, sys; from shapeshift.app import cli\n"
+        "def end(options): os.kill(os.getpid(), signal.SIGTERM)\n"
+        "import shapeshift.app.commands.info as info; info.run = end\n"
+        f"sys.argv = ['shapeshift', 'info', {str(scene)!r}]; sys.exit(cli.main())"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "Interrupted.\n")

@@ -125,8 +125,14 @@ def test_other_inputs_begin_anew_and_other_files_stay(tmp_path):
     with pytest.raises(BadFile, match="holds something else"):
         open_journal(tmp_path / "work", {"a": 3})
     (tmp_path / "other").mkdir()
-    with pytest.raises(BadFile, match="holds something else"):
-        open_journal(tmp_path / "other", {"a": 3})
+    assert open_journal(tmp_path / "other", {"a": 3}).resumed == 0  # killed as it was made
+    assert (tmp_path / "other/inputs.json").is_file()
+    (tmp_path / "third/3").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "third")
+    (tmp_path / "file").touch()
+    for name in ("third", "link", "file"):
+        with pytest.raises(BadFile, match="holds something else"):
+            open_journal(tmp_path / name, {"a": 3})
 
 
 def test_masks_of_other_programs_are_given_as_they_are(photos, specs, tmp_path):

@@ -8,7 +8,12 @@ import pytest
 
 from shapeshift.decomposition.masks.specs import ObjectSpec
 from shapeshift.decomposition.segment_scene import Segmented, SegmentedPart, scene_of_parts
-from shapeshift.decomposition.upright_scene import planes_under, turned_view, upright_scene
+from shapeshift.decomposition.upright_scene import (
+    planes_under,
+    scale_sentence,
+    turned_view,
+    upright_scene,
+)
 from shapeshift.runtime_models.parts import part_of
 from shapeshift.scene.cameras.upright import ASSUMED, PHOTOS, PLANES, STATED, Up, angle
 from shapeshift.scene.document.scene_file import FirstView
@@ -114,3 +119,10 @@ def test_a_first_look_never_goes_straight_up_or_down(degrees):
     away = np.array(found.target) - found.eye
     assert np.hypot(away[0], away[2]) > 1e-3 * np.linalg.norm(away)
     assert angle(away, tilted(degrees) @ (0, 0, -1)) < 1
+
+
+def test_of_unknown_metres_the_size_of_things_is_said():
+    found = table_and_things(0)
+    said = scale_sentence(found, "")
+    assert "cup 0.08 m, mug 0.08 m long" in said and "'unit_m'" in said
+    assert scale_sentence(found, "its own word") == "Scale: metres are those of its own word."

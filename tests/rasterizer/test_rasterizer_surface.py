@@ -127,6 +127,24 @@ def test_a_slanted_wall_of_flat_splats_is_a_plane(form):
 
 
 @pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("left", "metres"), [(0.7, 3.0), (0.8, 2.0), (0.16, 3.0), (0.04, 0.0)])
+def test_depth_is_where_so_much_light_is_left(form, left, metres):
+    """Fog of opacity 1/4 at 2 m before a wall of 4/5 at 3 m leaves .75, then .15: no mean of both
+    depths, and nothing where more light than that goes on.
+    """
+    size = (19, 18)
+    camera = Camera(np.eye(4), 80.0, 80.0, 9.5, 9.0, size, 0.05)
+    splats = [np.array([[0, 0, 2.0], [0, 0, 3.0]]), np.full((2, 3), [9.0, 9.0, 1e-4]),
+              np.tile([1.0, 0, 0, 0], (2, 1)), np.array([0.25, 0.8]), np.zeros((2, 3))]  # fmt: skip
+    d, on_device = device(), upload([a.astype(np.float32) for a in splats])
+    projected = project(d, *on_device, camera, form=form)
+    tiles = bin_tiles(d, projected, size, form)
+    surfaces = surface(d, *on_device[:3], camera, projected, form)
+    drawn = rasterize_depth(d, projected, tiles, surfaces, size, form=form, light_left=left)
+    np.testing.assert_allclose(d.download(drawn.metres), metres, rtol=1e-4)
+
+
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("group", range(5), ids=GROUPS)
 def test_every_gradient_matches_finite_differences(group, form):
     size = (37, 26)

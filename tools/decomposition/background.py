@@ -1,24 +1,28 @@
 """Is the background's body where the place is?  Cameras inside of it, sight lines blocked, floor.
 
-    python tools/decomposition/background.py --out docs/bench/background.csv NAME=SCENE=CAPTURE ...
+    python tools/decomposition/background.py --out FILE --before DIR CAPTURE ...
 
-SCENE is what `segment` wrote, CAPTURE its folder of photos; given twice, of two builds, they are
-compared.  Depth and objects are those of CAPTURE/truth where there is one (tools/synthetic/
-everyday.py), else the model's.  "cameras inside": winding number of the body about each camera.
-"sight lines blocked": of the rays of pixels that show an object, those which meet the body by more
-than 1 % of the way before it; a camera is blocked where half of its are.  "floor off": of pixels of
-background that lie level with what carries the objects, how far from there the ray meets the body,
-as a part of its length, the median.  Megabytes and seconds are those of `simulate SCENE --seconds
-1` in a process of its own, children with it, without kept colliders.
+CAPTURE is a folder of tools/synthetic/everyday.py with NAME.shift trained on it: its label maps cut
+the scene, and the body is made of all splats of the background, as it was, and of the rays of
+photos.  Depth and objects are those of CAPTURE/truth.  "cameras inside": winding number of the body
+about each camera.  "blocked": of the rays of pixels that show an object, those which meet the body
+by more than 1 % of the way before it; a camera is blocked where half of its are.  "floor": pixels
+of background that lie level with what carries the objects, at most AROUND sizes of all of them
+away: how far from there the ray meets the body, as a part of its length, the median, and the share
+within 1 %; "missed" is the share of rays that meet nothing.  made_s: processor seconds of the body,
+with the pictures of depth.  Megabytes and seconds of `simulate --seconds 1` with that background
+alone are of a process of its own: of the build in DIR for the body of all splats, of this one for
+the other; empty where the square matrix of that build would have taken more than MOST_GB.
 """
 
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,24 +32,42 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
-from shapeshift.decomposition.completion.plane import fit_plane  # noqa: E402
-from shapeshift.decomposition.completion.verify import ModelPictures  # noqa: E402
+from shapeshift.decomposition.completion.complete import only_background  # noqa: E402
+from shapeshift.decomposition.completion.plane import (  # noqa: E402
+    Plane,
+    fit_plane,
+    looks_of,
+    support_plane,
+)
+from shapeshift.decomposition.photo_views import sights_of  # noqa: E402
+from shapeshift.decomposition.proxies.ground import (  # noqa: E402
+    ground_mesh,
+    seen_depths,
+    seen_planes,
+)
+from shapeshift.decomposition.segment_scene import (  # noqa: E402
+    named_objects,
+    read_pictures,
+    segment,
+)
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
-from shapeshift.runtime_models.parts import splat_labels  # noqa: E402
+from shapeshift.runtime_models.package.write_package import write_package  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.scene.colliders.carve import SeenDepth  # noqa: E402
-from shapeshift.scene.colliders.collider import Making, collider_of_mesh  # noqa: E402
+from shapeshift.scene.colliders.collider import Making  # noqa: E402
+from shapeshift.scene.colliders.collider_pieces import write_collider  # noqa: E402
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh  # noqa: E402
-from shapeshift.scene.document.read_scene_file import read_scene_file  # noqa: E402
 from shapeshift.scene.pose import Pose, View  # noqa: E402
 from shapeshift.scene.world.physics import Physics  # noqa: E402
 
 FIELDS = (
-    "scene,corners,cameras,cameras_inside,sight_lines,blocked_percent,cameras_blocked,"
-    "floor_rays,floor_off_percent,floor_within_1_percent,simulate_mb,simulate_s"
+    "capture,body,corners,cameras,cameras_inside,sight_lines,blocked_percent,cameras_blocked,"
+    "floor_rays,floor_off_percent,floor_within_1_percent,floor_missed_percent,made_s,simulate_mb,"
+    "simulate_s"
 )
+MOST_GB = 6
 NEAR = 0.01  # of the way
 EVERY = 3  # pixels, along both sides
 LEVEL = 0.95  # cosine to the plane that things stand on, of what counts as floor or table
@@ -79,19 +101,16 @@ class Body:
 
 @dataclass(frozen=True)
 class Truth:
-    """What CAPTURE/truth says of a photo, at the pixels of its view; else the model's word."""
+    """What CAPTURE/truth says of a photo, at the pixels of its view."""
 
     depth_m: np.ndarray  # (H, W) along the view, the capture's units
     objects: np.ndarray  # (H, W) bool
-    known: bool
 
 
-def truth_of(capture: Path, photo: Path, view: View, drawn: tuple) -> Truth:
+def truth_of(capture: Path, photo: Path, view: View) -> Truth:
     """From truth/depth (16 bits) and truth/labels beside truth.json, of the photo's name."""
-    told = capture / "truth" / "truth.json"
-    if not told.is_file():
-        return Truth(drawn[0], drawn[1] > 0.9, False)
-    facts, (width, height) = json.loads(told.read_text()), view.size
+    facts = json.loads((capture / "truth" / "truth.json").read_text())
+    width, height = view.size
     step = facts["depth_m_a_step"] / facts["metres_a_unit"]
     pictures = []
     for kind in ("depth", "labels"):
@@ -100,23 +119,45 @@ def truth_of(capture: Path, photo: Path, view: View, drawn: tuple) -> Truth:
         rows, columns = ((np.arange(n) + 0.5) * (side / n) for n, side in
                          zip((height, width), whole.shape, strict=True))  # fmt: skip
         pictures.append(whole[np.ix_(rows.astype(int), columns.astype(int))])
-    return Truth(np.where(pictures[0] > 0, pictures[0] * step, np.inf), pictures[1] > 0, True)
+    return Truth(np.where(pictures[0] > 0, pictures[0] * step, np.inf), pictures[1] > 0)
 
 
-def figures(scene: Path, folder: Path) -> list[str]:
-    """The row of one scene, without its name."""
-    file, capture = read_scene_file(scene), read_capture(folder)
-    assert file.background is not None and file.background.collider, "segment names one"
-    mesh = collider_of_mesh(file.path(file.background.collider), Making(hollow=True)).mesh
-    model = read_model(file.path(file.background.model))
+def bodies(folder: Path, out: Path) -> Iterator[tuple[str, TriangleMesh, float]]:
+    """(how, the body, processor seconds) of both ways; each as a scene file HOW.scene.json too."""
+    device, model = open_device(), read_model(folder / f"{folder.name}.shift")
     assert isinstance(model, AnchorModel), "of a trained scene"
-    pictures, x, objects = ModelPictures(open_device(), model), model.stops[0].x, None
-    objects = splat_labels(model) != 0
+    capture = read_capture(folder)
+    pictures = read_pictures(folder / "labels", capture, model, None)
+    objects = named_objects(pictures, ())
+    model = segment(device, model, pictures, objects, 0, lambda done, count: None).model
+    assert isinstance(model, AnchorModel) and model.labels is not None
+    write_package(model, out / "cut.shift", "float32")
+    looks, x, alone = looks_of(model), model.stops[0].x, only_background(model)
+    found = {spec.label: support_plane(looks, model.labels, spec.label) for spec in objects}
+    planes = {label: plane for label, plane in found.items() if isinstance(plane, Plane)}
+    making = Making(kept=False, hollow=True, faces=10_000)
+    for how in ("all splats", "rays of photos"):
+        began = time.process_time()
+        sights = sights_of(capture, model.stops) if how != "all splats" else []
+        seen = seen_depths(device, model, sights, x, making)
+        flat = list(seen_planes(planes, seen, looks.spacing_m).values())
+        mesh = ground_mesh(alone, looks, model.labels, flat, x, making, (), seen)
+        took = time.process_time() - began
+        write_collider((), mesh, out / f"{how}.glb")
+        background = {"model": "cut.shift", "part": 0, "collider": f"{how}.glb"}
+        scene = {"format": "shapeshift-scene 1", "background": background, "objects": []}
+        (out / f"{how}.scene.json").write_text(json.dumps(scene))
+        yield how, mesh, took
+
+
+def figures(mesh: TriangleMesh, folder: Path) -> list[str]:
+    """The row of one body, without its name."""
+    capture = read_capture(folder)
     photos, body = capture.photos[:: -(-len(capture.photos) // MOST)], Body(mesh)
     views, truths, inside = [], [], 0
     for photo in photos:
         view = photo.view.divided(max(-(-max(photo.view.size) // 160), 1))
-        truth = truth_of(folder, photo.path, view, pictures.depth(view, x, objects))
+        truth = truth_of(folder, photo.path, view)
         views.append(SeenDepth(view, truth.depth_m.astype(np.float32)))
         truths.append(truth)
         inside += winding(mesh, view.world_from_eye.position) > 0.5
@@ -148,39 +189,51 @@ def figures(scene: Path, folder: Path) -> list[str]:
         f"{len(mesh.vertices)}", f"{len(views)}", f"{inside}", f"{len(lines)}",
         f"{100 * lines.mean():.2f}", f"{cameras_blocked}", f"{len(away)}",
         f"{100 * np.median(away):.2f}", f"{100 * (away < NEAR).mean():.1f}",
+        f"{100 * np.isinf(away).mean():.1f}",
     ]  # fmt: skip
 
 
+# A process starts with the peak of the one that forks it: a small one stands between.
+MEASURED = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True, stderr=subprocess.DEVNULL)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(f"{used.ru_maxrss / 1024:.0f} {used.ru_utime + used.ru_stime:.1f}")
+"""
+
+
 def simulated(scene: Path, root: Path) -> list[str]:
-    """Megabytes and seconds of both processors of `simulate`, by the program in `root`."""
+    """Megabytes and processor seconds of `simulate`, by the program in `root`."""
     with tempfile.TemporaryDirectory() as out:
-        program = [sys.executable, "-P", str(root / "shapeshift/__main__.py")]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(
-            [*program, "simulate", str(scene), "--seconds", "1", "--out", out], check=True,
-            env=os.environ | {"XDG_CACHE_HOME": out}, stderr=subprocess.DEVNULL,
+        program = [sys.executable, "-P", str(root / "shapeshift/__main__.py"), "simulate"]
+        found = subprocess.run(
+            [sys.executable, "-c", MEASURED, *program, str(scene), "--seconds", "1", "--out", out],
+            env=os.environ | {"XDG_CACHE_HOME": out}, check=True, capture_output=True, text=True,
         )  # fmt: skip
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return [f"{after.ru_maxrss / 1024:.0f}", f"{seconds:.1f}"]
+    return found.stdout.split()
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenes", nargs="+", metavar="NAME=SCENE=CAPTURE")
-    parser.add_argument("--root", type=Path, default=ROOT, help="the build that simulates")
+    parser.add_argument("captures", nargs="+", type=Path)
+    parser.add_argument("--before", type=Path, default=ROOT, help="a checkout of another build")
     parser.add_argument("--out", type=Path, help="the table; without, it is printed alone")
     options = parser.parse_args()
     rows = []
-    for text in options.scenes:
-        name, scene, capture = text.split("=")
-        found = figures(Path(scene), Path(capture))
-        rows.append(",".join([name, *found, *simulated(Path(scene), options.root)]))
-        sys.stdout.write(rows[-1] + "\n")
-        sys.stdout.flush()
+    for capture in options.captures:
+        with tempfile.TemporaryDirectory() as out:
+            for how, mesh, took in bodies(capture, Path(out)):
+                root = options.before if how == "all splats" else ROOT
+                fits = root == ROOT or 16 * len(mesh.vertices) ** 2 < MOST_GB << 30
+                scene = Path(out, f"{how}.scene.json")
+                simulates = simulated(scene, root) if fits else ["", ""]
+                cells = [capture.name, how, *figures(mesh, capture), f"{took:.1f}", *simulates]
+                rows.append(",".join(cells))
+                sys.stdout.write(rows[-1] + "\n")
+                sys.stdout.flush()
     if options.out:
-        head = f"# python tools/decomposition/background.py --out {options.out} NAME=SCENE=CAPTURE"
-        options.out.write_text("\n".join([head, FIELDS, *rows]) + "\n")
+        command = f"# python tools/decomposition/background.py --out {options.out} --before DIR"
+        options.out.write_text("\n".join([f"{command} CAPTURE ...", FIELDS, *rows]) + "\n")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from shapeshift.training.baselines.plain_step import (
     PlainDensificationStats,
     PlainStep,
 )
+from shapeshift.training.checkpoint import CONTENTS, refuse_other_capture
 from shapeshift.training.drawing import Color
 from shapeshift.training.first_anchors.first_anchors import neighbour_distance, photo_colors
 from shapeshift.training.first_anchors.hull import (
@@ -139,6 +140,7 @@ class PlainTrainer(Run):
         """(state, notes) from which `resume` goes on to the same bits."""
         notes = {name: getattr(self, name) for name in NOTED}
         notes |= {"first_loss": self.guard.first_loss, "settings": self.settings.as_dict()}
+        notes[CONTENTS] = self.contents
         return self.adam.state() | self.statistics(), notes | {"plain_splats_of": self.stop.name}
 
     def restore(self, state: dict[str, np.ndarray], notes: dict) -> None:
@@ -148,6 +150,7 @@ class PlainTrainer(Run):
                 f"the checkpoint is not of plain splats of '{self.stop.name}'; train anew without "
                 "--resume."
             )
+        refuse_other_capture(self.capture, notes[CONTENTS])
         for name in NOTED:
             setattr(self, name, notes[name])
         self.set_start(notes["start_s"])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.cameras.upright import turn_of_world
+from shapeshift.scene.cameras.upright import UNIT_M, turn_of_world
 from shapeshift.scene.captures.capture import LEFT_HANDED, Capture
 from shapeshift.scene.captures.point_clouds import read_las, read_points
 from shapeshift.scene.pose import View
@@ -278,7 +278,7 @@ def cloud_points(path: Path, capture: Capture, rng: np.random.Generator) -> tupl
         raise BadFile(f"{path}: holds no points, or some that are no numbers; export it again.")
     up = capture.notes.get("up_in_file", (0.0, 1.0, 0.0))
     turn = turn_of_world(up, bool(capture.notes.get(LEFT_HANDED)), str(path))
-    turned = subsampled(points, rng) @ turn[:3, :3].T
+    turned = subsampled(points, rng) @ turn[:3, :3].T * capture.notes.get(UNIT_M, 1.0)
     return turned - np.array(capture.origin), count
 
 

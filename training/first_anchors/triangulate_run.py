@@ -137,6 +137,7 @@ def main(given: str, wanted: str) -> None:
     except ImportError as why:
         sys.stderr.write(str(why))
         sys.exit(ABSENT)
+    pycolmap.logging.logtostderr = True  # else it leaves files in the temporary folder
     pycolmap.set_random_seed(0)
     with np.load(given) as job:
         cameras = [

@@ -4,13 +4,13 @@ Which photos are matched with which follows from their poses; triangulate_run.py
 """
 
 import math
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.scene.captures.colmap.colmap_child import Progress, run_child
 from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.views import common_box, pixel_of
@@ -86,7 +86,7 @@ def triangulated_points(
     ]
     if not pairs:
         return np.zeros((0, 3))
-    with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
+    with temporary_folder() as folder:
         given, wanted = Path(folder, "photos.npz"), Path(folder, "points.npz")
         write_job(given, chosen, pairs, background, effort.first_octave)
         log = Path(folder, "log.txt")

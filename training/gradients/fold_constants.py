@@ -5,11 +5,11 @@ is known beforehand to be small, until the shape of every value is known; so wha
 known before onnxruntime, which folds the rest, asks the machine for it.
 """
 
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.session import load_onnxruntime
 from shapeshift.training.gradients.onnx_graph import SMALL, OnnxGraph
@@ -72,7 +72,7 @@ def optimized(graph: OnnxGraph):
     options = quiet_options()
     levels = load_onnxruntime().GraphOptimizationLevel
     options.graph_optimization_level = levels.ORT_ENABLE_BASIC
-    with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
+    with temporary_folder() as folder:
         path = Path(folder) / "folded.onnx"
         options.optimized_model_filepath = str(path)
         open_checked(graph.model().SerializeToString(), graph.name, options)

@@ -5,6 +5,8 @@ from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.regions import Region, Regions
+from shapeshift.app.editor.texts.table import said
+from shapeshift.scene.cameras.upright import ASSUMED, PHOTOS, PLANES, STATED, Upright, disagree
 from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
@@ -110,6 +112,36 @@ def draw_segments(
     """Segments (S, 2, 3) of an object's frame, in the accent."""
     placed = moved(lines, obj.world_from_object.matrix())
     _lines(on_screen(view, placed, size), theme.color(theme.ACCENT, 0.9), 1.8 * ui_scale)
+
+
+NAMES = {STATED: "up: capture", ASSUMED: "up: usual axis", PHOTOS: "up: photos",
+         PLANES: "up: planes"}  # fmt: skip
+
+
+def draw_ups(upright: Upright, centre: np.ndarray, view: View, ui_scale: float) -> None:
+    """An arrow a way that says what is up, from the middle of the scene, where two disagree; the
+    one that is believed in the accent, and how far each is from it.
+    """
+    if not any(disagree(way, upright.used) for way in upright.ways):
+        return
+    screen, draw = imgui.get_io().display_size, imgui.get_background_draw_list()
+    for one, other, way in zip(*up_arrows(upright, centre, view), upright.ways, strict=True):
+        ink = theme.color(theme.ACCENT if way == upright.used else theme.TEXT, 0.9)
+        ends = on_screen(view, np.array([[one, other]]), (screen.x, screen.y))
+        _lines(ends, ink, 2.5 * ui_scale)
+        for x, y in np.clip(ends[:, 1], -1e5, 1e5):
+            draw.add_circle_filled(Vec(x, y), 4 * ui_scale, ink)
+            text = f"{said(NAMES[way.source])}, {way.off(upright.used):.0f}\u00b0"
+            draw.add_text(Vec(x + 8 * ui_scale, y - 8 * ui_scale), ink, text)
+
+
+def up_arrows(upright: Upright, centre: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """(W, 3) each, metres in the world: where each way's arrow begins and ends, a third of the
+    picture long."""
+    away = np.linalg.norm(centre - view.world_from_eye.position)
+    length = away * (view.tangents[3] - view.tangents[2]) / 3
+    ways = np.array([way.direction for way in upright.ways]) @ upright.turn.T
+    return np.broadcast_to(centre, ways.shape), centre + length * ways
 
 
 def draw_brush(cursor: tuple[float, float], radius: float, erase: bool, ui_scale: float) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.legend_panel import draw_legend
-from shapeshift.app.editor.panels.outlines import draw_brush, draw_outlines
+from shapeshift.app.editor.panels.outlines import draw_brush, draw_outlines, draw_ups
 from shapeshift.app.editor.panels.panel import Section, draw_panel
 from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
 from shapeshift.app.editor.panels.sections.camera_panel import draw_cameras, draw_edges
@@ -17,6 +17,7 @@ from shapeshift.app.editor.panels.sections.plain_sections import plain_sections
 from shapeshift.app.editor.panels.slider import draw_slider_bar
 from shapeshift.app.editor.panels.status_line import draw_status
 from shapeshift.app.editor.state.arrange import poll_bodies
+from shapeshift.app.editor.state.camera.camera import FIRST
 from shapeshift.app.editor.state.camera.framed import Framed
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -359,6 +360,9 @@ class Viewer:
             draw(scale)
         if state.overlay or state.regions.placing:
             draw_outlines(state.regions, state.scene, self.viewpoint.view(), scale)
+        upright, camera = state.edited.file.upright, self.viewpoint.camera
+        if state.overlay and upright is not None and camera.framed == FIRST:
+            draw_ups(upright, state.centre, self.viewpoint.view(), scale)
         if self.hands.is_painting and window.on_scene:
             erasing = self.hands.is_erasing
             draw_brush(window.cursor, state.regions.brush * scale, erasing, scale)

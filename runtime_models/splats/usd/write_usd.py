@@ -1,12 +1,11 @@
 """Plain splats to USD: one ParticleField3DGaussianSplat in metres, +Y up, by usd-core."""
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.files.whole_file import temporary_folder, write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.usd.read_usd import refuse_without
@@ -24,7 +23,7 @@ def write_usd(splats: PlainSplats, path: str | Path) -> None:
     path = Path(path)
     refuse_without(path)
     ending = path.suffix.lower()
-    with tempfile.TemporaryDirectory(prefix="shapeshift-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder() as folder:
         layer = Path(folder, INNER if ending == ".usdz" else f"splats{ending}")
         write_stage(splats, layer)
         if ending == ".usdz":

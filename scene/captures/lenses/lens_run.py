@@ -10,6 +10,7 @@ def lens_points(model: str, size: list, params: list, given: np.ndarray, back: b
     """(N, 2) pixels at tangents (N, 2); back: tangents at pixels."""
     import pycolmap
 
+    pycolmap.logging.logtostderr = True  # else it leaves files in the temporary folder
     camera = pycolmap.Camera(model=model, width=size[0], height=size[1], params=params)
     with np.errstate(all="ignore"):
         if back:

@@ -10,13 +10,13 @@ import shutil
 import subprocess
 from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
 
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.plain_text import one_line, path_end
+from shapeshift.runtime_models.files.whole_file import temporary_folder
 from shapeshift.runtime_models.model import BadFile
 
 PROGRAM = "dji-thermal-cli"
@@ -75,7 +75,7 @@ def _converted(path: Path, _changed_ns: int, size: int) -> np.ndarray:
         raise BadFile(f"{where}: a radiometric JPEG of DJI; {ADVICE}.")
     if not 0 < size <= MOST_BYTES:
         raise BadFile(f"{where}: {size:,} bytes are no thermal photo; copy it again")
-    with TemporaryDirectory(prefix="shapeshift-") as folder:
+    with temporary_folder() as folder:
         photo, out = Path(folder, "in", "photo.jpg"), Path(folder, "out")
         photo.parent.mkdir()
         shutil.copyfile(path, photo)

@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.cameras.upright import turn_of_world
+from shapeshift.scene.cameras.upright import UNIT_M, turn_of_world
 from shapeshift.scene.capture_files import find_file, photo_key
 from shapeshift.scene.capture_found import FileTable
 from shapeshift.scene.captures.capture import LEFT_HANDED, Capture, FoundFiles
@@ -274,7 +274,9 @@ def with_points(capture: Capture, posed: PosedFrames) -> Capture:
         return capture
     up, mirrored = capture.notes["up_in_file"], capture.notes.get(LEFT_HANDED, False)
     turn = turn_of_world(up, mirrored, posed.where)[:3, :3]
-    ours = (points[good] @ turn.T - np.array(capture.origin)).astype(np.float32)
+    ours = (
+        points[good] @ turn.T * capture.notes.get(UNIT_M, 1.0) - np.array(capture.origin)
+    ).astype(np.float32)
     if colors is not None:
         colors = np.clip(colors[good], 0, 1).astype(np.float32)
     files = (*capture.files, FoundFiles("points", len(ours), len(ours), 0))

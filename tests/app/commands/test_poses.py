@@ -1,11 +1,15 @@
 """poses: as a person starts it, on photos and on a video of a traced room; its refusals."""
 
+import contextlib
 import json
+import shutil
 import signal
 import sqlite3
 import subprocess
 import sys
 import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +18,13 @@ from PIL import Image
 pytest.importorskip("pycolmap", reason="pycolmap is not installed")
 
 from shapeshift.app import cli
-from shapeshift.app.commands.poses import parse_length
+from shapeshift.app.commands.poses import Options, frames_of, parse_length, refuse_target
 from shapeshift.app.errors import UsageError
+from shapeshift.decomposition.poses import write_posed
+from shapeshift.decomposition.poses.colmap_run import clear_others
+from shapeshift.decomposition.poses.find_poses import PoseSettings, describe, start_job
+from shapeshift.decomposition.poses.photo_list import list_photos
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.program import ROOT, assert_refused, launch
 from tests.support.scene.textured_room import camera, photo, write_photos
@@ -156,3 +165,83 @@ def test_a_video_gives_its_sharpest_frames(tmp_path, capsys):
     assert poses(video, "--out", tmp_path / "room", "--frames", 6) == 0
     assert "6 of 6 photos placed" in capsys.readouterr().out
     assert not (tmp_path / "room/frames").exists()
+
+
+# What a run that was killed leaves, and what is put in the place of its input meanwhile.
+
+
+def test_parts_of_a_killed_run_are_no_strange_files(tmp_path):
+    """Killed while frames were taken: a part and the note of the video lie in --out."""
+    out = tmp_path / "room"
+    (out / ".shapeshift-0123456789abcdef.part").mkdir(parents=True)
+    (out / "frames.txt").write_text("of a video")
+    refuse_target(Options(tmp_path / "walk.mp4", out))
+    assert [path.name for path in out.iterdir()] == ["frames.txt"]
+
+
+def test_frames_of_another_video_are_not_used(tmp_path, monkeypatch):
+    taken: list[Path] = []
+
+    def take(video, folder, count, progress):
+        taken.append(video)
+        (folder / "00000.jpg").touch()
+
+    monkeypatch.setattr("shapeshift.decomposition.poses.video_frames.take_frames", take)
+    one, other, out = tmp_path / "a.mp4", tmp_path / "b.mp4", tmp_path / "room"
+    one.write_bytes(b"one")
+    other.write_bytes(b"other")
+    folder = frames_of(Options(one, out), None)
+    assert frames_of(Options(one, out), None) == folder and taken == [one]
+    copy = tmp_path / "copy.mp4"
+    copy.write_bytes(b"one")  # the same by content
+    assert frames_of(Options(copy, out), None) == folder and taken == [one]
+    for options in (Options(other, out), Options(one, out, frames=6)):
+        with pytest.raises(UsageError, match="frames of another video or --frames"):
+            frames_of(options, None)
+    refuse_target(Options(other, out, overwrite=True))
+    assert frames_of(Options(other, out), None) == folder and taken == [one, other]
+
+
+def test_other_photos_of_the_same_names_are_another_search(photos, tmp_path):
+    work = tmp_path / "work"
+    work.mkdir()
+    mine = tmp_path / "photos"
+    shutil.copytree(photos, mine)
+    start_job(work, describe(list_photos(mine), work, PoseSettings(), None))
+    start_job(work, describe(list_photos(mine), work, PoseSettings(), None))
+    first, second = sorted(mine.iterdir())[:2]
+    first.write_bytes(second.read_bytes())
+    with pytest.raises(BadFile, match=rf"other photos or options \({first.name} is another pict"):
+        start_job(work, describe(list_photos(mine), work, PoseSettings(), None))
+    (work / "job.json").write_text("[]")  # damaged, or of another version
+    with pytest.raises(BadFile, match="other photos or options; give those again"):
+        start_job(work, describe(list_photos(mine), work, PoseSettings(), None))
+
+
+def test_matches_that_were_guided_go_before_the_first_attempt(tmp_path):
+    """A run that was killed in guided matches begins again as one that was never started."""
+    cleared: list[str] = []
+    base = SimpleNamespace(clear_matches=lambda: cleared.append("matches"),
+                           clear_two_view_geometries=lambda: None)  # fmt: skip
+    colmap = SimpleNamespace(
+        Database=SimpleNamespace(open=lambda path: contextlib.nullcontext(base))
+    )
+    mark = tmp_path / "guided"
+    for guided, times, kept in (
+        (False, 0, False), (True, 1, True),  # a run, killed
+        (False, 2, False), (True, 3, True), (True, 3, True), (False, 4, False), (False, 4, False),
+    ):  # fmt: skip
+        clear_others(colmap, tmp_path / "database.db", mark, guided)
+        assert (len(cleared), mark.exists()) == (times, kept)
+
+
+def test_what_makes_it_a_capture_is_written_last(photos, tmp_path, monkeypatch):
+    out, written = tmp_path / "room", []
+    real = write_posed.write_whole
+    monkeypatch.setattr(
+        write_posed, "write_whole", lambda path, data: (written.append(path.name), real(path, data))
+    )
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    assert poses(photos, "--out", out) == 0
+    assert written[-1] == "images.bin" and written.count("images.bin") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["room"]  # no log of a library's

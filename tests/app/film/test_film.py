@@ -1,6 +1,7 @@
 """film: the same frames always, files that other programs read, refusals in one sentence."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from shapeshift.app.drawing import open_renderer
 from shapeshift.app.film.draw_film import averaged
 from shapeshift.app.film.film_plan import circle_around
 from shapeshift.app.paths import DEMO
+from shapeshift.runtime_models.files import whole_file
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.cameras.camera_list import CameraList
@@ -145,6 +147,24 @@ def test_what_was_killed_goes_on_with_the_same_frames(scene, cameras, drawn, tmp
     assert film(*words[1:]) == 0
     assert bytes_of(out) == bytes_of(drawn)
     assert all((out / name).stat().st_mtime_ns == at for name, at in kept.items())
+
+
+def test_frames_that_a_disk_has_spoiled_are_drawn_again(scene, cameras, drawn, tmp_path):
+    """Cut off, empty, of another size, no picture; and a part that a kill has left."""
+    out = tmp_path / "spoiled"
+    shutil.copytree(drawn, out)
+    whole = bytes_of(drawn)
+    bad = {0: whole["00000.png"][:-1], 1: b"", 2: b"x" * 100, 3: whole["00003.png"][:-12]}
+    for number, data in bad.items():
+        (out / f"{number:05d}.png").write_bytes(data)
+    Image.new("RGB", (SIZE[0] + 1, SIZE[1])).save(out / "00004.png")
+    options = (scene, "--cameras", cameras, *TINY, *STYLE, "--out", out)
+    assert film(*options) == 0
+    assert bytes_of(out) == whole
+    (out / ".shapeshift-0123456789abcdef.part").touch()
+    whole_file._swept.clear()  # as another start
+    assert film(*options, "--background", 1, 1, 1, "--overwrite") == 0
+    assert len(bytes_of(out)) == 6 and not list(out.glob(".*"))
 
 
 def test_frames_of_another_film_are_not_mixed_in(scene, cameras, tmp_path, capsys):

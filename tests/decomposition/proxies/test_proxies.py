@@ -6,10 +6,17 @@ import pytest
 from shapeshift.decomposition.assemble import SNAP, choose_proxy, pressed
 from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.partition import LabelledView
-from shapeshift.decomposition.proxies.ground import distinct, is_within, slab, without_diagonals
+from shapeshift.decomposition.proxies.ground import (
+    distinct,
+    is_within,
+    seen_plane,
+    slab,
+    without_diagonals,
+)
 from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
+from shapeshift.scene.colliders.carve import SeenDepth
 from shapeshift.scene.colliders.collider import Collider, box_around
-from shapeshift.scene.colliders.collider_wrap import is_watertight, volume
+from shapeshift.scene.colliders.collider_wrap import is_watertight, join_meshes, volume
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
 from shapeshift.scene.pose import View, look_at, perspective
 from tools.decomposition.surface_scores import score_surfaces, surface_of
@@ -63,6 +70,33 @@ def test_the_true_cube_is_chosen_and_a_smaller_one_covers_too_little():
     assert [proxy.name for proxy in scored] == ["true", "small", "large"] or scored[0] is best
     small = score_silhouettes(candidates["small"], np.eye(4), 1, maps)
     assert small.recall == pytest.approx(0.25, abs=0.06)  # half as wide, a little farther away
+
+
+def test_a_mesh_is_scored_by_its_faces():
+    """Two cubes that touch at an edge: their hull covers what lies between, the mesh does not."""
+    low, high = (box_around(np.array([[s * 0.1, s * 0.1, -0.1], [0, 0, 0.1]])) for s in (-1, 1))
+    view = view_from((0, 0, 1.0))
+    labels = silhouette(view, (low.vertices, high.vertices)).astype(np.uint8)
+    both = Collider((np.concatenate([low.vertices, high.vertices]),), join_meshes([low, high]))
+    maps = [LabelledView(view, 0.0, labels)]
+    assert score_silhouettes(both, np.eye(4), 1, maps, as_mesh=True).iou == 1
+    assert score_silhouettes(both, np.eye(4), 1, maps).iou < 0.8
+
+
+def test_photos_raise_a_plane_to_what_they_see_of_it():
+    """Not by less than FEWEST_PIXELS, nor to what lies farther off than what counts as it."""
+    eye = (0.0, 1.0, 0.001)
+    view = View(look_at(eye, (0, 0, 0)), perspective(0.8, (12, 9)), 0.05, 10.0, (12, 9))
+    below = Plane(FLOOR.normal, -0.02)
+    ends = np.ones((9, 12), bool)
+
+    def seen(ends: np.ndarray) -> list[SeenDepth]:
+        return [SeenDepth(view, np.full((9, 12), 1.0, np.float32), ends)]
+
+    assert seen_plane(below, seen(ends), 0.03).offset == pytest.approx(0, abs=1e-6)
+    assert seen_plane(below, seen(ends), 0.015) is below
+    assert seen_plane(below, seen(ends & (np.arange(12) != 0)), 0.03) is below  # 99
+    assert seen_plane(below, [], 0.03) is below
 
 
 def test_other_objects_say_nothing():

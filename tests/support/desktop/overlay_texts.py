@@ -27,6 +27,7 @@ TABLES = {
     "cuts_panel": {"ADD": ALL, "EDGES": VALUES},
     "empty_panel": {"CHOICES": ALL, "WHAT": ALL},
     "open_row": {"NEW": ALL},
+    "outlines": {"NAMES": VALUES},
     "panel": {"LARGER": ALL, "SMALLER": ALL, "ORDER": ALL},
     "sections.camera_panel": {
         "STEPS": ALL, "KEEP": ALL, "SIDES": ALL, "WAYS": ALL, "FORM_NAMES": VALUES,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapeshift.app.training.train_baselines import checkpoint_of, is_unfinished
 from shapeshift.rasterizer.reference import rotations
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.read_scene import describe, read_model
@@ -322,6 +323,22 @@ def one_splat() -> PlainSplats:
 def test_names_of_stops_become_names_of_files():
     assert layer_name(3, Stop("a/../b: ä", 0.0)) == "3_a____b___.ply"
     assert layer_name(0, Stop("x" * 500, 0.0)) == f"0_{'x' * 40}.ply"
+
+
+def test_what_a_killed_run_left_is_written_into(tmp_path):
+    """Models without their list, each with a checkpoint beside the folder."""
+    out = tmp_path / "splats"
+    files = [out / "0_a.ply", out / "1_b.ply"]
+    assert not is_unfinished(out, files)
+    out.mkdir()
+    (out / ".shapeshift-0123456789abcdef.part").touch()
+    assert is_unfinished(out, files)  # killed in the first
+    files[0].touch()
+    assert not is_unfinished(out, files)  # somebody else's, of the same name
+    checkpoint_of(out, files[0]).touch()
+    assert is_unfinished(out, files)
+    (out / "mine.txt").touch()
+    assert not is_unfinished(out, files)
 
 
 def test_only_a_folder_of_ours_is_written_into(tmp_path):

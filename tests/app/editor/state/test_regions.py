@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.panels.outlines import on_screen, segments
+from shapeshift.app.editor.panels.outlines import on_screen, segments, up_arrows
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.regions import (
     KINDS,
@@ -17,7 +17,8 @@ from shapeshift.app.editor.state.regions import (
     selector_of,
 )
 from shapeshift.runtime_models.model import SplatLayers, Stop
-from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.cameras.upright import Up, Upright
+from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
 from tests.support.models import make_random_model
@@ -245,3 +246,16 @@ def test_picking_sees_what_a_region_shows():
     assert state.pick(VIEW, ray, 0.001).point[2] == pytest.approx(1)
     state.regions.add_selectors((HalfSpace(point=(0, 0, 0), normal=(0, 0, -1.0), x=1.0),), 0)
     assert state.pick(VIEW, ray, 0.001).point[2] == pytest.approx(-1)
+
+
+def test_arrows_of_up_point_as_each_way_says_and_fill_a_third_of_the_picture():
+    tilted = Up("planes", (0.0, 0.6, 0.8))
+    upright = Upright((Up("assumed", (0.0, 1.0, 0.0)), tilted), tilted)
+    size = (300, 300)
+    view = View(look_at((0, 0, 5), (0, 0, 0)), perspective(0.9, size), 0.05, 100.0, size)
+    begin, end = up_arrows(upright, np.zeros(3), view)
+    way = (end - begin) / np.linalg.norm(end - begin, axis=1)[:, None]
+    np.testing.assert_allclose(way[1], (0, 1, 0), atol=1e-12)  # the one that is believed
+    np.testing.assert_allclose(way[0] @ way[1], 0.6, atol=1e-12)  # as far apart as in the capture
+    ((low, high),) = on_screen(view, np.stack([begin, end], 1)[1:], size)
+    assert low[1] - high[1] == pytest.approx(100, abs=1e-9)
