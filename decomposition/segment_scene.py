@@ -50,7 +50,16 @@ class SegmentedPart:
     photos: int  # in which a label map shows it
     rows: int  # anchors, of plain splats splats
     pixels: float  # of evidence that its rows have
-    share: float  # of that, how much is for this object: 1 where no pixel disagrees
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What photos that an object was not made from say of it."""
+
+    name: str
+    agreement: float  # 0..1: IoU with masks made afresh there; NaN where nothing can be said
+    photos: int  # that show it
+    doubt: str  # why it may be wrong, in a few words; "": nothing speaks against it
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,7 @@ class Segmented:
     parts: tuple[SegmentedPart, ...]
     pictures: tuple[LabelledView, ...]  # what the label maps said
     silent: int  # photos without a label map
+    judged: tuple[Judged, ...] = ()  # of each part, in their order
     rests: tuple[Rest, ...] = ()  # of each body, as the scene is written; (): nothing was tested
 
 
@@ -139,10 +149,8 @@ def segment(
     for spec in specs:
         mine = cut.labels == spec.label
         pixels = float(sums[mine].sum())
-        column = int(column_of[spec.label])
-        share = float(sums[mine, column].sum() / pixels) if pixels else 0.0
         seen = sum(bool((picture.labels == spec.label).any()) for picture in pictures)
-        parts.append(SegmentedPart(spec, seen, int(mine.sum()), pixels, share))
+        parts.append(SegmentedPart(spec, seen, int(mine.sum()), pixels))
     silent = photos - len(pictures)
     return Segmented(cut, tuple(parts), tuple(pictures), silent)
 
@@ -163,6 +171,7 @@ def scene_of_parts(found: Segmented, model: str, folder: Path) -> SceneFile:
     They have no poses: a part without one stands where its model has it.
     """
     names = [part.spec.name for part in found.parts if part.rows]
+    doubts = {judged.name: judged.doubt for judged in found.judged}
     items = tuple(
         SceneItem(
             name=part.spec.name,
@@ -173,6 +182,7 @@ def scene_of_parts(found: Segmented, model: str, folder: Path) -> SceneFile:
             collider=part.spec.collider,
             static=part.spec.static,
             mass_kg=part.spec.mass_kg,
+            doubt=doubts.get(part.spec.name, ""),
         )
         for part in found.parts
         if part.spec.name in names

@@ -55,6 +55,20 @@ def walk_objects(
     progress("graph of anchors", 0, len(specs.objects))
     graph = make_graph(nodes_of(shown.model, eyes.mean(axis=0).astype(np.float32)), eyes)
     masks = prompted_masks(shown, photos, specs, graph.nodes, progress)
+    labels = labels_of_masks(shown, photos, graph, masks)
+    for spec in specs.objects:
+        if not (labels == spec.label).any():
+            raise BadFile(
+                f"object '{spec.name}' gets no anchor of the scene; its mask shows too little of "
+                "it: give a tighter box, clicks inside, or a mask."
+            )
+    return labels, masks
+
+
+def labels_of_masks(
+    shown: ShownAnchors, photos: list[WorkPhoto], graph: AnchorGraph, masks: Masks
+) -> np.ndarray:
+    """(A,) int32 labels: what the masks show of anchors, and a walk to all others."""
     inside: dict[int, np.ndarray] = {}
     seen: dict[int, np.ndarray] = {}
     for label, by_photo in masks.items():
@@ -63,14 +77,7 @@ def walk_objects(
             (within,), all_of_it = shown.masks(photos[view].view, photos[view].stop.x, [mask])
             inside[label] += within
             seen[label] += all_of_it
-    labels = walk_labels(graph, inside, seen)
-    for spec in specs.objects:
-        if not (labels == spec.label).any():
-            raise BadFile(
-                f"object '{spec.name}' gets no anchor of the scene; its mask shows too little of "
-                "it: give a tighter box, clicks inside, or a mask."
-            )
-    return labels, masks
+    return walk_labels(graph, inside, seen)
 
 
 def walk_labels(
@@ -165,6 +172,7 @@ LEAST_ON = 0.2  # of what lies around a prompt, that has to lie on one plane
 WITHIN = 0.7  # spacings of anchors: as near to the plane is on it while it is looked for
 MOST_PLACES = 2000  # by which a plane is looked for
 FINE, LOW, HIGH = 1.5, -2.0, 6.5  # medians of what lies beside the plane; of asinh of heights
+ON_PLANE = (60, 30)  # of 255: heights about 0, and by how much they scatter
 
 
 def heights_of(
@@ -229,18 +237,17 @@ def segment_by_walk(
     parts: list[SegmentedPart] = []
     for spec in specs.objects:
         rows = labels == spec.label
-        inside = seen = 0.0
+        seen = 0.0
         for view, mask in masks[spec.label].items():
             photo = photos[view]
-            (within,), total = shown.masks(photo.view, photo.stop.x, [mask])
-            inside, seen = inside + float(within[rows].sum()), seen + float(total[rows].sum())
+            _, total = shown.masks(photo.view, photo.stop.x, [])
+            seen += float(total[rows].sum())
             silent = np.full(mask.shape, SILENT, np.uint8)
             picture = pictures.setdefault(
                 view, LabelledView(photo.view, photo.stop.x, silent, photo.photo.path)
             )
             picture.labels[mask] = spec.label
-        share = inside / seen if seen else 0.0
-        parts.append(SegmentedPart(spec, len(masks[spec.label]), int(rows.sum()), seen, share))
+        parts.append(SegmentedPart(spec, len(masks[spec.label]), int(rows.sum()), seen))
     objects = tuple(ObjectLabel(spec.label, spec.name) for spec in specs.objects)
     cut = with_labels(shown.model, labels, objects)
     return Segmented(cut, tuple(parts), tuple(pictures.values()), 0)

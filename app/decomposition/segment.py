@@ -120,6 +120,7 @@ def cut(
     """
     from shapeshift.app.decomposition.segment_steps import CompletionSettings, at_rest, completed
     from shapeshift.app.errors import UsageError
+    from shapeshift.decomposition.judge import judged
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
     from shapeshift.decomposition.upright_scene import planes_under, scale_sentence, upright_scene
     from shapeshift.scene.document.write_scene_file import write_scene_file
@@ -140,6 +141,8 @@ def cut(
         found, counts = find_by_prompts(device, model, capture, specs, settings)
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
+    progress("asking other photos", 0, 1)
+    found = judged(device, found, capture)
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     planes: dict[int, Plane] = {}
@@ -307,10 +310,11 @@ def facts_of(
             "photos": part.photos,
             "rows": part.rows,
             "pixels": round(part.pixels, 1),
-            "share": round(part.share, DECIMALS),
+            "agreement": round(judged.agreement, DECIMALS) if isfinite(judged.agreement) else None,
+            "doubt": judged.doubt,
             **(vars(counts[part.spec.label]) if counts else {}),
         }
-        for part in found.parts
+        for part, judged in zip(found.parts, found.judged, strict=True)
     }
     for rest in found.rests:
         rows[rest.name]["rest"] = rest.row()
@@ -348,12 +352,13 @@ def print_tables(found: "Segmented", scores: "Sequence[LabelScore]") -> None:
 
     rows = "anchors" if isinstance(found.model, AnchorModel) else "splats"
     rests = {rest.name: rest.word for rest in found.rests}
-    table = Table("label", "object", "photos", rows, "pixels", "share", *["rests"] * bool(rests))
-    for part in found.parts:
+    table = Table("label", "object", "photos", rows, "pixels", "agrees", *["rests"] * bool(rests),
+                  "doubt")  # fmt: skip
+    for part, judged in zip(found.parts, found.judged, strict=True):
         table.add_row(
             str(part.spec.label), part.spec.name, f"{part.photos:,}", f"{part.rows:,}",
-            f"{part.pixels:,.0f}", f"{part.share:.1%}" if part.rows else "",
-            *[rests.get(part.spec.name, "")] * bool(rests),
+            f"{part.pixels:,.0f}", percent(judged.agreement) + " %" * (judged.agreement > 0),
+            *[rests.get(part.spec.name, "")] * bool(rests), judged.doubt,
         )  # fmt: skip
     console = open_console(stderr=False)
     console.print(table)

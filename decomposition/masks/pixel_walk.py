@@ -2,8 +2,7 @@
 
 Histograms of the colours inside and outside give a first guess, a random walk over the pixels
 joins it along edges of the photo; repeated, as GrabCut does it with graph cuts (Rother 2004).
-All that is marked in one photo is decided together: no pixel belongs to two.
-Good for compact things; long thin ones need a segmenter (docs/objects.md).
+What is marked in one photo is decided together.  Long thin things need a segmenter.
 """
 
 from collections.abc import Sequence
@@ -103,13 +102,12 @@ def walk_together(
     stands above that on which the object stands.  The order of the prompts changes nothing.
     """
     heights = heights or [None] * len(prompts)
-    known = [with_box_of_mask(prompt) for prompt in prompts]
-    known = [
-        with_box_of_clicks(image, p, known[:k] + known[k + 1 :], heights[k])
-        for k, p in enumerate(known)
-    ]
+    boxed = [with_box_of_mask(prompt) for prompt in prompts]
+    known = [with_box_of_clicks(image, p, boxed[:k] + boxed[k + 1 :], heights[k])
+             for k, p in enumerate(boxed)]  # fmt: skip
     # The smallest box first: what lies within another is the more exactly said.
-    order = sorted((k for k, p in enumerate(known) if is_placed(p)), key=lambda k: rank(known[k]))
+    placed = [k for k, p in enumerate(known) if p.box is not None]
+    order = sorted(placed, key=lambda k: rank(known[k]))
     parts = [
         part_of(image, known[k], [known[j] for j in order if j != k], heights[k]) for k in order
     ]
@@ -128,10 +126,6 @@ def walk_together(
     for k, (at, part) in enumerate(zip(order, parts, strict=True)):
         found[at] = candidate_of(part, k, owner)
     return found
-
-
-def is_placed(prompt: Prompt) -> bool:
-    return prompt.box is not None or len(prompt.inside) > 0
 
 
 def rank(prompt: Prompt) -> tuple:
@@ -317,8 +311,7 @@ def part_of(
         low = resized(height[top:bottom, left:right], size)
         small = np.concatenate([small, low[..., None]], axis=2)
     beside = [moved(other, (left, top), scale) for other in others]
-    clicks_beside = [other.inside for other in beside]
-    prompt = replace(prompt, outside=np.concatenate([prompt.outside, *clicks_beside]))
+    prompt = replace(prompt, outside=np.concatenate([prompt.outside, *(o.inside for o in beside)]))
     seeds, core = seeds_of(prompt, small.shape[:2])
     clicks = np.zeros(seeds.shape)
     if len(prompt.inside) or len(prompt.outside):

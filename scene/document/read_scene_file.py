@@ -84,6 +84,7 @@ def read_item(row: Fields, file: str) -> SceneItem:
     values = read_looks(row) | {
         "static": row.flag("static"),
         "floats": row.flag("floats"),
+        "doubt": row.text("doubt", ""),
         "mass_kg": row.number("mass_kg", 1.0, "kilograms above 0", 1e-9, MASS),
         "states": tuple(map(read_state, row.rows("states", MOST_ROWS, "state"))),
         "ring": row.flag("ring"),

@@ -56,6 +56,7 @@ class SceneItem:
     collider: str | None = None  # a mesh's path, HULLS, or None: nothing can touch it
     static: bool = False  # touched, but never moved
     floats: bool = False  # stays in the air until something touches it
+    doubt: str = ""  # why it may be cut wrong, as `segment` says
     mass_kg: float = 1.0
     friction: float = 0.6
     restitution: float = 0.0

@@ -66,8 +66,8 @@ def item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
     if item.collider is not None:
         path = item.collider
         row["collider"] = path if path == HULLS else moved(path, file.folder, folder)
-    for name in ("mode", "up", "flip", "x", "visible", "static", "floats", "mass_kg", "friction",
-                 "restitution", "ring"):  # fmt: skip
+    for name in ("mode", "up", "flip", "x", "visible", "static", "floats", "doubt", "mass_kg",
+                 "friction", "restitution", "ring"):  # fmt: skip
         if getattr(item, name) != getattr(PLAIN, name):
             row[name] = getattr(item, name)
     if "x" in row:

@@ -2,21 +2,24 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("pyopencl")
 
+from shapeshift.decomposition.judge import BEST, FEW, MOST_VIEWS, judge, views_to_ask
 from shapeshift.decomposition.label_photos import PhotoLabelling, best_of, choose_photos, with_click
 from shapeshift.decomposition.masks.journal import open_journal
 from shapeshift.decomposition.masks.label_maps import SILENT, write_label_map
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs, PhotoPrompt
 from shapeshift.decomposition.masks.work_photos import find_photo, work_photos
-from shapeshift.decomposition.walk_objects import heights_of, walk_objects
+from shapeshift.decomposition.segment_scene import SegmentedPart
+from shapeshift.decomposition.walk_objects import heights_of, walk_objects, with_labels
 from shapeshift.rasterizer.device import NoDevice
-from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.model import BadFile, ObjectLabel, Stop
 from tests.support.decomposition.demo_photos import (
     COUNT,
     SIZE,
@@ -262,6 +265,44 @@ def test_heights_tell_the_bench_from_what_stands_on_it(photos, specs):
     none = replace(nodes, means=np.random.default_rng(0).uniform(-1, 1, nodes.means.shape))
     assert heights_of(demo(), photo.view, 0.0, [prompt], none) == [None]
     assert heights_of(demo(), photo.view, 0.0, [], nodes) == []
+
+
+def test_photos_that_were_used_are_asked_only_without_others(photos):
+    used = {photos[0].photo.path, photos[3].photo.path}
+    chosen = views_to_ask(photos, used)
+    assert len({p.name for p in chosen}) == MOST_VIEWS and not used & {p.photo.path for p in chosen}
+    assert len(views_to_ask(photos, {p.photo.path for p in photos})) == MOST_VIEWS
+    assert [p.name for p in views_to_ask(photos[:2], used)] == [photos[1].name]
+    heat = next(stop for stop in demo().model.stops if stop.is_measured)
+    assert views_to_ask([replace(photos[0], stop=heat)], set()) == views_to_ask([], set()) == []
+
+
+def test_the_demos_mug_is_doubted_where_it_holds_bench(photos):
+    """Cut by the ray tracer's truth, and with the bench within 12 cm of its middle: its
+    agreement falls, and the reason is named; too little of it says nothing."""
+    model, name = demo().model, "mug"
+    label = LABELS[name]
+    right = np.where(labels_of_places(model.anchors)[0] == label, label, 0).astype(np.int32)
+    middle = model.anchors[right > 0].mean(0)
+    near = np.hypot(*(model.anchors - middle)[:, [0, 2]].T) < 0.12
+    wrong = np.where(near & (np.abs(model.anchors[:, 1]) < 0.02), label, right).astype(np.int32)
+
+    def asked(labels: np.ndarray, pixels: float = FEW, views=photos):
+        cut = with_labels(model, labels, (ObjectLabel(label, name),))
+        part = SegmentedPart(ObjectSpec(label, name), 1, int((labels > 0).sum()), pixels)
+        (found,) = judge(demo().device, cut, [part], views, set[Path]())
+        assert found.name == name
+        return found
+
+    good, bad = asked(right), asked(wrong)
+    assert good.agreement > 0.8 and good.doubt == "" and BEST <= good.photos <= MOST_VIEWS
+    assert bad.agreement < good.agreement - 0.1
+    assert bad.doubt == "holds a piece of what it stands on"
+    few = asked(right, 23.0)
+    assert np.isnan(few.agreement) and few.doubt == "too little seen: 23 pixels"
+    alone = asked(right, views=[])
+    assert np.isnan(alone.agreement) and alone.doubt == "no other photo shows it"
+    assert judge(demo().device, model, [], photos, set()) == ()
 
 
 def test_a_box_alone_gets_a_click_where_the_thing_is_deepest():

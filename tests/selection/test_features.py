@@ -22,7 +22,7 @@ FEATURES = {
     ),
     "inspection, thermal": (r"inspection/|radiometric/|api/inspect", 43, 3),
     "film, gallery": (r"^app/film/|^scene/film/|api/film", 16, 3),
-    "segmentation": (r"^decomposition/(?!poses)|^app/decomposition/|api/segment", 34, 3),
+    "segmentation": (r"^decomposition/(?!poses)|^app/decomposition/|api/segment", 35, 3),
     "styles": (r"training/style|api/style", 21, 3),
     "the page": (r"^web/(?!headset)|^app/page/|^runtime_models/web/", 33, 3),
     "change": (r"^app/change/|^scene/change/", 9, 2),

@@ -7,6 +7,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.regions import Region, Regions
 from shapeshift.app.editor.texts.table import said
 from shapeshift.scene.cameras.upright import ASSUMED, PHOTOS, PLANES, STATED, Upright, disagree
+from shapeshift.scene.document.scene_file import SceneFile
 from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
@@ -14,6 +15,7 @@ from shapeshift.scene.scene import Scene, SceneObject
 Vec = imgui.ImVec2
 ROUND = 48  # segments of a circle
 GRID = 4  # lines of a half-space's plane to either side
+BOUNDS = (1, 99)  # percent of an object's anchors along an axis, that its frame holds
 MOST_DOTS = 3000  # of painted anchors that are marked
 
 
@@ -104,6 +106,27 @@ def draw_outlines(regions: Regions, scene: Scene, view: View, ui_scale: float) -
         else:
             lines = moved(segments(region, regions.radius), world_from_object)
             _lines(on_screen(view, lines, size), ink, (1.8 if chosen else 1.2) * ui_scale)
+
+
+def draw_doubts(file: SceneFile, scene: Scene, view: View, ui_scale: float) -> None:
+    """A frame around each object that may be cut wrong, in the colour of a warning."""
+    doubted = {item.name for item in file.items if item.doubt}
+    screen = imgui.get_io().display_size
+    size = (screen.x, screen.y)
+    for obj in scene.objects:
+        if obj.name in doubted and obj.visible:
+            lines = moved(frame_of(anchor_places(obj.model)), obj.world_from_object.matrix())
+            ink = theme.color(theme.WARNING, 0.8)
+            _lines(on_screen(view, lines, size), ink, 1.4 * ui_scale)
+
+
+def frame_of(places: np.ndarray) -> np.ndarray:
+    """(12, 2, 3): the edges of the box that holds nearly all places (A, 3); none of no place."""
+    places = places[np.isfinite(places).all(axis=1)]
+    if not len(places):
+        return np.zeros((0, 2, 3))
+    low, high = np.percentile(places, BOUNDS, axis=0)
+    return segments(Region("box", "", centre=(low + high) / 2, half=(high - low) / 2), 0.0)
 
 
 def draw_segments(

@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.legend_panel import draw_legend
-from shapeshift.app.editor.panels.outlines import draw_brush, draw_outlines, draw_ups
+from shapeshift.app.editor.panels.outlines import draw_brush, draw_doubts, draw_outlines, draw_ups
 from shapeshift.app.editor.panels.panel import Section, draw_panel
 from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
 from shapeshift.app.editor.panels.sections.camera_panel import draw_cameras, draw_edges
@@ -53,6 +53,7 @@ from shapeshift.app.paths import WorkFolders
 from shapeshift.renderer.debug.debug import debug_legend
 from shapeshift.renderer.gl.context import describe
 from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.four_views import OVERLAY
 
 WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
 SLEEP_S = 0.5  # longest wait for input while nothing moves
@@ -360,6 +361,8 @@ class Viewer:
             draw(scale)
         if state.overlay or state.regions.placing:
             draw_outlines(state.regions, state.scene, self.viewpoint.view(), scale)
+        if state.overlay and state.shown_scene.show == OVERLAY:
+            draw_doubts(state.edited.file, state.scene, self.viewpoint.view(), scale)
         upright, camera = state.edited.file.upright, self.viewpoint.camera
         if state.overlay and upright is not None and camera.framed == FIRST:
             draw_ups(upright, state.centre, self.viewpoint.view(), scale)

@@ -80,6 +80,7 @@ def test_label_maps_become_objects_that_can_be_opened(given, tmp_path, capsys):
     assert segment(given, *words) == 0
     told = capsys.readouterr()
     assert "object 1" in told.out and "mean" in told.out
+    assert "agrees" in told.out and "doubt" in told.out
     assert "2 photos have no label maps and say nothing." in told.err
     assert f"view {out}" in told.err
     _, of = balls()
@@ -114,7 +115,9 @@ def test_objects_json_gives_names_masses_and_colliders(given, tmp_path, capsys):
     facts = json.loads(told.out)["objects"]
     assert facts["cup"]["label"] == 2 and facts["cup"]["photos"] == 6
     assert facts["absent"]["rows"] == 0
-    assert 0.4 < facts["mug"]["share"] < 1  # more than that is of every anchor of an object
+    assert facts["absent"]["agreement"] is None and "too little seen" in facts["absent"]["doubt"]
+    assert "share" not in facts["mug"] and 0 <= facts["mug"]["agreement"] <= 1
+    assert read_scene_file(out).items[0].doubt == facts["cup"]["doubt"]
     assert "Left out, for no label map shows it: absent." in told.err
     items = {item.name: item for item in read_scene_file(out).items}
     assert list(items) == ["cup", "mug"]

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from shapeshift.app import cli, program
+from shapeshift.app import cli
 from shapeshift.app.paths import full
 from shapeshift.app.training.train import FEW_STEPS, Options, seconds_a_step, what_next
+from shapeshift.runtime_models import program
 from tests.support.models import random_package
 
 ROOT = Path(__file__).resolve().parents[3]

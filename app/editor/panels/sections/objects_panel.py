@@ -127,6 +127,8 @@ def _row(objects: ObjectEdits, index: int, ui_scale: float) -> None:
     if index >= len(state.scene.objects):
         return
     obj = state.scene.objects[index]
+    item = edits.find(state.edited.file, obj.name)
+    doubt = item.doubt if item is not None else ""
     imgui.push_id(index)
     changed, seen = imgui.checkbox("##seen", obj.visible)
     tip("Seen or hidden; a hidden object is touched as before.", ui_scale)
@@ -136,22 +138,28 @@ def _row(objects: ObjectEdits, index: int, ui_scale: float) -> None:
     imgui.same_line()
     chosen = obj.name == state.chosen
     ink = theme.ACCENT if chosen else theme.TEXT if obj.visible else theme.MUTED
+    ink = theme.WARNING if doubt and not chosen else ink
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*ink, 1))
     width = imgui.get_content_region_avail().x - 56 * ui_scale
     if imgui.selectable(f"{obj.name}###name", chosen, 0, Vec(width, 0))[0]:
         state.chosen = "" if chosen else obj.name
     imgui.pop_style_color()
     splats = number(obj.model.splat_count)
-    tip(said("{name}: {count} splats", name=obj.name, count=splats), ui_scale)
+    told = said("{name}: {count} splats", name=obj.name, count=splats)
+    tip(f"{told}\n{doubt}" if doubt else told, ui_scale)
     imgui.same_line()
     right_aligned(f"x {obj.slider_x:.2f}")
     imgui.pop_id()
 
 
 def _chosen(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
-    """Name, handles, place and body of the chosen object."""
+    """Name, what speaks against it, handles, place and body of the chosen object."""
     if item.name != BACKGROUND:
         _rename(objects, item, ui_scale)
+    if item.doubt:
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.WARNING, 1))
+        imgui.text_wrapped(item.doubt)
+        imgui.pop_style_color()
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
     for mode, word in MODES.items():
         lit = objects.state.handles == mode
