@@ -20,6 +20,7 @@ from shapeshift.decomposition.masks.segmenter import Segmenter
 from shapeshift.decomposition.masks.specs import ObjectSpecs
 from shapeshift.decomposition.masks.work_photos import WorkPhoto, straight_points, work_photos
 from shapeshift.decomposition.shown import ShownAnchors
+from shapeshift.runtime_models.files.hashes import hash_file
 from shapeshift.runtime_models.files.whole_file import make_folders
 from shapeshift.scene.captures.capture import Capture
 
@@ -42,7 +43,8 @@ def label_by_segmenter(
     Raises BadFile.
     """
     photos = choose_photos(work_photos(capture, shown.model.stops), specs, most)
-    inputs = {"format": FORMAT, "photos": [photo.name for photo in photos],
+    contents = [hash_file(photo.photo.path) for photo in photos]  # another one under its name
+    inputs = {"format": FORMAT, "photos": [photo.name for photo in photos], "contents": contents,
               "prompts": digest_of(specs), **about}  # fmt: skip
     journal = open_journal(work, json.loads(json.dumps(inputs)))
     labelling = PhotoLabelling(shown, photos, specs, segmenter, journal, progress)

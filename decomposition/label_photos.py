@@ -132,8 +132,6 @@ class PhotoLabelling:
             mask = given_mask(self.specs, said, photo)
             if mask is None:
                 prompt = prompt_of(spec, said, photo)
-                if self.segmenter.wants_click:
-                    prompt = with_click(photo.pixels(), prompt)
                 mask = self.asked(spec, view, prompt, encoded)
             found[view] = mask
         if not found:
@@ -152,6 +150,10 @@ class PhotoLabelling:
             candidates = self.journal.candidates(spec.label, view, size)
         else:
             candidates = encoded.candidates(view, prompt)
+            if self.segmenter.wants_click:
+                clicked = with_click(self.photos[view].pixels(), prompt)
+                more = [] if clicked is prompt else encoded.candidates(view, clicked)
+                candidates = [*candidates, *more]
         best = best_of(candidates, prompt)
         if best is None:
             raise BadFile(
@@ -230,8 +232,8 @@ class PhotoLabelling:
 
 def with_click(image: np.ndarray, prompt: Prompt) -> Prompt:
     """A box without clicks gets one where a walk over the photo's pixels (H, W, 3) finds the object
-    deepest: networks take a box alone for a thing that fills it less often than for one of its
-    parts, or for what stands beside it.
+    deepest.  Networks answer both differently, now one better, now the other, whatever they say of
+    it themselves: both are asked, and the box's sides judge.
     """
     if prompt.box is None or len(prompt.inside):
         return prompt

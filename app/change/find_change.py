@@ -109,6 +109,12 @@ def find_change(
     in_b = None if views is None else [common.view_in_b(view) for view in views]
     of_b = own_views(after, in_b, choice.size)
     seen_b = see(renderer, after, of_b, common, heat, "B", progress)
+    for name, seen in zip(names, (seen_a, seen_b), strict=True):
+        if seen.photographed and len(seen.views) < LEAST_VIEWS:
+            raise BadFile(
+                f"{name} was photographed from {len(seen.views)} of the {LEAST_VIEWS} places that "
+                "are wanted: what one side shows alone is no evidence; take more photos."
+            )
     radius = radius_of(before, seen_a)
     settings = choice.settings(radius, stop)
     registration = register((seen_a, seen_b), names, settings, radius, progress)
@@ -116,14 +122,14 @@ def find_change(
     if registration.how != "common" and views is not None and not seen_b.photographed:
         in_b = [found_b.view_in_b(view) for view in views]
         seen_b = see(renderer, after, (in_b, False), found_b, heat, "B", progress)
-    seen = seen_a, replace(seen_b, a_from_own=found_b)
+    both = seen_a, replace(seen_b, a_from_own=found_b)
     progress("comparing", 0.0)
-    first, second = (own_surface(visit, settings) for visit in seen)
+    first, second = (own_surface(visit, settings) for visit in both)
     if views is not None:
         first, second = first.within(views), second.within(views)
     cells = (
-        cells_of(first, second, seen[1], settings),
-        cells_of(second, first, seen[0], settings),
+        cells_of(first, second, both[1], settings),
+        cells_of(second, first, both[0], settings),
     )
     judged = judged_part(cells, names, settings)
     unit = stop.unit if stop else ""
@@ -137,7 +143,7 @@ def find_change(
     known = change[np.isfinite(change)]
     overall = -float(np.median(known)) if len(known) else float("nan")
     found = SceneChange(tuple(places), registration, settings, unit, compared, overall, judged)
-    return FoundChange(found, before, after, cells, seen)
+    return FoundChange(found, before, after, cells, both)
 
 
 def judged_part(

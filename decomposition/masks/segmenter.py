@@ -35,7 +35,7 @@ class Segmenter(Protocol):
     name: str  # for messages: "SAM 2 of sam2_tiny.decoder.onnx"
     reads_text: bool  # else Prompt.text is not used
     takes_boxes: bool  # else a box counts as a click in its middle
-    wants_click: bool  # whether a box with a click inside says more to it than a box alone
+    wants_click: bool  # whether a box alone is asked about again, with a click inside
 
     def encode(self, image: np.ndarray) -> Any:
         """image: (H, W, C) uint8; the first three channels are display sRGB, further ones other

@@ -21,6 +21,7 @@ from shapeshift.scene.pose import View
 
 LEAST_VIEWS = 3  # of either visit that a cell must be seen in: one view is no evidence
 DARK, BRIGHT, FEWEST = 0.02, 0.9, 100  # light, and cells, that tell an exposure
+SAME_LIGHT = 0.1  # logarithm of an exposure that is none
 AROUND = 8  # cells of the other visit that a colour is compared with
 CONTRAST = 6.0  # Lab: less says that nobody can see whether a surface is there
 UNSURE = 0.5  # of as many own views as show a cell may see through it: more, and it is fog
@@ -91,6 +92,9 @@ def cells_of(
     light = exposure_of(own.color, np.where(still[:, None], found.color, np.nan))
     lab = lab_of(own.color)
     change = lab_of(found.color, light) - lab
+    if np.abs(np.log(light)).max() > SAME_LIGHT:  # what burnt out at one exposure has no colour
+        burnt = (linear_of(np.stack([own.color, found.color])) > BRIGHT).any(axis=(0, 2))
+        change[burnt] = np.nan
     if len(other.points) and len(points):
         change = least_change(change, lab, lab_of(other.color, light), points, other.points)
     contrast = color_distance(lab_of(found.behind, light) - lab, shade=1.0)

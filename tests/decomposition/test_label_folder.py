@@ -13,9 +13,12 @@ from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.undistort import pinhole_of
 from shapeshift.scene.pose import View, look_at, perspective
 
+FIXTURES = Path(__file__).resolve().parents[1] / "fixtures"
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 SIZE = (64, 48)
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0))
 
@@ -84,3 +87,16 @@ def test_a_photo_shows_the_stop_of_its_modality():
     assert stop_of(photo(Path("a"), "anything"), STOPS[:1]) is STOPS[0]
     with pytest.raises(BadFile, match="'depth' belong to no stop of the scene, which has RGB, T"):
         stop_of(photo(Path("a"), "depth"), STOPS)
+
+
+@pytest.mark.parametrize("name,capture", [("plush", "plush_snowmiku"), ("fern", "fern_llff")])
+def test_drawn_maps_belong_to_the_photos_of_their_captures(name, capture):
+    """Ten each, with the thing, the rest, and pixels that are not marked."""
+    folder = DATA / capture
+    if not folder.is_dir():
+        pytest.skip(f"{capture} is not here")
+    found = find_maps(FIXTURES / "drawn_labels" / name, read_capture(folder))
+    assert len(found) == 10
+    for photo, path in found[:2]:
+        _, labels = read_map(path, photo, 4)
+        assert np.unique(labels).tolist() == [0, 1, 255]

@@ -145,7 +145,7 @@ def row_of(pair: tuple[str, str], first: Path, second: Path) -> str:
     except BadFile as why:
         cpu = time.process_time() - begun
         said = "".join(c if c.isalnum() or c in " %." else " " for c in str(why))
-        return f"{pair[0]} to {pair[1]},refused: {said},,,,,{cpu:.1f}"
+        return f"{pair[0]} to {pair[1]},refused,,,{said},,{cpu:.1f}"
     cpu = time.process_time() - begun
     kinds = " + ".join(place.kind for place in found.places) or "none"
     beside = ""

@@ -12,6 +12,7 @@ from PIL import Image
 
 import shapeshift as ss
 from shapeshift.app import cli
+from shapeshift.runtime_models.eyes import spread_eyes
 from shapeshift.runtime_models.splats.layers.layer_list import LIST
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.write_cameras import write_cameras
@@ -23,6 +24,7 @@ from tests.support.scene.visited_table import (
     BLUE,
     GREEN,
     MOVED_M,
+    RED,
     STOPS,
     TABLE,
     TALL,
@@ -298,3 +300,37 @@ def test_other_values_than_heat_are_higher_and_lower(visits, tmp_path):
     assert (change.kind, change.unit) == ("values", "m³/m³")
     with pytest.raises(ss.UsageError, match="no stop 'Heat' of values"):
         ss.change(tmp_path / "before", tmp_path / "after", values="Heat", context="none")
+
+
+def photographed(folder, views: list[View]):
+    """A visit that says from where its photos were taken."""
+    scene = ss.load(folder)
+    places = np.array([view.world_from_eye.position for view in views])
+    looks = np.array([(*view.world_from_eye.wxyz, *view.tangents) for view in views])
+    return scene.with_model(replace(scene.model, provenance=spread_eyes(places, looks)))
+
+
+def test_halves_of_a_capture_are_one_place_and_what_was_taken_away_is_said(visits, tmp_path):
+    """Six photos each, none from the same place; B has fog before A's cameras, as scenes have that
+    nobody saw from there, which drawn from A's cameras would hide and replace the table.
+    """
+    ring = []
+    for turn in 2 * np.pi * np.arange(12) / 12:
+        eye = 1.5 * np.array([0.5 * np.sin(turn), 0.87, 0.5 * np.cos(turn)])
+        ring.append(View(look_at(eye, np.zeros(3)), perspective(0.7, SIZE), 0.05, 50.0, SIZE))
+    a, b = ring[::2], ring[1::2]
+    fog = [
+        Block(tuple(0.8 * v.world_from_eye.position), (0.03, 0.03, 0.03), (0.9, 0.9, 0.9))
+        for v in a
+    ]
+    write_visit(tmp_path / "foggy", (*BEFORE, *fog), seed=1)
+    write_visit(tmp_path / "less", (TABLE, RED, GREEN, TALL, *fog), seed=1)
+    first, usual = photographed(visits / "before", a), {"size": SIZE, "context": "none"}
+    same = ss.change(first, photographed(tmp_path / "foggy", b), **usual)
+    assert same.places == () and same.registration.how == "common" and min(same.judged) > 0.5
+    less = ss.change(first, photographed(tmp_path / "less", b), **usual)
+    assert less.places and {place.kind for place in less.places} == {"vanished"}
+    for place in less.places:  # a side that few photos show may be a place of its own
+        assert (np.abs(place.points - BLUE.centre) < np.add(BLUE.half, 2 * CELL)).all()
+    with pytest.raises(ss.BadFile, match="photographed from 2 of the 3 places"):
+        ss.change(first, photographed(tmp_path / "less", b[:2]), **usual)

@@ -97,4 +97,4 @@ def test_no_cache_at_all_is_no_reason_to_refuse(tmp_path, monkeypatch):
 
     monkeypatch.setattr("shapeshift.app.commands.claims.cache_folder", refuse)
     with claimed(tmp_path / "a", "train"), claimed(tmp_path / "a", "train"):
-        pass
+        assert not list(tmp_path.glob("a*")), "nor is a lock put beside what is written"
