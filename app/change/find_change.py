@@ -122,14 +122,14 @@ def find_change(
     if registration.how != "common" and views is not None and not seen_b.photographed:
         in_b = [found_b.view_in_b(view) for view in views]
         seen_b = see(renderer, after, (in_b, False), found_b, heat, "B", progress)
-    both = seen_a, replace(seen_b, a_from_own=found_b)
+    sides = seen_a, replace(seen_b, a_from_own=found_b)
     progress("comparing", 0.0)
-    first, second = (own_surface(visit, settings) for visit in both)
+    first, second = (own_surface(visit, settings) for visit in sides)
     if views is not None:
         first, second = first.within(views), second.within(views)
     cells = (
-        cells_of(first, second, both[1], settings),
-        cells_of(second, first, both[0], settings),
+        cells_of(first, second, sides[1], settings),
+        cells_of(second, first, sides[0], settings),
     )
     judged = judged_part(cells, names, settings)
     unit = stop.unit if stop else ""
@@ -143,7 +143,7 @@ def find_change(
     known = change[np.isfinite(change)]
     overall = -float(np.median(known)) if len(known) else float("nan")
     found = SceneChange(tuple(places), registration, settings, unit, compared, overall, judged)
-    return FoundChange(found, before, after, cells, both)
+    return FoundChange(found, before, after, cells, sides)
 
 
 def judged_part(

@@ -74,7 +74,8 @@ def completed(
     views = photo_views(device, found, capture, factor)
     made = assemble(
         device, found.model, views, row_evidence(device, found.model, views), wanted,
-        shadows=settings.shadows, background=capture.background or (0.0, 0.0, 0.0),
+        shadows=settings.shadows,
+        background=default_background(found.model, capture.background or (0.0, 0.0, 0.0)),
         making=Making(progress=lambda what, part: settings.progress(what, int(100 * part), 100)),
         sights=sights_of(capture, found.model.stops),
     )  # fmt: skip

@@ -15,6 +15,7 @@ from shapeshift.decomposition.completion.plane import (
     Refused,
     cells_of,
     footprint_of,
+    hidden_inside,
     looks_of,
     support_plane,
 )
@@ -92,7 +93,19 @@ def find_stamp(
 
 
 def find_patches(grid: PlaneCells, foot: Footprint) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(cells of the hole (X, Y), step (2,) to where they are copied from), each cell once."""
+    """(cells of the hole (X, Y), step (2,) to where they are copied from), each cell once.
+
+    From places in no shadow first.
+    """
+    found = patches_from(grid, foot._replace(good=foot.good & ~foot.dark))
+    taken = np.any([chosen for chosen, _ in found], axis=0) if found else np.zeros(grid.shape, bool)
+    if not foot.dark.any() or taken.sum() >= (1 - LEAST_LEFT) * foot.hole.sum():
+        return found
+    return found + patches_from(grid, foot._replace(hole=foot.hole & ~taken))
+
+
+def patches_from(grid: PlaneCells, foot: Footprint) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The same, of all that is good."""
     seam = seams(grid, foot)
     left, total = foot.hole.copy(), foot.hole.sum()
     found: list[tuple[np.ndarray, np.ndarray]] = []
@@ -183,15 +196,17 @@ class Completion:
     stamp: Stamp | None  # the one that stays
     verdict: Verdict | None
     why: str = ""  # why nothing was filled, a clause
+    ghosts: int = 0  # anchors of background that no photo shows, taken out of its volume
 
     def sentence(self) -> str:
         """For people, without the thing's name."""
+        ghosts = f"{self.ghosts:,} hidden anchors taken out of its inside; " * bool(self.ghosts)
         if self.stamp is None:
-            return f"the background behind it stays as it is: {self.why}"
+            return f"{ghosts}the background behind it stays as it is: {self.why}"
         assert self.verdict is not None, "what stays was verified"
         patches = f"{self.stamp.patches} patch{'es' if self.stamp.patches > 1 else ''}"
         copies = f"{len(self.stamp.rows):,} anchors copied, {int(self.stamp.dropped.sum()):,} taken"
-        return f"{patches}, {copies} out; {self.verdict.sentence()}"
+        return f"{ghosts}{patches}, {copies} out; {self.verdict.sentence()}"
 
 
 def complete(
@@ -219,13 +234,37 @@ def complete(
     told = []
     for done, label in enumerate(things):
         progress("completing the background", done, len(things))
+        ghosts = 0
+        if evidence is not None:
+            model, evidence, ghosts = without_ghosts(model, label, evidence)
         model, one = complete_one(device, model, views, label, evidence, shadows, background)
+        one = replace(one, ghosts=ghosts)
         if one.stamp is not None and evidence is not None:  # copies look as seen
             kept = evidence[~one.stamp.dropped]
             evidence = np.concatenate([kept, evidence[one.stamp.rows]])
         told.append(one)
     progress("completing the background", len(things), len(things))
     return model, told
+
+
+def without_ghosts(
+    model: AnchorModel, label: int, evidence: np.ndarray
+) -> tuple[AnchorModel, np.ndarray, int]:
+    """The model and evidence (A,) without what hidden_inside() finds, and how many that were.
+
+    No photo can confirm it, or is changed by it: none shows these anchors.
+    """
+    labels = model.labels
+    assert labels is not None, "complete() asks for them"
+    looks = looks_of(model)
+    plane = support_plane(looks, labels, label)
+    ghosts = hidden_inside(
+        looks, labels, label, evidence, plane if isinstance(plane, Plane) else None
+    )
+    count = int(ghosts.sum())
+    return (model.with_anchors(~ghosts), evidence[~ghosts], count) if count else (
+        model, evidence, 0
+    )  # fmt: skip
 
 
 def complete_one(

@@ -130,11 +130,45 @@ def support_plane(looks: AnchorLooks, labels: np.ndarray, label: int) -> Plane |
     return plane
 
 
+UNSEEN = 0.25  # of what the median anchor of background shows: less leaks in at an outline
+
+
+def hidden_inside(
+    looks: AnchorLooks, labels: np.ndarray, label: int, evidence: np.ndarray, plane: Plane | None
+) -> np.ndarray:
+    """(A,) bool: background in a thing's own volume, above what carries it, hardly shown by photos.
+
+    What training put there to be covered: a ghost of the thing once that is taken away.
+    evidence (A,): pixels of background that each anchor shows.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    found = np.zeros(len(labels), bool)
+    mine = looks.places[looks.there & (labels == label)]
+    shown = evidence[(labels == 0) & (evidence > 0)]
+    may = (labels == 0) & (evidence < UNSEEN * (np.median(shown) if len(shown) else 0.0))
+    if plane is not None:
+        may &= plane.height(looks.places) > ON_PLANE * looks.spacing_m
+    if len(mine) < 4 or not may.any():
+        return found
+    low, high = np.percentile(mine, (LOWEST, 100 - LOWEST), axis=0)  # without stray ones
+    mine = mine[((mine >= low) & (mine <= high)).all(1)]
+    try:
+        equations = ConvexHull(mine).equations  # (F, 4) outward normals
+    except (QhullError, ValueError):
+        return found
+    rows = np.flatnonzero(may & ((looks.places >= low) & (looks.places <= high)).all(1))
+    inside = (looks.places[rows] @ equations[:, :3].T + equations[:, 3] <= 0).all(1)
+    found[rows[inside]] = True
+    return found
+
+
 CELL = 1.8  # spacings of anchors: the side of a cell
 ON_PLANE = 1.4  # spacings above or below
 BELOW, ABOVE = 5.0, 3.5  # spacings: what is dropped there was guessed, or is contact shadow
 ROOM = 4  # empty cells around all
 SHADOW = 0.78  # of the plane's usual brightness, below which a cell may be in shadow
+IN_SHADOW = 6  # cells from a thing: what is dark there is copied last: it may be shadow
 NEAR_TOP = 0.5  # of the thing's height: its footprint is what is lower
 SEEN = 0.25  # of a usual cell's evidence: what photos show of the plane stays as it is
 LOW_THINGS = 25.0  # spacings above the plane: other things there keep their place free of sources
@@ -145,6 +179,7 @@ class Footprint(NamedTuple):
     shade: np.ndarray  # (X, Y) bool: those of them that photos show, in the thing's shadow
     good: np.ndarray  # (X, Y) bool: cells of the plane that may be copied
     ring: np.ndarray  # (X, Y) bool: cells around the hole whose look a patch has to go on
+    dark: np.ndarray  # (X, Y) bool: those of `good` that may lie in a thing's shadow
 
 
 @dataclass(frozen=True)
@@ -224,8 +259,11 @@ def footprint_of(
     low = looks.there & (labels != 0) & (grid.height < LOW_THINGS * looks.spacing_m)
     usual = np.median(grid.count[grid.count > 0]) if grid.on.any() else 0.0
     thin = ndimage.uniform_filter(grid.count, 3) < 0.35 * usual
+    light = grid.colors[..., :3].sum(2)
+    dark = light < SHADOW * np.median(light[grid.count > 0]) if grid.on.any() else covered
+    shaded = dark & grow(there(low) | hole, iterations=IN_SHADOW)
     good = covered & ~grow(there(low)) & ~hole & ~thin
-    return Footprint(hole, hole & ~stands, good, ring)
+    return Footprint(hole, hole & ~stands, good, ring, good & shaded)
 
 
 def seen_cells(grid: PlaneCells, evidence: np.ndarray, usual: np.ndarray) -> np.ndarray:

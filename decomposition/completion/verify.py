@@ -1,6 +1,8 @@
 """Render and verify: a patch stays only where it closes holes and harms nothing (OWD, section 3.4).
 
-Holes are pixels of the thing's own mask through which nothing of the background is seen.  All other
+Holes are pixels of the thing's own mask through which nothing of the background is seen, and those
+that show a ghost or a scar: over the place that is filled, what lies off its plane or has a colour
+that is nowhere around.  All other
 pixels of background are protected: they may hardly change, and around the mask they may not become
 less like the photos.  What fills a hole has to look as the background around the mask does, and to
 lie on the plane that it fills.
@@ -47,21 +49,22 @@ class ModelPictures:
         eye = np.asarray(view.world_from_eye.position, np.float32)
         return self._rasterize(view, self._evaluator.color(x, eye))
 
-    def heights(self, view: View, x: Controls, normal: np.ndarray, offset: float) -> np.ndarray:
-        """(H, W) metres above the plane normal . p = offset of the splats seen, by their share.
+    def away(self, view: View, x: Controls, cells: "Cells") -> np.ndarray:
+        """(H, W) sides of a cell from the cells' plane to the splats seen, by their share.
 
-        NaN where nothing is seen.
+        0 where nothing is seen.  A splat counts as FARTHEST at most: what shines through from far
+        behind would hide what lies on the plane.
         """
         width, height = view.size
         if self._empty:
-            return np.full((height, width), np.nan)
+            return np.zeros((height, width))
         self._decode(x)
-        above = self._means @ normal - offset  # drawn as a colour: shares are the picture's own
-        color = np.zeros((len(above), 3), np.float32)
-        color[:, 0] = above
+        away = np.abs(self._means @ cells.normal - (cells.middles @ cells.normal).mean())
+        color = np.zeros((len(away), 3), np.float32)  # drawn: shares are the picture's own
+        color[:, 0] = np.minimum(away / cells.side_m, FARTHEST)
         picture = self._rasterize(view, color).astype(np.float64)
         seen = picture[..., 3] > 0
-        return np.where(seen, picture[..., 0] / np.where(seen, picture[..., 3], 1), np.nan)
+        return np.where(seen, picture[..., 0] / np.where(seen, picture[..., 3], 1), 0.0)
 
     def depth(self, view: View, x: Controls, marked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(H, W) metres along the view behind which LEFT of the light is left, Inf where more is;
@@ -109,15 +112,19 @@ def over(picture: np.ndarray, background: np.ndarray | tuple[float, float, float
     return picture[..., :3] + (1 - picture[..., 3:]) * np.asarray(background, np.float32)
 
 
-OPEN = 0.5  # alpha below which a pixel is a hole
+OPEN = 0.5  # of the alpha around, below which a pixel is a hole
 MARGIN = 3  # pixels around a mask that are not protected: the thing's own border
 AROUND = 24  # pixels around a mask that are compared with photos, and lend their colours
 LEAST_PIXELS = 30  # of a mask, for a view to say something
 LEAST_FEWER = 0.75  # of the holes over the cells that were filled that must be closed
-LEAST_ALIKE_DB = 30.0  # PSNR of protected pixels, before against after, in the worst view
+# PSNR of protected pixels, before against after, in the worst view; less where the scene itself is
+# less like its photos.
+LEAST_ALIKE_DB = 30.0
 MOST_LOST_DB = 2.0  # that protected pixels around a mask may lose against the photos
 MOST_STRANGE = 0.06  # display units from a filled pixel to the nearest colour around, mean
-MOST_AWAY = 1.0  # sides of a cell that what fills it may be above or under the plane, mean
+MOST_AWAY = 1.5  # sides of a cell off the plane: of a pixel that shows a ghost; of fills, mean
+SCAR = 0.1  # display units from one pixel to the nearest colour around: noise and seams are below
+FARTHEST = 4.0  # sides of a cell
 MOST_COLORS = 4000  # around a mask that are compared with
 
 
@@ -176,6 +183,8 @@ class Tally:
     filled: int = 0
     away: float = 0.0  # sides of a cell, of filled pixels over the cells
     placed: int = 0
+    own_error: float = 0.0  # of all protected pixels before, against the photos
+    own: int = 0
 
 
 def verify(
@@ -200,9 +209,10 @@ def verify(
         if mask.sum() < LEAST_PIXELS:
             continue
         pair = [each.draw(view.labelled.view, view.labelled.x) for each in drawings]
-        add_view(tally, view, mask, pair, background, cells, shadows)
+        off = []
         if cells is not None:
-            add_heights(tally, view.labelled, mask, pair[1], drawings[1], cells)
+            off = [each.away(view.labelled.view, view.labelled.x, cells) for each in drawings]
+        add_view(tally, view, mask, pair, off, background, cells, shadows)
     return judge(tally)
 
 
@@ -211,21 +221,15 @@ def add_view(
     view: PhotoView,
     mask: np.ndarray,
     pair: list[np.ndarray],
+    off: Sequence[np.ndarray],
     background: tuple[float, float, float],
     cells: Cells | None,
     shadows: bool,
 ) -> None:
-    """One view's pictures (H, W, 4) before and after."""
+    """One view's pictures (H, W, 4) before and after, and how far each lies off the plane."""
     from scipy import ndimage
 
     first, second = (over(picture, background) for picture in pair)
-    hole = mask & (pair[0][..., 3] < OPEN)
-    tally.views += 1
-    tally.before += int(hole.sum())
-    tally.after += int((mask & (pair[1][..., 3] < OPEN)).sum())
-    meant = hole if cells is None else hole & shown_cells(view.labelled.view, cells, 0.5)
-    tally.meant += int(meant.sum())
-    tally.met += int((meant & (pair[1][..., 3] >= OPEN)).sum())
     grown = ndimage.binary_dilation(mask, iterations=MARGIN)
     protected = ~grown & (view.labelled.labels == 0)
     if cells is not None and shadows:
@@ -235,32 +239,38 @@ def add_view(
         tally.alike_db = min(tally.alike_db, decibels(error))
     beside = ndimage.binary_dilation(grown, iterations=AROUND) & protected
     if view.photo is not None:
+        errors = [((each - view.photo) ** 2).mean(2) for each in (first, second)]
         tally.beside += int(beside.sum())
-        tally.error_before += float(((first - view.photo)[beside] ** 2).mean(1).sum())
-        tally.error_after += float(((second - view.photo)[beside] ** 2).mean(1).sum())
-    filled = hole & (pair[1][..., 3] >= OPEN)
-    known = first if view.photo is None else view.photo
-    if filled.any() and beside.any():
-        tally.strange += float(strangeness(second[filled], known[beside]).sum())
+        tally.error_before += float(errors[0][beside].sum())
+        tally.error_after += float(errors[1][beside].sum())
+        tally.own += int(protected.sum())
+        tally.own_error += float(errors[0][protected].sum())
+    known = (first if view.photo is None else view.photo)[beside]
+    place = mask if cells is None else mask & shown_cells(view.labelled.view, cells, 0.5)
+    # A training may leave a floor of its background's own colour nearly clear all over.
+    clear = OPEN * max(float(p[beside, 3].mean()) for p in pair) if beside.any() else OPEN
+    bad = [mask & (picture[..., 3] < clear) for picture in pair]
+    for wrong, picture, away in zip(bad, (first, second), off, strict=False):
+        wrong |= place & (away > MOST_AWAY)
+        here = place & ~wrong
+        if len(known):
+            wrong[here] = strangeness(picture[here], known) > SCAR
+    if off:
+        there = place & (pair[1][..., 3] >= clear)
+        tally.away += float(off[1][there].sum())
+        tally.placed += int(there.sum())
+    tally.views += 1
+    tally.before, tally.after = (
+        total + int(wrong.sum())
+        for total, wrong in zip((tally.before, tally.after), bad, strict=True)
+    )
+    meant = place & bad[0]
+    tally.meant += int(meant.sum())
+    tally.met += int((meant & ~bad[1]).sum())
+    filled = bad[0] & (pair[1][..., 3] >= clear)
+    if filled.any() and len(known):
+        tally.strange += float(strangeness(second[filled], known).sum())
         tally.filled += int(filled.sum())
-
-
-def add_heights(
-    tally: Tally,
-    picture: LabelledView,
-    mask: np.ndarray,
-    picture_after: np.ndarray,
-    after: ModelPictures,
-    cells: Cells,
-) -> None:
-    """How far from their plane one view sees the cells: colours alone hardly show it."""
-    filled = mask & (picture_after[..., 3] >= OPEN) & shown_cells(picture.view, cells, 0.5)
-    if not filled.any():
-        return
-    offset = float((cells.middles @ cells.normal).mean())
-    heights = after.heights(picture.view, picture.x, cells.normal, offset)
-    tally.away += float(np.abs(heights[filled]).sum()) / cells.side_m
-    tally.placed += int(filled.sum())
 
 
 def shown_cells(view: View, cells: Cells, reach: float) -> np.ndarray:
@@ -295,10 +305,10 @@ def judge(tally: Tally) -> Verdict:
     if not tally.views:
         why = "no view shows the thing, so that nothing can be verified"
     elif not tally.meant:
-        why = "there was no hole"
+        why = "there was no hole, ghost or scar"
     elif not tally.met >= LEAST_FEWER * tally.meant:
         why = f"it closes {100 * tally.met / tally.meant:.0f} % of the holes where it lies"
-    elif not tally.alike_db >= LEAST_ALIKE_DB:
+    elif not tally.alike_db >= least_alike(tally):
         why = f"it changes what is not behind the thing ({tally.alike_db:.1f} dB alike)"
     elif not photo[1] >= photo[0] - MOST_LOST_DB:
         why = f"it is less like the photos ({photo[0]:.1f} -> {photo[1]:.1f} dB)"
@@ -317,6 +327,12 @@ def judge(tally: Tally) -> Verdict:
         away,
         why,
     )
+
+
+def least_alike(tally: Tally) -> float:
+    """dB that protected pixels have to stay alike: no more than the scene itself reaches there."""
+    own = decibels(tally.own_error / tally.own) if tally.own else np.inf
+    return min(LEAST_ALIKE_DB, own) if own == own else LEAST_ALIKE_DB
 
 
 def decibels(error: float) -> float:

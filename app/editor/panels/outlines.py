@@ -148,23 +148,26 @@ def draw_ups(upright: Upright, centre: np.ndarray, view: View, ui_scale: float) 
     if not any(disagree(way, upright.used) for way in upright.ways):
         return
     screen, draw = imgui.get_io().display_size, imgui.get_background_draw_list()
-    for one, other, way in zip(*up_arrows(upright, centre, view), upright.ways, strict=True):
+    arrows = zip(*up_arrows(upright, centre, view), upright.ways, strict=True)
+    for row, (one, other, way) in enumerate(arrows):  # texts of arrows that are one stand apart
         ink = theme.color(theme.ACCENT if way == upright.used else theme.TEXT, 0.9)
         ends = on_screen(view, np.array([[one, other]]), (screen.x, screen.y))
         _lines(ends, ink, 2.5 * ui_scale)
         for x, y in np.clip(ends[:, 1], -1e5, 1e5):
             draw.add_circle_filled(Vec(x, y), 4 * ui_scale, ink)
             text = f"{said(NAMES[way.source])}, {way.off(upright.used):.0f}\u00b0"
-            draw.add_text(Vec(x + 8 * ui_scale, y - 8 * ui_scale), ink, text)
+            draw.add_text(Vec(x + 8 * ui_scale, y + (16 * row - 24) * ui_scale), ink, text)
 
 
 def up_arrows(upright: Upright, centre: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
     """(W, 3) each, metres in the world: where each way's arrow begins and ends, a third of the
-    picture long."""
-    away = np.linalg.norm(centre - view.world_from_eye.position)
+    picture long, from the middle of the picture as far away as `centre` (3,) is."""
+    eye, ahead = view.world_from_eye.position, -view.world_from_eye.matrix()[:3, 2]
+    away = np.linalg.norm(centre - eye)
     length = away * (view.tangents[3] - view.tangents[2]) / 3
     ways = np.array([way.direction for way in upright.ways]) @ upright.turn.T
-    return np.broadcast_to(centre, ways.shape), centre + length * ways
+    begin = eye + away * ahead
+    return np.broadcast_to(begin, ways.shape), begin + length * ways
 
 
 def draw_brush(cursor: tuple[float, float], radius: float, erase: bool, ui_scale: float) -> None:

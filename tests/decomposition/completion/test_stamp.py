@@ -1,14 +1,18 @@
 """The clone stamp on planes made of numbers: where copies come from and where they land."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.completion.complete import LEAST_LEFT, find_stamp
+from shapeshift.decomposition.completion.complete import LEAST_LEFT, Stamp, find_stamp
 from shapeshift.decomposition.completion.plane import (
     CELL,
+    SHADOW,
     AnchorLooks,
     Plane,
     fit_plane,
+    hidden_inside,
     support_plane,
 )
 
@@ -119,6 +123,41 @@ def test_what_photos_show_around_the_thing_stays():
     unseen = find_stamp(looks, labels, THING, plane, evidence, core=False)
     assert unseen.cells < seen.cells < all_anew.cells
     assert unseen.dropped.sum() < all_anew.dropped.sum() / 3
+
+
+def test_what_lies_in_a_shadow_is_copied_last():
+    looks, labels, _ = scene(half=40)
+    upright = looks.places @ TURN
+    away = np.abs(upright[:, [0, 2]]).max(1) / STEP
+    dark = (labels == 0) & (away < 12)  # a ring of shadow around the block
+    colors = np.where(dark[:, None], 0.9 * SHADOW * 0.5, 0.5) * np.ones((1, 3))
+    looks = replace(looks, colors=colors)
+    stamp = find_stamp(looks, labels, THING, support_plane(looks, labels, THING))
+    assert stamp.filled == stamp.cells and not dark[stamp.rows].any()
+    everywhere = replace(looks, colors=np.where(labels[:, None] == 0, 0.1, 0.5) * np.ones((1, 3)))
+    assert isinstance(
+        find_stamp(everywhere, labels, THING, support_plane(looks, labels, THING)), Stamp
+    )
+
+
+def test_only_what_no_photo_shows_inside_and_above_the_plane_is_a_ghost():
+    looks, labels, _ = scene()
+    plane = support_plane(looks, labels, THING)
+    evidence = np.ones(len(labels))
+    inside = np.array([[0, 4, 0], [1, 3, 1], [0, 4, 1], [0, -2, 0], [0, 30, 0], [9, 4, 0]]) * STEP
+    places = np.concatenate([looks.places, inside @ TURN.T])
+    more = replace(
+        looks, places=places, there=np.ones(len(places), bool),
+        colors=np.concatenate([looks.colors, np.zeros((6, 3))]),
+    )  # fmt: skip
+    labels = np.append(labels, np.zeros(6, int))
+    evidence = np.append(evidence, [0.0, 0.24, 0.26, 0.0, 0.0, 0.0])  # of the median 1
+    found = hidden_inside(more, labels, THING, evidence, plane)
+    assert np.flatnonzero(found).tolist() == [len(labels) - 6, len(labels) - 5]
+    under = hidden_inside(more, labels, THING, evidence, None)
+    assert np.array_equal(under, found)  # it lies below the block, too
+    assert not hidden_inside(more, labels, 7, evidence, plane).any()
+    assert not hidden_inside(more, labels, THING, np.zeros(len(labels)), plane).any()
 
 
 def test_several_patches_where_none_is_as_large():

@@ -19,7 +19,7 @@ from shapeshift.decomposition.completion.verify import (
     verify,
 )
 from shapeshift.decomposition.partition import LabelledView
-from shapeshift.runtime_models.model import AnchorFrames
+from shapeshift.runtime_models.model import AnchorFrames, AnchorModel
 from shapeshift.scene.pose import View, look_at, perspective
 from tests.support.models import make_random_model
 
@@ -78,9 +78,18 @@ def test_strangeness_is_the_distance_to_the_nearest_colour():
     assert np.allclose(told, [0.1, 0.2])
 
 
-@pytest.mark.parametrize("lift", [0.0, 0.4, -0.7, 3.0])
-def test_fills_are_measured_from_their_plane(device, lift):
-    """A flat model, lifted by so many sides of a cell, seen through a hole all over the mask."""
+@pytest.mark.parametrize(("own_db", "alike_db", "good"), [
+    (25.0, 25.0, True), (25.0, 24.9, False), (40.0, LEAST_ALIKE_DB, True), (40.0, 29.9, False),
+    (float("nan"), 29.9, False),
+])  # fmt: skip
+def test_a_scene_has_to_stay_no_more_alike_than_it_is_like_its_photos(own_db, alike_db, good):
+    own_error = 1000 * 10 ** (-own_db / 10)
+    tally = replace(GOOD, alike_db=alike_db, own_error=own_error * (1 + 1e-9), own=1000)
+    assert judge(tally).is_accepted == good
+
+
+def flat_model(lift: float) -> tuple[AnchorModel, PhotoView, Cells]:
+    """A flat model, lifted by so many sides of the cells, and a view from above, its mask."""
     side = 0.02
     model = make_random_model(400)
     count = len(model.anchors)
@@ -92,16 +101,31 @@ def test_fills_are_measured_from_their_plane(device, lift):
     places = np.random.default_rng(0).uniform(-0.1, 0.1, (count, 3)) * (1, 0, 1)
     places[:, 1] = 0.5 + lift * side
     after = replace(model, anchors=places.astype(np.float32), frames=frames)
-    before = after.with_anchors(np.zeros(count, bool))
     pose = look_at(np.array([0.02, 1.1, 0.05]), np.array([0, 0.5, 0.0]))
     view = View(pose, perspective(0.5, (64, 48)), 0.01, 10.0, (64, 48))
     labels = np.zeros((48, 64), np.uint8)
     labels[12:36, 16:48] = 1
     x, z = (g.ravel() for g in np.mgrid[-5:6, -5:6] * side)
     cells = Cells(np.stack([x, 0 * x + 0.5, z], 1), side, np.array([0.0, 1.0, 0.0]))
-    told = verify(device, before, after, 1, [PhotoView(LabelledView(view, 0.0, labels))],
-                  cells=cells)  # fmt: skip
+    return after, PhotoView(LabelledView(view, 0.0, labels)), cells
+
+
+def test_a_ghost_that_hides_the_plane_is_no_less_a_hole(device):
+    """An opaque sheet three sides of a cell above the plane: alpha sees no hole."""
+    ghost, view, cells = flat_model(3.0)
+    filled, _, _ = flat_model(0.0)
+    told = verify(device, ghost, filled, 1, [view], cells=cells)
+    assert told.holes_before > 0.9 * 24 * 32 and told.holes_after < 0.1 * told.holes_before
+    assert verify(device, filled, ghost, 1, [view], cells=cells).why.startswith("there was no hole")
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.4, -0.7, 3.0])
+def test_fills_are_measured_from_their_plane(device, lift):
+    """A flat model, lifted by so many sides of a cell, seen through a hole all over the mask."""
+    after, view, cells = flat_model(lift)
+    before = after.with_anchors(np.zeros(len(after.anchors), bool))
+    told = verify(device, before, after, 1, [view], cells=cells)
     assert told.holes_before == 24 * 32
     assert told.holes_after < told.holes_before  # or nothing was measured
     assert told.away == pytest.approx(abs(lift), abs=0.05)
-    assert verify(device, before, after, 1, [PhotoView(LabelledView(view, 0.0, labels))]).away == 0
+    assert verify(device, before, after, 1, [view]).away == 0
