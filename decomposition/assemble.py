@@ -30,7 +30,7 @@ from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.parts import part_of
-from shapeshift.scene.colliders.carve import Sight
+from shapeshift.scene.colliders.carve import PhotoSight
 from shapeshift.scene.colliders.collider import Collider, Making, collider_of_mesh, mesh_of_splats
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume
 from shapeshift.scene.colliders.cut_apart import apart
@@ -140,7 +140,7 @@ def assemble(
     shadows: bool = False,
     background: tuple[float, float, float] = (0.0, 0.0, 0.0),
     making: Making | None = None,
-    sights: Sequence[Sight] = (),
+    sights: Sequence[PhotoSight] = (),
 ) -> Assembled:
     """Proxies, ground and completed background of a labelled model.
 

@@ -17,7 +17,7 @@ from shapeshift.decomposition.masks.anchor_walk import nodes_of
 from shapeshift.decomposition.masks.pixel_walk import walk_together
 from shapeshift.decomposition.masks.segmenter import Prompt
 from shapeshift.decomposition.masks.work_photos import WorkPhoto, work_photos
-from shapeshift.decomposition.segment_scene import Judged, Segmented, SegmentedPart
+from shapeshift.decomposition.segment_scene import ObjectJudgement, Segmented, SegmentedPart
 from shapeshift.decomposition.shown import ShownAnchors
 from shapeshift.decomposition.walk_objects import ON_PLANE, heat_of, heights_of
 from shapeshift.rasterizer.device import Device
@@ -36,7 +36,7 @@ REASON = 0.08  # the same, of what is in doubt
 
 
 @dataclass
-class Tally:
+class AskedTally:
     """Pixels of one object in views, and how well each of them agrees."""
 
     ious: list[float] = field(default_factory=list)
@@ -89,20 +89,20 @@ def judge(
     parts: Sequence[SegmentedPart],
     photos: Sequence[WorkPhoto],
     used: set[Path],
-) -> tuple[Judged, ...]:
+) -> tuple[ObjectJudgement, ...]:
     """What other photos say of each object of a labelled model.
 
     photos: of the capture; used: those that masks were given of, which are left out where others
     show colours.  Raises BadFile.
     """
-    tallies = {part.spec.label: Tally() for part in parts if part.rows}
+    tallies = {part.spec.label: AskedTally() for part in parts if part.rows}
     views = views_to_ask(photos, used)
     if views and tallies:
         ask(device, model, views, tallies)
     names = {part.spec.label: part.spec.name for part in parts}
     found = []
     for part in parts:
-        tally = tallies.get(part.spec.label, Tally())
+        tally = tallies.get(part.spec.label, AskedTally())
         agreement, doubt = tally.agreement(), ""
         if part.pixels < FEW:
             agreement, doubt = np.nan, f"too little seen: {part.pixels:,.0f} pixels"
@@ -110,7 +110,7 @@ def judge(
             doubt = "no other photo shows it"
         else:
             doubt = doubt_of(tally, names)
-        found.append(Judged(part.spec.name, agreement, len(tally.ious), doubt))
+        found.append(ObjectJudgement(part.spec.name, agreement, len(tally.ious), doubt))
     return tuple(found)
 
 
@@ -118,7 +118,7 @@ def ask(
     device: Device,
     model: AnchorModel | SplatLayers,
     views: Sequence[WorkPhoto],
-    tallies: dict[int, Tally],
+    tallies: dict[int, AskedTally],
 ) -> None:
     """Adds to the tallies what each view says; masks are made there by a walk over its pixels."""
     shown, drawn = ShownAnchors(device, model), LabelPictures(device, model)
@@ -140,7 +140,7 @@ def ask(
             tallies[k].add(k, labels, fresh, height)
 
 
-def doubt_of(tally: Tally, names: dict[int, str]) -> str:
+def doubt_of(tally: AskedTally, names: dict[int, str]) -> str:
     """Why an object may be wrong, in a few words; "" where nothing speaks against it."""
     shown = max(tally.shown, 1)
     other, most = max(tally.shared.items(), key=lambda item: item[1], default=(0, 0))

@@ -19,7 +19,7 @@ from shapeshift.runtime_models.model import AnchorModel, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.photo import load_photo
-from shapeshift.scene.colliders.carve import Sight
+from shapeshift.scene.colliders.carve import PhotoSight
 
 MOST_VIEWS = 24  # that verify and score: well spread, they say what all would
 MOST_SIGHTS, SIGHT_SIDE = 80, 160  # photos that carve what is free, pixels of their longest side
@@ -58,7 +58,7 @@ def photo_views(
     return views
 
 
-def sights_of(capture: Capture, stops: tuple[Stop, ...]) -> list[Sight]:
+def sights_of(capture: Capture, stops: tuple[Stop, ...]) -> list[PhotoSight]:
     """MOST_SIGHTS photos, evenly, in few pixels; of those of the first stop with measured depth."""
     sights = []
     for photo in evenly(list(capture.photos), MOST_SIGHTS):
@@ -66,7 +66,7 @@ def sights_of(capture: Capture, stops: tuple[Stop, ...]) -> list[Sight]:
         measured = None
         if photo.depth is not None and stop_of(photo, stops).x == stops[0].x:
             measured = load_depth(photo, factor)
-        sights.append(Sight(photo.view.divided(factor), measured))
+        sights.append(PhotoSight(photo.view.divided(factor), measured))
     return sights
 
 

@@ -53,7 +53,7 @@ class SegmentedPart:
 
 
 @dataclass(frozen=True)
-class Judged:
+class ObjectJudgement:
     """What photos that an object was not made from say of it."""
 
     name: str
@@ -68,7 +68,7 @@ class Segmented:
     parts: tuple[SegmentedPart, ...]
     pictures: tuple[LabelledView, ...]  # what the label maps said
     silent: int  # photos without a label map
-    judged: tuple[Judged, ...] = ()  # of each part, in their order
+    judged: tuple[ObjectJudgement, ...] = ()  # of each part, in their order
     rests: tuple[Rest, ...] = ()  # of each body, as the scene is written; (): nothing was tested
 
 

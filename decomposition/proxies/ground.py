@@ -17,8 +17,8 @@ from shapeshift.runtime_models.model import AnchorModel
 from shapeshift.runtime_models.parts import splat_labels
 from shapeshift.scene.colliders.carve import (
     GRAZING,
+    PhotoSight,
     SeenDepth,
-    Sight,
     carved_mesh,
     is_free,
     votes,
@@ -79,7 +79,7 @@ def ground_mesh(
 
 
 def seen_depths(
-    device: Device, model: AnchorModel, sights: Sequence[Sight], x: float, making: Making
+    device: Device, model: AnchorModel, sights: Sequence[PhotoSight], x: float, making: Making
 ) -> list[SeenDepth]:
     """How far each photo sees, and which of its pixels end on background.
 

@@ -106,7 +106,7 @@ def surface_cells(seen: SeenVisit, cell_m: float) -> tuple[np.ndarray, np.ndarra
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class PointEvidence:
     """What a visit's views say of points (m, 3): how many show a surface there, see through it and
     hide it; medians of those that show it, and of what they see through it.
     """
@@ -119,11 +119,11 @@ class Evidence:
     value: np.ndarray  # (m,) NaN: not known
 
 
-def evidence_at(points: np.ndarray, seen: SeenVisit, least_m: float) -> Evidence:
+def evidence_at(points: np.ndarray, seen: SeenVisit, least_m: float) -> PointEvidence:
     """points (m, 3): A's metres.  least_m: depths that differ by less agree."""
     parts = [_evidence(points[i : i + CHUNK], seen, least_m)
              for i in range(0, max(len(points), 1), CHUNK)]  # fmt: skip
-    return Evidence(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return PointEvidence(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _evidence(points: np.ndarray, seen: SeenVisit, least_m: float) -> tuple[np.ndarray, ...]:

@@ -36,7 +36,7 @@ AROUND = 2.0  # cells around a camera that are free
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class PhotoSight:
     """Where a photo was taken from, in few pixels."""
 
     view: View

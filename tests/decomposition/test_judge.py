@@ -11,7 +11,7 @@ pytest.importorskip("pyopencl")
 from shapeshift.decomposition.judge import (
     BEST,
     DOUBT,
-    Tally,
+    AskedTally,
     box_of,
     doubt_of,
 )
@@ -20,9 +20,11 @@ from shapeshift.decomposition.walk_objects import ON_PLANE
 NAMES = {1: "mug", 2: "banana"}
 
 
-def told(shown: int, fresh: int, height: int | None = None, of: int = 1, views: int = 1) -> Tally:
+def told(
+    shown: int, fresh: int, height: int | None = None, of: int = 1, views: int = 1
+) -> AskedTally:
     """Of views in which label `of` has rows 2 to `shown`, and afresh rows 2 to `fresh`."""
-    tally = Tally()
+    tally = AskedTally()
     for _ in range(views):
         labels, again = np.zeros((40, 12), np.uint8), np.zeros((40, 12), np.uint8)
         labels[2:shown, 2:10], again[2:fresh, 2:10] = of, of
@@ -41,7 +43,7 @@ def test_agreement_is_that_of_the_best_whole_views():
     assert tally.agreement() == 1.0  # the one that no border cuts
     tally.cut_off = [True] * 5
     assert tally.agreement() == pytest.approx(np.mean(sorted(tally.ious)[-BEST:]))
-    assert np.isnan(Tally().agreement())
+    assert np.isnan(AskedTally().agreement())
 
 
 @pytest.mark.parametrize(
@@ -60,7 +62,7 @@ def test_each_reason_is_said_in_words(tally, doubt):
 def test_what_another_one_has_is_named():
     labels, again = np.zeros((40, 12), np.uint8), np.zeros((40, 12), np.uint8)
     labels[2:22, 2:10], again[2:12, 2:10], again[12:22, 2:10] = 1, 1, 2
-    tally = Tally()
+    tally = AskedTally()
     tally.add(1, labels, again, None)
     assert doubt_of(tally, NAMES) == "shares its mask with banana"
     assert tally.agreement() < DOUBT and tally.missing == 0
