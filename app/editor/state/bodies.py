@@ -102,7 +102,7 @@ class Bodies:
         if self._future is not None and self._future.done():
             future, self._future = self._future, None
             key, made, problem, rough = future.result()
-            self._take(key, made, rough)
+            self._exchange(key, made, rough)
             self.problem = problem or self.problem
         try:
             self._catch_up(edited)
@@ -111,7 +111,7 @@ class Bodies:
             self._given_up = self.world is None
         return self.busy
 
-    def _take(self, key: tuple, made: "Collider | None", rough: "Collider | None") -> None:
+    def _exchange(self, key: tuple, made: "Collider | None", rough: "Collider | None") -> None:
         """A collider, in the place of the rough one that stood in for it."""
         self._made[key] = made
         for name, (made_of_it, before) in self._of.items():
