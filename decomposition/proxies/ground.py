@@ -29,6 +29,7 @@ from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
 THICK = 4.0  # sides of a cell: of the slab below a plane
 SUNK = 2.0  # sides of a cell that the skin near a plane is kept below it: out of all contacts
+PINCH = 0.02  # of the way to its neighbours that a corner goes which others share
 NEAR = 1.5  # sides of a cell above and below, in which the skin counts as the plane's
 SAME_HEIGHT, SAME_WAY = 2.0, 0.9  # spacings of anchors, cosine: a pixel that shows a plane
 FEWEST_PIXELS = 100  # that tell how high a plane is
@@ -75,7 +76,25 @@ def ground_mesh(
         within = is_within(vertices, corners, side)
         height = plane.height(vertices[within])
         vertices[within] -= np.maximum(height + SUNK * side, 0)[:, None] * plane.normal
-    return join_meshes([TriangleMesh(vertices.astype(np.float32), skin.faces), *slabs])
+    return join_meshes([without_pinches(vertices.astype(np.float32), skin.faces), *slabs])
+
+
+def without_pinches(vertices: np.ndarray, faces: np.ndarray) -> TriangleMesh:
+    """Corners that several sheets of a skin share in place go a little back into their own.
+
+    Who reads a mesh may join equal corners, and edges there would have more than two faces.
+    """
+    _, group, count = np.unique(vertices, axis=0, return_inverse=True, return_counts=True)
+    shared = count[group.reshape(-1)] > 1
+    sums, around = np.zeros(vertices.shape), np.zeros(len(vertices))
+    for corner in range(3):
+        others = vertices[faces].sum(axis=1, dtype=np.float64) - vertices[faces[:, corner]]
+        np.add.at(sums, faces[:, corner], others)
+        np.add.at(around, faces[:, corner], 2)
+    middle = sums[shared] / np.maximum(around[shared], 1)[:, None]
+    moved = vertices.copy()
+    moved[shared] += (PINCH * (middle - vertices[shared])).astype(np.float32)
+    return TriangleMesh(moved, faces)
 
 
 def seen_depths(

@@ -324,6 +324,17 @@ def four_far_apart(rim: np.ndarray, normal: np.ndarray) -> np.ndarray:
 THICKNESS = 0.02  # metres, behind the faces: a table top's
 
 
+def rim_of(faces: np.ndarray, count: int) -> np.ndarray | None:
+    """(R, 2) edges of triangles (F, 3) int64 without a neighbour, as the triangles go around them;
+    None where two go along one in the same way.  count: of the vertices.
+    """
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])  # (3F, 2)
+    code = edges[:, 0] * count + edges[:, 1]
+    if len(np.unique(code)) < len(code):
+        return None
+    return edges[~np.isin(code, edges[:, 1] * count + edges[:, 0])]
+
+
 def thickened(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
     """(V', 3) float32, (F', 3) uint32, and whether that is a solid whose faces look outward.
 
@@ -331,16 +342,17 @@ def thickened(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.n
     it is, turned outward; an open one gets a back THICKNESS behind it and a rim.  Where faces are
     wound both ways there is no behind: the mesh comes back as it was, and False.
     """
-    points, row = np.unique(vertices, axis=0, return_inverse=True)  # seams in files are cuts
-    f = row.reshape(-1)[faces].astype(np.int64)  # (F, 3)
-    f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
-    edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])  # (3F, 2), directed
-    code = edges[:, 0] * len(points) + edges[:, 1]
-    if len(np.unique(code)) < len(code):
+    points, f = vertices, faces.astype(np.int64)
+    rim = rim_of(f, len(points))
+    if rim is None or len(rim):
+        points, row = np.unique(vertices, axis=0, return_inverse=True)  # seams in files are cuts
+        f = row.reshape(-1)[faces].astype(np.int64)  # (F, 3)
+        f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
+        rim = rim_of(f, len(points))
+    if rim is None:
         return vertices, faces.astype(np.uint32), False
-    rim = edges[~np.isin(code, edges[:, 1] * len(points) + edges[:, 0])]  # (R, 2)
     corners = points[f].astype(np.float64)  # (F, 3, 3)
-    if not len(rim):
+    if not len(rim):  # closed, perhaps where two of its corners touch
         volume = np.linalg.det(corners - points.mean(axis=0)).sum()
         return points, (f if volume > 0 else f[:, ::-1]).astype(np.uint32), True
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # (F, 3)

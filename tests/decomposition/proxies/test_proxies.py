@@ -12,6 +12,7 @@ from shapeshift.decomposition.proxies.ground import (
     seen_plane,
     slab,
     without_diagonals,
+    without_pinches,
 )
 from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
 from shapeshift.scene.colliders.carve import SeenDepth
@@ -19,6 +20,8 @@ from shapeshift.scene.colliders.collider import Collider, box_around
 from shapeshift.scene.colliders.collider_wrap import is_watertight, join_meshes, volume
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
 from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.scene.world.physics_shapes import mesh_shape
+from tests.support.scene.physics_things import BOX_FACES, box
 from tools.decomposition.surface_scores import score_surfaces, surface_of
 
 FLOOR = Plane(np.array([0.0, 1.0, 0.0]), 0.0)
@@ -186,3 +189,15 @@ def test_places_within_a_hull_and_around_it_are_found():
         assert 0 < found.sum() < len(found)
     assert not is_within(np.zeros((0, 3)), box, 0.1).any()
     assert not is_within(np.full((1, 3), np.nan), box, 0.1).any()
+
+
+def test_corners_that_sheets_share_go_apart():
+    """Two boxes along one edge, a third alone: whoever joins equal corners finds two solids."""
+    one, alone = box(1, 1, 1), box(1, 1, 1) + np.float32([9, 0, 0])
+    vertices = np.concatenate([one, one + np.float32([2, 2, 0]), alone])
+    faces = np.concatenate([BOX_FACES + 8 * i for i in range(3)])
+    made = without_pinches(vertices, faces)
+    assert len(np.unique(vertices, axis=0)) == 22 and len(np.unique(made.vertices, axis=0)) == 24
+    moved = np.linalg.norm(made.vertices - vertices, axis=1)
+    assert (moved > 0).sum() == 4 and moved.max() < 0.05 and not moved[16:].any()
+    assert mesh_shape(made)[1] == []

@@ -6,12 +6,7 @@ import pytest
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.world.physics import Physics
 from shapeshift.scene.world.physics_shapes import THICKNESS, thickened
-from tests.support.scene.physics_things import at, box, run, sheet
-
-BOX_FACES = np.array(
-    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-     [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]], np.int32
-)  # fmt: skip
+from tests.support.scene.physics_things import BOX_FACES, at, box, run, sheet
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
@@ -75,3 +70,17 @@ def test_a_closed_table_carries_on_top_and_stops_from_below():
         body = physics.add_body([box(0.05, 0.05, 0.05)], at(0, 0.3 * side, 0), 0.3)
         run(physics, 1)
         assert physics.pose(body).position[1] * side == pytest.approx(0.06, abs=0.001)
+
+
+def test_a_solid_whose_corners_touch_is_one():
+    """Two boxes that touch along an edge: joined there, each side of it would be there twice."""
+    one = box(1, 1, 1)
+    vertices = np.concatenate([one, one + np.float32([2, 2, 0])])
+    faces = BOX_FACES if volume(one, BOX_FACES) > 0 else BOX_FACES[:, ::-1]
+    faces = np.concatenate([faces, faces + len(one)])
+    assert len(np.unique(vertices, axis=0)) == len(vertices) - 2
+    for given in (faces, faces[:, ::-1]):
+        points, triangles, outward = thickened(vertices, given)
+        assert outward
+        np.testing.assert_array_equal(points, vertices)
+        np.testing.assert_array_equal(triangles, faces)

@@ -15,6 +15,12 @@ def at(x: float, y: float, z: float, wxyz: object = UPRIGHT) -> Pose:
     return Pose(np.array([x, y, z], np.float64), np.array(wxyz, np.float64))
 
 
+BOX_FACES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+     [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]], np.int32
+)  # fmt: skip
+
+
 def box(x: float, y: float, z: float) -> np.ndarray:
     """(8, 3) float32 corners of a box with these halves, metres."""
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
