@@ -116,10 +116,15 @@ def note_start() -> None:
         faulthandler.disable()
         faulthandler.enable(file)
 
+    def end() -> None:
+        faulthandler.disable()
+        path.unlink(missing_ok=True)
+        file.close()
+
     watch()
     opened.append(watch)
     _noted.append(file)
-    atexit.register(path.unlink, missing_ok=True)
+    atexit.register(end)
 
 
 def remove_damaged_invokers() -> bool:
