@@ -7,6 +7,7 @@ import sys
 import time
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from unittest.mock import patch
 
 from shapeshift.app import progress
 from shapeshift.app.cli import main
@@ -28,7 +29,10 @@ def launch(*arguments, **keywords) -> subprocess.CompletedProcess:
             timeout=120, **keywords,
         )  # fmt: skip
     said, warned = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in range(2))
-    with contextlib.chdir(ROOT), redirect_stdout(said), redirect_stderr(warned):
+    with (
+        contextlib.chdir(ROOT), patch.object(sys, "argv", ["shapeshift", *words]),
+        redirect_stdout(said), redirect_stderr(warned),
+    ):  # fmt: skip
         try:
             code = main(words)
         except SystemExit as ended:
