@@ -90,8 +90,11 @@ def test_the_environment_and_the_tests_can_be_interrupted(monkeypatch):
 
 @pytest.fixture
 def settled():
-    """The handlers of the tests come back."""
+    """As a program that is started from a shell has them; those of the tests come back."""
     before = {each: signal.getsignal(each) for each in ENDINGS}
+    for each in ENDINGS:  # the tests may run under nohup
+        usual = signal.default_int_handler if each == signal.SIGINT else signal.SIG_DFL
+        signal.signal(each, usual)
     yield
     for each, handler in before.items():
         signal.signal(each, handler)
