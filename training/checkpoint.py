@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from shapeshift.runtime_models.files.hashes import hash_file
+from shapeshift.runtime_models.files.hashes import ABSENT, hash_file
 from shapeshift.runtime_models.files.whole_file import whole_file
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
@@ -98,7 +98,11 @@ def refuse_other_capture(capture: Capture, before: dict[str, list]) -> None:
     now = contents_of(capture)
     both = [name for name in now if name in before]
     doubts = [
-        *(f"{name} is another picture" for name in both if now[name][0] != before[name][0]),
+        *(
+            f"{name} is another picture"
+            for name in both
+            if before[name][0] not in (now[name][0], ABSENT)
+        ),
         *(f"{name} stands elsewhere" for name in both if moved(now[name], before[name])),
         *(f"{name} is new" for name in now if name not in before),
         *(f"{name} is not there" for name in before if name not in now),

@@ -11,9 +11,11 @@ from functools import cached_property
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
+from shapeshift.runtime_models.files.hashes import ABSENT
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.baselines.plain_settings import PlainSettings
-from shapeshift.training.checkpoint import contents_of
+from shapeshift.training.checkpoint import contents_of, files_of, name_in
 from shapeshift.training.drawing import Color, DrawnView
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.optimizer import Adam
@@ -84,6 +86,12 @@ class Run(ABC):
     def contents(self) -> dict[str, list]:
         """What its photos are, for a run that goes on; read when it is asked for."""
         return contents_of(self.capture)
+
+    def forget_photo(self, sentence: str) -> None:
+        """One that a sentence says cannot be read: mended, it is another file than it was."""
+        for photo in self.capture.photos:
+            if any(path_end(p).removeprefix("...") in sentence for p in files_of(photo)):
+                self.contents[name_in(self.capture, photo)][0] = ABSENT
 
     @property
     @abstractmethod

@@ -83,6 +83,7 @@ def saved_when_it_fails(trainer: "Trainer", out: Path, checkpoint: Path) -> Iter
     except BadFile as why:
         if not trainer.iteration:
             raise
+        trainer.forget_photo(str(why))
         save(trainer, out, checkpoint)
         raise BadFile(
             f"{why}  The scene as it was after {trainer.iteration} steps is in {full(out)}; when "

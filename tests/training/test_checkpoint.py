@@ -88,3 +88,19 @@ def test_a_checkpoint_of_another_capture_spoils_nothing(device, balls, tmp_path)
     fewer = replace(balls, photos=tuple(p for p in balls.photos if p is not balls.photos[0]))
     with pytest.raises(BadFile, match="another capture than"):
         Trainer(device, fewer, SETTINGS, (state, notes))
+
+
+def test_a_photo_that_could_not_be_read_may_be_mended(device, balls, tmp_path):
+    shutil.copytree(balls.folder, tmp_path / "moved")
+    moved = read_capture(tmp_path / "moved")
+    broken, other = moved.photos[:2]
+    whole = broken.path.read_bytes()
+    broken.path.write_bytes(whole[:100])
+    trainer = Trainer(device, balls, SETTINGS)
+    trainer.capture = moved
+    trainer.forget_photo(f"{broken.path}: the image is cut off.")
+    broken.path.write_bytes(whole)
+    refuse_other_capture(moved, trainer.contents)
+    other.path.write_bytes(whole)
+    with pytest.raises(BadFile, match="is another picture"):
+        refuse_other_capture(moved, trainer.contents)
