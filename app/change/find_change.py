@@ -261,7 +261,8 @@ def _in_common(
         if farther and residual <= BETTER * plain[1]:
             return Registration(fitted, "icp", residual, shared)
         return Registration(common, "common", plain[1], plain[2])
-    agreed = min(agreement(*seen, settings), agreement(*seen[::-1], settings))
+    first, second = seen
+    agreed = min(agreement(first, second, settings), agreement(second, first, settings))
     return Registration(common, "common", plain[1], agreed) if agreed >= OVERLAP else None
 
 

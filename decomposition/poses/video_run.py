@@ -36,7 +36,7 @@ def take_frames(name: str, into: str, count: int, hear: Callable[..., None]) -> 
         if len(times) < 2:
             raise Unreadable(f"holds {len(times)} frames; a video of a walk is wanted")
         return write_sharpest(av, video, Path(into), count, sorted(times), hear)
-    except (av.FFmpegError, OSError) as error:
+    except (av.FFmpegError, OSError) as error:  # pyright: ignore[reportPrivateImportUsage]
         raise Unreadable(f"no video that can be read ({error})") from None
 
 

@@ -19,7 +19,7 @@ from shapeshift.decomposition.masks.work_photos import find_photo, work_photos
 from shapeshift.decomposition.segment_scene import SegmentedPart
 from shapeshift.decomposition.walk_objects import heights_of, walk_objects, with_labels
 from shapeshift.rasterizer.device import NoDevice
-from shapeshift.runtime_models.model import BadFile, ObjectLabel, Stop
+from shapeshift.runtime_models.model import AnchorModel, BadFile, ObjectLabel, Stop
 from tests.support.decomposition.demo_photos import (
     COUNT,
     SIZE,
@@ -281,6 +281,7 @@ def test_the_demos_mug_is_doubted_where_it_holds_bench(photos):
     """Cut by the ray tracer's truth, and with the bench within 12 cm of its middle: its
     agreement falls, and the reason is named; too little of it says nothing."""
     model, name = demo().model, "mug"
+    assert isinstance(model, AnchorModel)
     label = LABELS[name]
     right = np.where(labels_of_places(model.anchors)[0] == label, label, 0).astype(np.int32)
     middle = model.anchors[right > 0].mean(0)

@@ -14,6 +14,7 @@ from shapeshift.decomposition.upright_scene import (
     turned_view,
     upright_scene,
 )
+from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.parts import part_of
 from shapeshift.scene.cameras.upright import ASSUMED, PHOTOS, PLANES, STATED, Up, angle
 from shapeshift.scene.document.scene_file import FirstView
@@ -48,7 +49,7 @@ def table_and_things(degrees: float, flat: bool = True, shelf: bool = False) -> 
     cloud = exact_cloud(len(places))
     model = replace(cloud, means=places.astype(np.float32), labels=labels,
                     opacity=np.full_like(cloud.opacity, 0.9))  # fmt: skip
-    parts = tuple(SegmentedPart(ObjectSpec(label, name), 1, int((labels == label).sum()), 1.0, 1.0)
+    parts = tuple(SegmentedPart(ObjectSpec(label, name), 1, int((labels == label).sum()), 1.0)
                   for label, name in ((1, "mug"), (2, "cup")))  # fmt: skip
     return Segmented(model, parts, (), 0)
 
@@ -63,6 +64,7 @@ def places_of(file, found: Segmented, name: str) -> np.ndarray:
     """(N, 3) metres in the scene's world."""
     item = next(item for item in file.all_items if item.name == name)
     part, _ = part_of(found.model, item.part)
+    assert isinstance(part, SplatLayers)
     pose = item.pose.matrix()
     return part.means @ pose[:3, :3].T + pose[:3, 3]
 

@@ -136,10 +136,11 @@ def test_depth_is_where_so_much_light_is_left(form, left, metres):
     camera = Camera(np.eye(4), 80.0, 80.0, 9.5, 9.0, size, 0.05)
     splats = [np.array([[0, 0, 2.0], [0, 0, 3.0]]), np.full((2, 3), [9.0, 9.0, 1e-4]),
               np.tile([1.0, 0, 0, 0], (2, 1)), np.array([0.25, 0.8]), np.zeros((2, 3))]  # fmt: skip
-    d, on_device = device(), upload([a.astype(np.float32) for a in splats])
-    projected = project(d, *on_device, camera, form=form)
+    d = device()
+    means, scales, wxyz, opacity, color = upload([a.astype(np.float32) for a in splats])
+    projected = project(d, means, scales, wxyz, opacity, color, camera, form=form)
     tiles = bin_tiles(d, projected, size, form)
-    surfaces = surface(d, *on_device[:3], camera, projected, form)
+    surfaces = surface(d, means, scales, wxyz, camera, projected, form)
     drawn = rasterize_depth(d, projected, tiles, surfaces, size, form=form, light_left=left)
     np.testing.assert_allclose(d.download(drawn.metres), metres, rtol=1e-4)
 

@@ -36,7 +36,7 @@ def launch(*arguments, **keywords) -> subprocess.CompletedProcess:
         try:
             code = main(words)
         except SystemExit as ended:
-            code = ended.code or 0
+            code = ended.code if isinstance(ended.code, int) else 2 if ended.code else 0
     texts = []
     for stream in (said, warned):
         stream.flush()

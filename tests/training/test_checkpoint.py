@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,7 +48,8 @@ def test_a_checkpoint_of_other_numbers_is_refused(tmp_path):
         (state, "[]"),
         (state, "{"),
     ):
-        np.savez(path, **other, notes=np.array(text))
+        arrays: dict[str, Any] = {**other, "notes": np.array(text)}
+        np.savez(path, **arrays)
         with pytest.raises(BadFile, match=r"delete it, and train anew without --resume"):
             read_checkpoint(path)
 

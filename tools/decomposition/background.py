@@ -163,7 +163,7 @@ def figures(mesh: TriangleMesh, folder: Path) -> list[str]:
         inside += winding(mesh, view.world_from_eye.position) > 0.5
     around = np.concatenate([one.points[t.objects] for one, t in zip(views, truths, strict=True)])
     low, high = np.nanpercentile(around, (1, 99), axis=0)
-    size = np.linalg.norm(high - low)
+    size = float(np.linalg.norm(high - low))
     ground = np.concatenate(
         [one.points[~t.objects][::7] for one, t in zip(views, truths, strict=True)]
     )

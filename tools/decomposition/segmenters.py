@@ -50,7 +50,8 @@ def rows_of(segmenter, capture: Path, labels: Path) -> tuple[list[list[float]], 
                 true = np.asarray(picture)
             encoded[said["photo"]] = image, true, segmenter.encode(image)
         image, true, features = encoded[said["photo"]]
-        box = Prompt(tuple(map(float, said["box"])))
+        left, top, right, bottom = map(float, said["box"])
+        box = Prompt((left, top, right, bottom))
         both = with_click(image, box)
         found = [best_of(PixelWalk().candidates(image, box), box)]
         answers = [segmenter.candidates(features, p) for p in (box, replace(both, box=None), both)]

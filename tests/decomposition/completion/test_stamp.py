@@ -125,6 +125,12 @@ def test_what_photos_show_around_the_thing_stays():
     assert unseen.dropped.sum() < all_anew.dropped.sum() / 3
 
 
+def plane_under(looks, labels) -> Plane:
+    found = support_plane(looks, labels, THING)
+    assert isinstance(found, Plane)
+    return found
+
+
 def test_what_lies_in_a_shadow_is_copied_last():
     looks, labels, _ = scene(half=40)
     upright = looks.places @ TURN
@@ -132,17 +138,16 @@ def test_what_lies_in_a_shadow_is_copied_last():
     dark = (labels == 0) & (away < 12)  # a ring of shadow around the block
     colors = np.where(dark[:, None], 0.9 * SHADOW * 0.5, 0.5) * np.ones((1, 3))
     looks = replace(looks, colors=colors)
-    stamp = find_stamp(looks, labels, THING, support_plane(looks, labels, THING))
+    stamp = find_stamp(looks, labels, THING, plane_under(looks, labels))
+    assert isinstance(stamp, Stamp)
     assert stamp.filled == stamp.cells and not dark[stamp.rows].any()
     everywhere = replace(looks, colors=np.where(labels[:, None] == 0, 0.1, 0.5) * np.ones((1, 3)))
-    assert isinstance(
-        find_stamp(everywhere, labels, THING, support_plane(looks, labels, THING)), Stamp
-    )
+    assert isinstance(find_stamp(everywhere, labels, THING, plane_under(looks, labels)), Stamp)
 
 
 def test_only_what_no_photo_shows_inside_and_above_the_plane_is_a_ghost():
     looks, labels, _ = scene()
-    plane = support_plane(looks, labels, THING)
+    plane = plane_under(looks, labels)
     evidence = np.ones(len(labels))
     inside = np.array([[0, 4, 0], [1, 3, 1], [0, 4, 1], [0, -2, 0], [0, 30, 0], [9, 4, 0]]) * STEP
     places = np.concatenate([looks.places, inside @ TURN.T])

@@ -193,8 +193,8 @@ def test_places_within_a_hull_and_around_it_are_found():
 
 def test_corners_that_sheets_share_go_apart():
     """Two boxes along one edge, a third alone: whoever joins equal corners finds two solids."""
-    one, alone = box(1, 1, 1), box(1, 1, 1) + np.float32([9, 0, 0])
-    vertices = np.concatenate([one, one + np.float32([2, 2, 0]), alone])
+    one, alone = box(1, 1, 1), box(1, 1, 1) + np.array([9, 0, 0], np.float32)
+    vertices = np.concatenate([one, one + np.array([2, 2, 0], np.float32), alone])
     faces = np.concatenate([BOX_FACES + 8 * i for i in range(3)])
     made = without_pinches(vertices, faces)
     assert len(np.unique(vertices, axis=0)) == 22 and len(np.unique(made.vertices, axis=0)) == 24

@@ -203,13 +203,19 @@ def test_few_and_flat_splats_have_a_collider(soon, count, kind):
         assert making is FRESH or len(made.parts) == 1
 
 
+def of_cloud(cloud: Cloud, making: Making | None = None) -> Collider:
+    means, scales, wxyz, opacity = cloud.columns
+    return collider_of_splats(means, scales, wxyz, opacity, making)
+
+
 def test_nothing_to_touch_is_one_sentence():
     cloud = splatted(shapes()["sphere"], 100)
     for count, opacity in ((0, 1), (100, 0), (100, -1), (100, np.nan)):
-        columns = [column[:count] for column in cloud.columns[:3]]
+        means, scales, wxyz = [column[:count] for column in cloud.columns[:3]]
+        light = np.full(count, opacity, np.float32)
         for making in (FRESH, ROUGH):
             with pytest.raises(BadFile, match="opaque enough to be touched"):
-                collider_of_splats(*columns, np.full(count, opacity, np.float32), making)
+                collider_of_splats(means, scales, wxyz, light, making)
 
 
 @pytest.mark.parametrize("name", ["sphere", "torus", "cube", "two spheres"])
@@ -219,26 +225,26 @@ def test_a_rough_collider_is_the_hull_of_all(name):
     """
     shape = shapes()[name]
     cloud = splatted(shape, 5000, floaters=0.01)
-    made = collider_of_splats(*cloud.columns, Making(rough=True))
+    made = of_cloud(cloud, Making(rough=True))
     check_hulls(made, 1)
     want = shape.convex_hull.volume
     assert made.rough and 0.97 * want < parts_volume(made) < 1.2 * want
     assert uncovered(made, shape) < 0.03 * shape.extents.max()
-    again = collider_of_splats(*cloud.columns, Making(rough=True))
+    again = of_cloud(cloud, Making(rough=True))
     assert again.rough
 
 
 def test_in_place_of_a_rough_collider_what_was_made_before_is_taken():
-    columns = splatted(shapes()["sphere"], 500).columns
-    exact = collider_of_splats(*columns)
-    again = collider_of_splats(*columns, Making(rough=True))
+    cloud = splatted(shapes()["sphere"], 500)
+    exact = of_cloud(cloud)
+    again = of_cloud(cloud, Making(rough=True))
     assert not again.rough and np.array_equal(again.parts[0], exact.parts[0])
 
 
 def test_a_rough_place_is_made_as_it_is():
     """One hull of a room would fill it."""
-    columns = splatted(shapes()["sphere"], 500).columns
-    made = collider_of_splats(*columns, Making(kept=False, rough=True, hollow=True))
+    cloud = splatted(shapes()["sphere"], 500)
+    made = of_cloud(cloud, Making(kept=False, rough=True, hollow=True))
     assert not made.rough and len(made.mesh.faces) > 100
 
 

@@ -75,7 +75,7 @@ def test_a_closed_table_carries_on_top_and_stops_from_below():
 def test_a_solid_whose_corners_touch_is_one():
     """Two boxes that touch along an edge: joined there, each side of it would be there twice."""
     one = box(1, 1, 1)
-    vertices = np.concatenate([one, one + np.float32([2, 2, 0])])
+    vertices = np.concatenate([one, one + np.array([2, 2, 0], np.float32)])
     faces = BOX_FACES if volume(one, BOX_FACES) > 0 else BOX_FACES[:, ::-1]
     faces = np.concatenate([faces, faces + len(one)])
     assert len(np.unique(vertices, axis=0)) == len(vertices) - 2

@@ -160,8 +160,8 @@ def tilted(degrees: float) -> Physics:
     physics, turn = Physics(), np.deg2rad(degrees)
     wxyz = (np.cos(turn / 2), 0, 0, np.sin(turn / 2))
     up = np.array([-np.sin(turn), np.cos(turn), 0])
-    physics.add_static([box(1, 0.01, 1)], at(*(-0.01 * up), wxyz))
-    physics.add_body([box(HALF, HALF, HALF)], at(*(HALF * up), wxyz), 0.5)
+    physics.add_static([box(1, 0.01, 1)], at(*(-0.01 * up), wxyz=wxyz))
+    physics.add_body([box(HALF, HALF, HALF)], at(*(HALF * up), wxyz=wxyz), 0.5)
     return physics
 
 
@@ -173,7 +173,7 @@ def leaning() -> Physics:
     foot = np.array([HALF + SIDE / np.tan(turn), 0.0])
     middle = foot + half * along - thick * below
     wxyz = (np.cos(turn), 0, 0, np.sin(turn))
-    physics.add_body([box(half, thick, 0.03)], at(*middle, 0, wxyz), 0.2)
+    physics.add_body([box(half, thick, 0.03)], at(middle[0], middle[1], 0, wxyz), 0.2)
     return physics
 
 

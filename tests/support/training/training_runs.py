@@ -1,13 +1,16 @@
 """How tests make a training run, and the bits that it left."""
 
 from pathlib import Path
+from typing import TypeVar
 
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.run import Run
 from shapeshift.training.train import Trainer
 
+Kind = TypeVar("Kind", bound=Run)
 
-def run(trainer: Run, steps: int | None = None) -> Run:
+
+def run(trainer: Kind, steps: int | None = None) -> Kind:
     """Train to the end of the budget, or for so many steps."""
     for now in trainer.steps():
         if steps is not None and now.iteration >= steps:
@@ -16,8 +19,8 @@ def run(trainer: Run, steps: int | None = None) -> Run:
 
 
 def run_keeping(
-    trainer: Run, folder: Path, *steps: int, most: int | None = None
-) -> tuple[Run, list]:
+    trainer: Kind, folder: Path, *steps: int, most: int | None = None
+) -> tuple[Kind, list]:
     """Train to the end of the budget; and the checkpoints that were written after those steps.
 
     A run that was ended there has the same: what writing it changed, the end's bits would show.

@@ -166,6 +166,7 @@ def test_rough_hulls_come_first_and_exact_pieces_in_their_place(monkeypatch):
         time.sleep(0.001)
     assert world.objects["a"].collider.rough and world.held("right") == "a"
     world.release("right")
+    assert all(each.body is not None for each in world.objects.values())
     before = {n: (o.pose.position, world.physics.velocity(o.body)[0]) for n, o in
               world.objects.items()}  # fmt: skip
     until_there(bodies, of)
