@@ -95,29 +95,35 @@ def cells_of(
     if np.abs(np.log(light)).max() > SAME_LIGHT:  # what burnt out at one exposure has no colour
         burnt = (linear_of(np.stack([own.color, found.color])) > BRIGHT).any(axis=(0, 2))
         change[burnt] = np.nan
+    value_change = found.value - own.value
     if len(other.points) and len(points):
         change = least_change(change, lab, lab_of(other.color, light), points, other.points)
+        value_change = least_change(
+            value_change[:, None], own.value[:, None], other.value[:, None], points, other.points
+        )[:, 0]
     contrast = color_distance(lab_of(found.behind, light) - lab, shade=1.0)
     return SurfaceCells(
         points, own.views, through, away, own.color, np.where(still[:, None], change, np.nan),
-        own.value, np.where(still, found.value - own.value, np.nan),
+        own.value, np.where(still, value_change, np.nan),
         np.where(np.isfinite(contrast), contrast, np.inf),
     )  # fmt: skip
 
 
 def least_change(
-    change: np.ndarray, lab: np.ndarray, lab_other: np.ndarray, points: np.ndarray,
+    change: np.ndarray, own: np.ndarray, other: np.ndarray, points: np.ndarray,
     points_other: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """(m, 3) the least of changes (m, 3) and of those to the cells of the other visit around: what
-    one capture shows a little beside or more blurred is no other colour.
+    one capture shows a little beside or more blurred is no other colour.  Lab, own (m, 3) and
+    other (n, 3); or (m, 1) of values.
     """
     from scipy.spatial import cKDTree
 
     near = cKDTree(points_other).query(points, k=min(AROUND, len(points_other)))[1]
-    beside = lab_other[near.reshape(len(points), -1)] - lab[:, None]  # (m, k, 3)
+    beside = other[near.reshape(len(points), -1)] - own[:, None]  # (m, k, 3)
     every = np.concatenate([change[:, None], beside], axis=1)
-    distance = np.nan_to_num(color_distance(every), nan=np.inf)
+    size = color_distance(every) if every.shape[-1] == 3 else np.abs(every[..., 0])
+    distance = np.nan_to_num(size, nan=np.inf)
     best = every[np.arange(len(every)), np.argmin(distance, axis=1)]
     return np.where(np.isfinite(change), best, np.nan)
 
