@@ -27,7 +27,7 @@ MOST = {
     "tests/shapeshift": 35,
     "tests/slow": 12,
     "tests/support": 178,
-    "tests/training": 215,
+    "tests/training": 183,
     "tests/vr": 75,
     "tests/web": 3,
     "tests/xr": 12,

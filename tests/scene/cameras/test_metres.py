@@ -25,6 +25,7 @@ def test_a_unit_is_in_poses_points_and_cameras(tmp_path):
     write_transforms(tmp_path, frames, points="points.npz", unit_m=0.07, **more)
     found, scaled = read_capture(tmp_path), read_camera_list(path, CameraReading())
     assert (plain.metres, found.metres) == ("", "its own word")
+    assert plain.points is not None and found.points is not None
     before, after = (eyes([p.view for p in each.photos]) for each in (plain, found))
     np.testing.assert_allclose(after, 0.07 * before, atol=1e-12)
     np.testing.assert_allclose(found.points, 0.07 * plain.points, rtol=1e-6)

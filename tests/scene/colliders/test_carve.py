@@ -166,7 +166,9 @@ def test_the_grid_has_a_budget(seen, monkeypatch):
     far = [replace(one, depth_m=np.where(np.indices(SIZE[::-1]).sum(0) % 9, one.depth_m, 5e3)
                    .astype(np.float32)) for one in seen]  # fmt: skip
     monkeypatch.setattr(carve, "MOST_PLACES", 20_000)
-    _low, cell, where, shape = carve.grid_of(far)
+    grid = carve.grid_of(far)
+    assert grid is not None
+    _low, cell, where, shape = grid
     assert len(where) <= 24_000 and max(shape) <= carve.CELLS + 14
     assert cell < 0.2  # of a place of 4 m, whatever lies behind it
     tracemalloc.start()
