@@ -151,6 +151,25 @@ def test_a_colour_a_cell_beside_is_the_same_colour():
     assert (found[:16] == 0).all() and (found[24:] == 30).all()
 
 
+def test_a_value_a_cell_beside_is_the_same_value():
+    """An edge of 40 degrees that the other capture shows a cell beside is no change; a wall that
+    is 9 degrees warmer is one, everywhere, edge or not.
+    """
+
+    def warm(edge: int, more: float = 0.0) -> SeenVisit:
+        value = np.where(np.arange(96) < edge, 20.0, 60.0) + more
+        seen = side(1.5)
+        return visit(3, replace(seen, value=np.broadcast_to(value, (72, 96)).copy()))
+
+    before = warm(30)
+    for other, least, most in ((before, 0, 0), (warm(31), 0, 0), (warm(30, 9.0), 9, 9)):
+        surfaces = own_surface(before, SETTINGS), own_surface(other, SETTINGS)
+        change = cells_of(*surfaces, other, SETTINGS).value_change
+        assert np.isfinite(change).mean() > 0.9
+        known = change[np.isfinite(change)]
+        assert least <= known.min() and known.max() <= most + 1e-9
+
+
 def test_lab_of_known_colours():
     """CIE values of sRGB's red, of white, black and middle grey (Lindbloom)."""
     found = lab_of(np.array([[1.0, 0, 0], [1, 1, 1], [0, 0, 0], [0.5, 0.5, 0.5]]))
