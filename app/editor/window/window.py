@@ -17,6 +17,7 @@ from shapeshift.app.editor.window.monitor import (
     grow_window,
     monitor_height,
     open_window,
+    place_of,
     put_window,
 )
 from shapeshift.app.editor.window.overlay.presented import Presented
@@ -179,12 +180,15 @@ class Window:
         """What input and overlay are measured in."""
         return self._window.size
 
-    def stand(self, place: Place | None) -> None:
-        """Where it was before; without that as much larger as its text is, in the middle."""
-        if place is not None:
-            put_window(self.handle, place)
-        else:
+    def stand(self, place: Place | None) -> bool:
+        """Where it was before; without that as much larger as its text is, in the middle.
+
+        Returns whether the desktop has less room than that takes, so that it is smaller.
+        """
+        if place is None:
             grow_window(self.handle, self.text_size)
+            place = place_of(self.handle) or (0, 0, *self.logical_size)
+        return put_window(self.handle, place)
 
     @property
     def closing(self) -> bool:
@@ -246,8 +250,11 @@ class Window:
             self._note()
         return self._unsettled > 0
 
-    def begin_frame(self) -> list[Event]:
-        """Starts an overlay frame; returns the input since the last one that is for the scene."""
+    def begin_frame(self, early: bool = False) -> list[Event]:
+        """Starts an overlay frame; returns the input since the last one that is for the scene.
+
+        `early`: there is no scene yet, so the first frame that has one is given it.
+        """
         if self._restyle:
             self._restyle = False
             theme.apply(self.ui_scale)
@@ -265,7 +272,7 @@ class Window:
         imgui.new_frame()
         if self.popup_open and imgui.is_key_pressed(imgui.Key.escape, False):
             imgui.internal.close_popups_except_modals()  # ImGui does so by its own keys alone
-        events, self._raw = self._raw, []
+        events, self._raw = self._raw, self._raw if early else []
         return events
 
     def end_frame(self) -> None:
