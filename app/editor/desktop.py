@@ -75,8 +75,8 @@ def run(options: Options) -> int:
     with refiner, state.bodies, Window("Shapeshift", size, settings.text_size) as window:
         if not options.size and options.screenshot is None and window.stand(settings.place):
             settings.panel_open = None  # that was for a larger window
-        first = FirstStart(window, state.title if options.screenshot is None else None)
-        with first, Renderer(window.ctx, drawing=options.drawing) as renderer:
+        card = OpeningCard(window, state.title if options.screenshot is None else None)
+        with card, Renderer(window.ctx, drawing=options.drawing) as renderer:
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, state, options, settings, own_files)
             hooks, upload = viewer.hooks, viewer.shown.upload
@@ -94,14 +94,15 @@ def run(options: Options) -> int:
                 )  # fmt: skip
             with two, viewer.parts.finder:
                 if options.screenshot is None:
-                    viewer.draw_first()
-                first.end()
+                    viewer.draw_splats()  # all that is compiled for them is
+                    viewer.is_drawn = True
+                card.end()
                 viewer.loop()
             viewer.shell.keep_place()
     return 0
 
 
-class FirstStart:
+class OpeningCard:
     """What the window shows until it has a picture: no black one, and what is compiled, once.
 
     Use it in a `with`; nothing else may draw into the window until `end`.
@@ -113,7 +114,7 @@ class FirstStart:
         self._began = self._shown = time.perf_counter()
         self._count = 0  # compilers that have begun
 
-    def __enter__(self) -> "FirstStart":
+    def __enter__(self) -> "OpeningCard":
         if self._title is not None:
             compiling.append(self._compile)
             self._show(said("Opening {name}", name=self._title or "Shapeshift"))

@@ -38,6 +38,17 @@ def place_of(handle: Any) -> Place | None:
     return (*glfw.get_window_pos(handle), *glfw.get_window_size(handle))
 
 
+def stand_window(handle: Any, place: Place | None, times: float) -> bool:
+    """Where it was before; without that as many times larger as its text is, in the middle.
+
+    Returns whether the desktop has less room than that takes, so that it is smaller.
+    """
+    if place is None:
+        grow_window(handle, times)
+        place = place_of(handle) or (0, 0, *glfw.get_window_size(handle))
+    return put_window(handle, place)
+
+
 def put_window(handle: Any, place: Place) -> bool:
     """Back to where it was, as large as there is room now; True where that is smaller.
 

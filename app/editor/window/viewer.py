@@ -124,7 +124,7 @@ class Viewer:
         hooks = self.hooks
         hooks.asked += [self.objects.asked, self.files.asked, lambda: state.timeline.problem]
         self._title = ""  # what the window's title says
-        self._is_drawn = False  # what the first frame shows, before it
+        self.is_drawn = False  # what the next frame shows, before it began
         self._told: tuple = ()  # what is said and asked, as it was drawn last
         self.frames, self._overlay_ms = 0, 0.0  # drawn since the window opened, of the last one
 
@@ -188,11 +188,6 @@ class Viewer:
         hooks.status.append(exporting.status)
 
     # ---- frames
-
-    def draw_first(self) -> None:
-        """Draws the splats of the first frame before it begins, and all that is compiled is."""
-        self.draw_splats()
-        self._is_drawn = True
 
     def loop(self) -> None:
         """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
@@ -333,8 +328,8 @@ class Viewer:
         if self.state.measure_now or self.shown.due(request, now):
             self.state.measure_now = False
             self.shown.measure(request)
-        cold = self.frames < WARM_UP and not self._is_drawn
-        force, self._is_drawn = self.options.screenshot is not None or cold, False
+        cold = self.frames < WARM_UP and not self.is_drawn
+        force, self.is_drawn = self.options.screenshot is not None or cold, False
         screen, presented = self.window.screen(), self.window.presented
         fresh = self.shown.draw(request, screen, force, presented.show_picture_again)
         if not fresh:

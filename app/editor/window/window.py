@@ -12,14 +12,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
 from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
 from shapeshift.app.editor.state.user.settings import default_text_size
-from shapeshift.app.editor.window.monitor import (
-    Place,
-    grow_window,
-    monitor_height,
-    open_window,
-    place_of,
-    put_window,
-)
+from shapeshift.app.editor.window.monitor import Place, monitor_height, open_window, stand_window
 from shapeshift.app.editor.window.overlay.presented import Presented
 from shapeshift.app.paths import plain
 from shapeshift.runtime_models.files.plain_text import one_line
@@ -181,14 +174,8 @@ class Window:
         return self._window.size
 
     def stand(self, place: Place | None) -> bool:
-        """Where it was before; without that as much larger as its text is, in the middle.
-
-        Returns whether the desktop has less room than that takes, so that it is smaller.
-        """
-        if place is None:
-            grow_window(self.handle, self.text_size)
-            place = place_of(self.handle) or (0, 0, *self.logical_size)
-        return put_window(self.handle, place)
+        """Where it was before, or as large as its text; True: the desktop has less room."""
+        return stand_window(self.handle, place, self.text_size)
 
     @property
     def closing(self) -> bool:

@@ -355,7 +355,7 @@ def test_a_first_start_says_what_it_compiles(viewer, monkeypatch):
     clock = [0.0]
     monkeypatch.setattr(desktop.time, "perf_counter", lambda: clock[0])
     early = Drag("left", 1.0, 0.0)
-    with desktop.FirstStart(window, "ball") as first:
+    with desktop.OpeningCard(window, "ball") as first:
         window._raw.append(early)
         announce("one.cl")  # at once: a start that is nearly over
         clock[0] = desktop.SAY_AGAIN_S
@@ -379,6 +379,6 @@ def test_a_first_start_says_what_it_compiles(viewer, monkeypatch):
     )
     assert early in window.begin_frame()
     imgui.end_frame()
-    with desktop.FirstStart(window, None):  # pictures for a file: nobody watches
+    with desktop.OpeningCard(window, None):  # pictures for a file: nobody watches
         announce("five.cl")
     assert len(shown) == 2
