@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from shapeshift.app.editor.panels.panel import Section
 from shapeshift.app.editor.state.layout import Box
-from shapeshift.app.editor.window.shown import RightSide, FrameRequest
+from shapeshift.app.editor.window.shown import FrameRequest, RightSide
 from shapeshift.app.editor.window.window import Event
 from shapeshift.scene.scene import Scene
 

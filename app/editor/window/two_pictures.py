@@ -17,7 +17,7 @@ from shapeshift.app.editor.state.layout import Box
 from shapeshift.app.editor.state.shown_scene import SplitState, name_of
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
-from shapeshift.app.editor.window.shown import RightSide, FrameRequest, Shown
+from shapeshift.app.editor.window.shown import FrameRequest, RightSide, Shown
 from shapeshift.app.editor.window.window import (
     DoubleClick,
     Drag,
