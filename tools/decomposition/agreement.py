@@ -4,9 +4,10 @@
 
 Each FOLDER is a capture with objects.json (boxes) and labels (true maps), and NAME.shift trained of
 it, in it or beside it; tools/synthetic/desk.py makes one.  The demo comes by itself, with boxes in
-the views that show most.  Objects are cut twice: as `segment` does, and wrong on purpose, each mask
-made alone and all that it encloses filled.  iou is that of the cut object in the true maps,
-agreement and doubt are what the table of `segment` shows.
+the views that show most.  Objects are cut three times: as `segment` does; wrong on purpose, each
+mask made alone and all that it encloses filled; and with the nearest other object, which is not
+listed, in its box.  iou is that of the cut object in the true maps, agreement and doubt are what
+the table of `segment` shows.
 """
 
 import argparse
@@ -22,7 +23,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
 from PIL import Image  # noqa: E402
-from scipy.ndimage import binary_fill_holes  # noqa: E402
+from scipy.ndimage import binary_fill_holes, distance_transform_edt  # noqa: E402
 from scipy.stats import spearmanr  # noqa: E402
 
 from shapeshift.app.opening import open_capture  # noqa: E402
@@ -57,7 +58,7 @@ from shapeshift.training.synthetic.workshop import dome  # noqa: E402
 from tools.synthetic.labels import LABELS, label_map  # noqa: E402
 
 COLUMNS = ("capture", "masks", "object", "iou", "agreement", "doubt")
-TOGETHER, ALONE = "together", "alone, filled"
+TOGETHER, ALONE, PAIR = "together", "alone, filled", "with an unlisted neighbour"
 SIZE, VIEWS, MARGIN = (384, 288), 16, 3  # of the demo's photos; pixels of a box around an object
 
 
@@ -107,6 +108,31 @@ def cut_wrong(
     return replace(right, model=with_labels(shown.model, labels, objects), parts=parts)
 
 
+def pairs_of(specs: ObjectSpecs, maps: dict[str, np.ndarray]) -> Iterator[ObjectSpecs]:
+    """Each two nearest in a prompted photo as one: the first one's, with a box around both.
+
+    maps: the true label map (H, W) of photos, by file name without its ending.
+    """
+    done: set[frozenset[int]] = set()
+    for spec in specs.objects:
+        labels = maps.get(Path(spec.prompts[0].photo).stem)
+        if labels is None or not (labels == spec.label).any():
+            continue
+        away = distance_transform_edt(labels != spec.label)
+        others = [o for o in specs.objects if o is not spec and (labels == o.label).any()]
+        other = min(others, key=lambda o: float(away[labels == o.label].min()))
+        pair = frozenset((spec.label, other.label))
+        if pair in done:
+            continue
+        done.add(pair)
+        rows, columns = np.nonzero(np.isin(labels, list(pair)))
+        box = (float(columns.min()), float(rows.min()),
+               float(columns.max() + 1), float(rows.max() + 1))  # fmt: skip
+        prompt = PhotoPrompt(spec.prompts[0].photo, box)
+        one = replace(spec, name=f"{spec.name} + {other.name}", prompts=(prompt,))
+        yield replace(specs, objects=(one,))
+
+
 def rows_of(
     device: Device, name: str, model: AnchorModel, capture: Capture, specs: ObjectSpecs, true: Path
 ) -> Iterator[tuple[str, str, str, float, float, str]]:
@@ -114,7 +140,10 @@ def rows_of(
     right = segment_by_walk(shown, photos, specs)
     pictures = read_pictures(true, capture, model, None)
     used = {picture.photo for picture in right.pictures if picture.photo is not None}
-    for how, found in ((TOGETHER, right), (ALONE, cut_wrong(shown, photos, specs, right))):
+    cuts = [(TOGETHER, right), (ALONE, cut_wrong(shown, photos, specs, right))]
+    maps = {picture.photo.stem: picture.labels for picture in pictures if picture.photo}
+    cuts += [(PAIR, segment_by_walk(shown, photos, pair)) for pair in pairs_of(specs, maps)]
+    for how, found in cuts:
         scores = scores_of(device, found, pictures)
         judged = judge(device, found.model, found.parts, photos, used)
         for score, one in zip(scores, judged, strict=True):
@@ -147,7 +176,7 @@ def main() -> None:
         specs = read_specs(folder / "objects.json")
         rows += rows_of(device, folder.name, model, capture, specs, folder / "labels")
     names = " ".join(folder.name for folder in options.captures)
-    ranks = "; ".join(rank(rows, how) for how in (TOGETHER, ALONE, "all"))
+    ranks = "; ".join(rank(rows, how) for how in (TOGETHER, ALONE, PAIR, "all"))
     with options.out.open("w", newline="") as file:
         file.write(f"# python tools/decomposition/agreement.py {names} --work WORK --out ")
         file.write(f"{options.out}\n# {device.platform}\n# Spearman: {ranks}\n")
