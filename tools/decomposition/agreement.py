@@ -23,7 +23,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
 from PIL import Image  # noqa: E402
-from scipy.ndimage import binary_fill_holes, distance_transform_edt  # noqa: E402
+from scipy.ndimage import binary_fill_holes  # noqa: E402
 from scipy.stats import spearmanr  # noqa: E402
 
 from shapeshift.app.opening import open_capture  # noqa: E402
@@ -108,28 +108,53 @@ def cut_wrong(
     return replace(right, model=with_labels(shown.model, labels, objects), parts=parts)
 
 
+Box = tuple[float, float, float, float]
+
+
+def boxes_of(specs: ObjectSpecs, photo: str, labels: np.ndarray | None) -> dict[int, Box]:
+    """Of each object in a photo, by label: its prompt's, else that of the true map (H, W)."""
+    boxes: dict[int, Box] = {}
+    for spec in specs.objects:
+        said = spec.prompts[0]
+        if said.photo == photo and said.box is not None:
+            boxes[spec.label] = said.box
+        elif labels is not None and (labels == spec.label).any():
+            rows, columns = np.nonzero(labels == spec.label)
+            boxes[spec.label] = (float(columns.min()), float(rows.min()),
+                                 float(columns.max() + 1), float(rows.max() + 1))  # fmt: skip
+    return boxes
+
+
+def gap(one: Box, other: Box) -> tuple[float, float]:
+    """Pixels between two boxes, 0 where they overlap, and between their middles."""
+    a, b = np.reshape(one, (2, 2)), np.reshape(other, (2, 2))
+    apart = np.maximum(np.maximum(a[0] - b[1], b[0] - a[1]), 0)
+    return float(np.linalg.norm(apart)), float(np.linalg.norm((a - b).mean(0)))
+
+
 def pairs_of(specs: ObjectSpecs, maps: dict[str, np.ndarray]) -> Iterator[ObjectSpecs]:
-    """Each two nearest in a prompted photo as one: the first one's, with a box around both.
+    """Each two nearest in a prompted photo as one: the larger one's, with a box around both.
 
     maps: the true label map (H, W) of photos, by file name without its ending.
     """
     done: set[frozenset[int]] = set()
     for spec in specs.objects:
-        labels = maps.get(Path(spec.prompts[0].photo).stem)
-        if labels is None or not (labels == spec.label).any():
+        photo = spec.prompts[0].photo
+        boxes = boxes_of(specs, photo, maps.get(Path(photo).stem))
+        if len(boxes) < 2 or spec.label not in boxes:
             continue
-        away = distance_transform_edt(labels != spec.label)
-        others = [o for o in specs.objects if o is not spec and (labels == o.label).any()]
-        other = min(others, key=lambda o: float(away[labels == o.label].min()))
-        pair = frozenset((spec.label, other.label))
-        if pair in done:
+        near = min(boxes.keys() - {spec.label}, key=lambda k: gap(boxes[k], boxes[spec.label]))
+        if frozenset((spec.label, near)) in done:
             continue
-        done.add(pair)
-        rows, columns = np.nonzero(np.isin(labels, list(pair)))
-        box = (float(columns.min()), float(rows.min()),
-               float(columns.max() + 1), float(rows.max() + 1))  # fmt: skip
-        prompt = PhotoPrompt(spec.prompts[0].photo, box)
-        one = replace(spec, name=f"{spec.name} + {other.name}", prompts=(prompt,))
+        done.add(frozenset((spec.label, near)))
+        corners = np.array([boxes[spec.label], boxes[near]])
+        sides = corners[:, 2:] - corners[:, :2]
+        box = tuple(map(float, (*corners[:, :2].min(0), *corners[:, 2:].max(0))))
+        larger = (spec.label, near)[int(np.argmax(sides.prod(1)))]
+        whose = next(o for o in specs.objects if o.label == larger)
+        other = next(o for o in specs.objects if o.label in (spec.label, near) and o is not whose)
+        prompt = PhotoPrompt(photo, (box[0], box[1], box[2], box[3]))
+        one = replace(whose, name=f"{whose.name} + {other.name}", prompts=(prompt,))
         yield replace(specs, objects=(one,))
 
 
@@ -147,7 +172,7 @@ def rows_of(
         scores = scores_of(device, found, pictures)
         judged = judge(device, found.model, found.parts, photos, used)
         for score, one in zip(scores, judged, strict=True):
-            yield name, how, one.name, score.iou, one.agreement, one.doubt
+            yield name, how, one.name, round(score.iou, 3), round(one.agreement, 3), one.doubt
 
 
 def rank(rows: Sequence[tuple], how: str) -> str:
