@@ -13,12 +13,11 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.inspection.draw_values import MeasuredScene, measured_scene
 from shapeshift.app.inspection.mark_options import free_name
 from shapeshift.app.inspection.pictures import ColorScale, auto_ends
+from shapeshift.app.inspection.window.emissivities import Emissivities
 from shapeshift.app.paths import is_bundled
 from shapeshift.renderer.colors.palette import ALL_VALUES, LEAST_SHARE
 from shapeshift.runtime_models.files.plain_text import name_line
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.inspection.air import Air
-from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.inspection.mark_photos import MOST_OF_ALL, shrunk_photo
 from shapeshift.scene.inspection.marks import (
     MOST_MARKS,
@@ -35,6 +34,7 @@ from shapeshift.scene.inspection.marks import (
 )
 from shapeshift.scene.inspection.marks_file import (
     MarksFile,
+    laid,
     marks_path,
     moved_marks,
     read_marks_file,
@@ -68,6 +68,8 @@ class Inspecting:
         self._path: Path | None = None
         self._warned: MarksFile | None = None  # that somebody wanted to close, and was told
         self._measured: tuple[Scene | None, MeasuredScene | None] = (None, None)
+        self.emissivities = Emissivities()
+        self._surfaces: tuple = ()  # a picture, and what was said of emissivity when it was made
 
     # ---- the scene
 
@@ -108,6 +110,7 @@ class Inspecting:
                 self._left.pop(self._path, None)
         self.on, self.chosen, self._before = False, "", []
         self.picture, self.is_current, self.readings = None, False, {}
+        self.emissivities = Emissivities()
         self._state.settings = replace(self._state.settings, heat_ends=ALL_VALUES)
         self.file = self._saved = MarksFile()
         source = self.source
@@ -133,7 +136,7 @@ class Inspecting:
 
     def edit(self, file: MarksFile) -> None:
         """A step that `undo` takes back."""
-        self._before = [*self._before, self.file][-MOST_STEPS:]
+        self._before, self.emissivities.dragged = [*self._before, self.file][-MOST_STEPS:], ()
         self.file = file
         self.read()
 
@@ -174,7 +177,7 @@ class Inspecting:
             self._state.say(str(error))
             return
         self.chosen = name
-        self.edit(replace(self.file, marks=(*self.file.marks, mark)))
+        self.edit(replace(self.file, marks=(*self.file.marks, laid(mark, picture))))
 
     def delete(self, name: str) -> None:
         """The mark, and the differences that name it."""
@@ -204,6 +207,26 @@ class Inspecting:
         """Another mark in the place of the one of that name."""
         marks = tuple(changed if mark.name == name else mark for mark in self.file.marks)
         self.edit(replace(self.file, marks=marks))
+
+    def drag(self, file: MarksFile) -> None:
+        """A number that is being dragged: no step of its own."""
+        self.file = file
+        self.read()
+
+    def lay_anew(self, name: str) -> None:
+        """The value of a mark is what is seen of it now."""
+        if self.picture is None or not self.is_current:
+            return
+        mark = laid(self.mark(name), self.picture)
+        if mark.laid is not None:
+            self.change(name, mark)
+        else:
+            self.note(said("Nothing is seen of {name} from here.", name=name))
+
+    @property
+    def chosen_object(self) -> str:
+        """Name of the object that is edited, of several; "": there is one alone."""
+        return self._state.chosen if len(self._state.scene.objects) > 1 else ""
 
     def write_note(self, name: str, text: str) -> None:
         """A line about a mark, for tables and reports."""
@@ -258,21 +281,6 @@ class Inspecting:
         else:
             self.edit(file)
 
-    def radiate(self, surface: SurfaceRadiation | None, air: Air | None = None) -> None:
-        """Values become temperatures of such surfaces, behind this air (None: behind what they
-        were); without a surface they are as photographed.
-        """
-        known = self.file.emission or Emission()
-        emission = replace(known, surface=surface, air=air or known.air) if surface else None
-        file = replace(self.file, emission=emission)
-        before, now = self._before[-1] if self._before else None, self.file
-        same = before and _lies_as(before, now) and before.isotherms is now.isotherms
-        if same and surface and now.emission:
-            self.file = file  # the number is being dragged: one step
-            self.read()
-        else:
-            self.edit(file)
-
     def note(self, sentence: str) -> None:
         """Says for a moment what a hand cannot do."""
         self._state.say(sentence)
@@ -285,20 +293,21 @@ class Inspecting:
 
     def saw(self, picture: ValuePicture) -> None:
         """What the view has, measured just now."""
-        self.picture, self.is_current = self.corrected(picture), True
+        self.picture, self.is_current = picture, True
         self.read()
+        self.emissivities.hand_over(self, picture)
 
     def corrected(self, picture: ValuePicture) -> ValuePicture:
-        """As the file of marks has the emissivity; values that are no temperatures stay."""
-        emission = self.file.emission
-        if emission is not None and picture.is_temperature:
-            return picture.corrected(emission)
-        return picture.as_photographed()
+        """As the file of marks has the emissivity."""
+        return self.file.of_surfaces(picture)
 
     def read(self) -> None:
         """All marks anew in the picture that is there."""
-        if self.picture is not None and self.picture.emission != self.file.emission:
+        own = tuple(mark for mark in self.file.marks if mark.emissivity is not None)
+        surfaces = (self.picture, self.file.emission, own, self.file.objects)
+        if self.picture is not None and surfaces != self._surfaces:
             self.picture = self.corrected(self.picture)
+            self._surfaces = (self.picture, *surfaces[1:])
         picture = self.picture
         marks: tuple[Mark, ...] = self.file.marks if picture is not None else ()
         self.readings = {mark.name: read_mark(mark, picture) for mark in marks if picture}
