@@ -20,7 +20,7 @@ FEATURES = {
         r"|splats/sog/\w*stream",
         24, 5,
     ),
-    "inspection, thermal": (r"inspection/|radiometric/|api/inspect", 44, 3),
+    "inspection, thermal": (r"inspection/|radiometric/|api/inspect", 43, 3),
     "film, gallery": (r"^app/film/|^scene/film/|api/film", 16, 3),
     "segmentation": (r"^decomposition/(?!poses)|^app/decomposition/|api/segment", 35, 3),
     "styles": (r"training/style|api/style", 21, 3),

@@ -48,6 +48,7 @@ class InspectActions:
 
     toggle: Callable[[], None]  # the tool
     auto: Callable[[], None]  # level and span of what is seen
+    save: Callable[[], object]
     report: Callable[[], None] | None = None  # None: it is not offered
 
 
@@ -92,7 +93,7 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
     elif clicked:
         tool.ends = tool.value_range
     tips = {
-        "Save marks": "NAME.marks.json beside the scene: read when it is opened again.",
+        "Save marks": "All that is not saved; marks go into NAME.marks.json beside the scene.",
         "Report": "One HTML file with pictures and tables of this view, among the exports.",
     }
     report = actions.report
@@ -100,7 +101,7 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
         del tips["Report"]
     clicked = button_row(tips, ui_scale, len(tips))
     if clicked == "Save marks":
-        tool.keep()
+        actions.save()
     elif clicked and report is not None:
         report()
 
@@ -158,7 +159,7 @@ def _chosen(tool: Inspecting, ui_scale: float) -> None:
     if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:
         tool.delete(name)
         return
-    tip("Delete the mark; Ctrl+Z brings it back while the tool is on.", ui_scale)
+    tip("Delete the mark; Ctrl+Z brings it back.", ui_scale)
     if tool.chosen == name:
         draw_about_mark(tool, name, ui_scale)
 
@@ -182,7 +183,7 @@ def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:
     changed, on = imgui.checkbox(item_label("emissivity"), emission is not None)
     tip(EMISSIVITY, ui_scale)
     if changed:
-        tool.emissivities.radiate(tool, SurfaceRadiation(USUAL_EMISSIVITY) if on else None)
+        tool.radiate(SurfaceRadiation(USUAL_EMISSIVITY) if on else None)
         emission = tool.file.emission
     if emission is None:
         return
@@ -203,9 +204,7 @@ def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:
     back = in_unit(unit, mirrored, mirrored, own)[1] if unit != own else mirrored
     if done or moved:
         try:
-            tool.emissivities.radiate(
-                tool, SurfaceRadiation(share, back if moved else surface.reflected)
-            )
+            tool.radiate(SurfaceRadiation(share, back if moved else surface.reflected))
         except ValueError:  # typed and out of bounds: what was there stays
             return
     _air(tool, wanted, ui_scale)
@@ -221,7 +220,7 @@ def draw_own_emissivity(tool: Inspecting, name: str, of_object: bool, ui_scale: 
     tip("Its own, in every reading, alarm, picture and report.", ui_scale)
     if changed:
         share = usual if on else None
-        tool.emissivities.shine(tool, name, share, of_object)
+        tool.shine(name, share, of_object)
     if share is None:
         return
     imgui.same_line()
@@ -231,7 +230,7 @@ def draw_own_emissivity(tool: Inspecting, name: str, of_object: bool, ui_scale: 
     )
     tip("Of what is seen: 0.95 paint, brick, skin; 0.8 rusty steel; 0.2 bare metal.", ui_scale)
     if done and LEAST_EMISSIVITY <= new <= 1:
-        tool.emissivities.shine(tool, name, new, of_object)
+        tool.shine(name, new, of_object)
 
 
 def _air(tool: Inspecting, wanted: str, ui_scale: float) -> None:
@@ -261,7 +260,7 @@ def _air(tool: Inspecting, wanted: str, ui_scale: float) -> None:
             between = Air(metres, humidity, back if warm else air.celsius)
         except ValueError:  # typed and out of bounds: what was there stays
             return
-        tool.emissivities.radiate(tool, emission.surface, between)
+        tool.radiate(emission.surface, between)
 
 
 def _bound(tool: Inspecting, kind: Bound, words: str, wanted: str, ui_scale: float) -> None:

@@ -114,7 +114,7 @@ def test_all_doors_say_the_same_and_it_is_the_formulas(walls, doors, capsys, mon
     assert inner == pytest.approx(want, abs=NEAR_C)
     assert {r.mark.name: r.most for r in scene.read_marks(camera=BOTH)} == inner
     tool = Inspecting(EditorState(read_model))
-    tool.file = found.file
+    tool.edit(found.file, what="emissivity")
     tool.saw(plain)
     assert {n: r.most for n, r in tool.readings.items()} == inner
     shown = [label_words(m, tool.readings[m.name], tool.picture, "")[0] for m in tool.file.marks]
@@ -288,13 +288,13 @@ def test_what_is_cut_out_keeps_the_emissivity_of_a_mark_on_it():
     picture = replace(traced(), owner_names=("wall",), owners=np.zeros((72, 96), int))
     tool = Inspecting(EditorState(read_model))
     mark = Mark("Sp1", "spot", np.array([(0.2, 0.0, 0.0)]), emissivity=0.6)
-    tool.file = MarksFile((mark,))
+    tool.edit(MarksFile((mark,)), what="emissivity")
     tool.saw(picture)
     assert tool.file.objects == ()
     halves = (picture.points[..., 0] > 0.1).astype(int)
     cut = replace(picture, owner_names=("wall", "part"), owners=halves)
     for objects in ((("part", 0.6),), (("part", 0.8),), ()):
         if objects != (("part", 0.6),):
-            tool.emissivities.shine(tool, "part", dict(objects).get("part"), True)
+            tool.shine("part", dict(objects).get("part"), True)
         tool.saw(cut)
         assert tool.file.objects == objects
