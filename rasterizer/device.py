@@ -34,6 +34,23 @@ class NoMemory(NoDevice):
     """The device's memory is full.  The message says what was asked for."""
 
 
+_first_process: list[int] = []  # that asked a driver for a device or a context
+
+
+def check_fork() -> None:
+    """Raises NoDevice in a process that was forked after a driver was asked for something.
+
+    Threads of the driver are not in it, and a call would wait for them for ever.
+    """
+    if not _first_process:
+        _first_process.append(os.getpid())
+    if _first_process[0] != os.getpid():
+        raise NoDevice(
+            "This process was forked after its parent had drawn, and the drivers' threads are not "
+            "in it; start it with multiprocessing.get_context('spawn'), or draw in it alone."
+        )
+
+
 @dataclass(frozen=True)
 class Device:
     """One OpenCL device with its queue.  Arrays come from a pool: freed ones are reused."""
@@ -177,6 +194,7 @@ def open_device(kind: str | None = None) -> Device:
     """
     import pyopencl as cl
 
+    check_fork()
     try:
         found = [d for platform in cl.get_platforms() for d in platform.get_devices()]
     except cl.LogicError:  # PLATFORM_NOT_FOUND_KHR: there is no driver at all

@@ -11,6 +11,7 @@ from shapeshift.runtime_models.stop_weights import Controls
 DIRECTIONS = 64  # colours are asked for along so many: four times the functions of degree 3
 ROUND, ROUND_SHARE = 32, 0.02  # where eyes are known: directions all around, what they weigh in all
 BLOCK = 1 << 13  # splats, or anchors, at a time: bounds the memory
+COLORS = 1 << 23  # colours that are held at a time, 100 MB
 
 ColorAt = Callable[[Controls], np.ndarray]  # (n, 3) as the model has them at a control
 # (those of some splats, their rows in the model) -> colours (n, 3) as shown
@@ -57,28 +58,38 @@ def fit_seen_colors(
     directions of its own, from the eyes, and so normal equations of its own; what is all around
     weighs ROUND_SHARE of all, so that these can be solved and the rest stays near.
     """
-    looks = [(np.tile(d, (len(anchors), 1)), ROUND_SHARE / ROUND) for d in spread_directions(ROUND)]
     share = (1 - ROUND_SHARE) / len(eyes)
-    sh = np.zeros((len(rows), count, 3), np.float32)
-    for direction, weight in [*looks, *((eye, share) for eye in eyes)]:
-        if direction.ndim == 1:  # an eye
-            direction = directions(anchors, direction)
-        parts = (np.float32(weight) * basis(direction, count))[rows]  # (n, count)
-        color = color_along(direction) - np.float32(0.5)
-        for coefficient in range(count):
-            sh[:, coefficient] += parts[:, coefficient, None] * color
+    looks = [(d, ROUND_SHARE / ROUND, True) for d in spread_directions(ROUND)]
+    looks += [(eye, share, False) for eye in eyes]
+    place = np.arange(len(rows)) - np.searchsorted(rows, rows)  # of a splat, at its anchor
+    each = int(place.max(initial=0)) + 1  # splats at an anchor, at most
+    sums = np.zeros((len(anchors), count, 3 * each), np.float32)
+    together = max(1, min(len(looks), COLORS // (max(len(anchors), 1) * each)))
+    for first in range(0, len(looks), together):
+        some = looks[first : first + together]
+        parts = np.empty((len(anchors), len(some), count), np.float32)
+        colors = np.zeros((len(anchors), len(some), each, 3), np.float32)
+        for i, (direction, weight, around) in enumerate(some):
+            toward = (
+                np.tile(direction, (len(anchors), 1)) if around else directions(anchors, direction)
+            )
+            parts[:, i] = np.float32(weight) * basis(toward, count)
+            colors[rows, i, place] = color_along(toward) - np.float32(0.5)
+        flat = colors.reshape(len(anchors), len(some), 3 * each)
+        for start in range(0, len(anchors), BLOCK):
+            block = slice(start, start + BLOCK)
+            sums[block] += parts[block].transpose(0, 2, 1) @ flat[block]
     around = basis(spread_directions(ROUND).astype(np.float64), count)
     shared = ROUND_SHARE / ROUND * around.T @ around  # (count, count)
     for start in range(0, len(anchors), BLOCK):
         some = anchors[start : start + BLOCK]
-        normal = np.tile(shared, (len(some), 1, 1))
-        for eye in eyes:
-            values = basis(directions(some, eye).astype(np.float64), count)  # (a, count)
-            normal += share * values[:, :, None] * values[:, None, :]
-        first, last = np.searchsorted(rows, (start, start + len(some)))
-        solve = np.linalg.inv(normal)[rows[first:last] - start]
-        sh[first:last] = solve @ sh[first:last]
-    return sh
+        values = np.stack(
+            [basis(directions(some, eye).astype(np.float64), count) for eye in eyes], 1
+        )
+        normal = shared + share * values.transpose(0, 2, 1) @ values  # (a, count, count)
+        block = slice(start, start + len(some))
+        sums[block] = np.linalg.inv(normal) @ sums[block]
+    return np.ascontiguousarray(sums.reshape(len(anchors), count, each, 3)[rows, :, place])
 
 
 def recolored(sh: np.ndarray, recolor: Recolor) -> np.ndarray:

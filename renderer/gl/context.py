@@ -7,6 +7,8 @@ from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_int, c_uint, c_void_p
 
 import moderngl
 
+from shapeshift.rasterizer.device import check_fork
+
 NEEDED = 430  # compute shaders and storage buffers
 KINDS = ("egl", "surfaceless", "osmesa")  # the order of "auto": a GPU comes first where one is
 SOFTWARE = (
@@ -37,8 +39,10 @@ class NoContext(RuntimeError):
 def open_context(kind: str = "auto") -> moderngl.Context:
     """A current GL 4.3 core context without a window; "auto" tries KINDS in order.
 
-    Raises NoContext with one sentence when there is none, and when GL is older than 4.3.
+    Raises NoContext with one sentence when there is none, and when GL is older than 4.3; NoDevice
+    in a forked process.
     """
+    check_fork()
     openers = {"egl": _open_egl, "surfaceless": _open_surfaceless, "osmesa": _open_osmesa}
     if kind in openers:
         return _moderngl(openers[kind]())
@@ -73,10 +77,15 @@ def is_software(ctx: moderngl.Context) -> bool:
 
 
 class _Current:
-    """What moderngl wants of a context that somebody else made: load, make current, release."""
+    """What moderngl wants of a context that somebody else made: load, make current, release.
 
-    def __init__(self, load, make_current, destroy) -> None:
+    In a `with` it is the current one of this thread, and afterwards what was current before.
+    """
+
+    def __init__(self, load, make_current, is_current, let_go, destroy) -> None:
         self._load, self._make_current, self._destroy = load, make_current, destroy
+        self._is_current, self.let_go = is_current, let_go
+        self._others: list[bool] = []  # of each `with` that is open: it was not current before
         make_current()
 
     def load_opengl_function(self, name: str) -> int:
@@ -85,18 +94,29 @@ class _Current:
     load = load_opengl_function
 
     def __enter__(self) -> "_Current":
+        self._others.append(not self._is_current())
         self._make_current()
         return self
 
     def __exit__(self, *failure) -> None:
-        pass
+        if self._others.pop():
+            self.let_go()
 
     def release(self) -> None:
         self._destroy()
 
 
+def let_go(ctx: moderngl.Context) -> None:
+    """No context is current in this thread any more, so that another thread may use this one."""
+    if isinstance(ctx.extra, _Current):
+        ctx.extra.let_go()
+    elif sys.platform == "win32":
+        ctypes.WinDLL("opengl32").wglMakeCurrent(None, None)
+
+
 def _moderngl(current: _Current) -> moderngl.Context:
     ctx = moderngl.create_context(context=current, require=0)
+    ctx.extra = current
     if not ctx.version_code >= NEEDED:
         name, (major, minor) = ctx.info["GL_RENDERER"], divmod(ctx.version_code // 10, 10)
         ctx.release()
@@ -123,6 +143,7 @@ def _egl_library() -> ctypes.CDLL:
         ("eglChooseConfig", c_uint, [c_void_p, c_void_p, c_void_p, c_int, c_void_p]),
         ("eglCreateContext", c_void_p, [c_void_p, c_void_p, c_void_p, c_void_p]),
         ("eglMakeCurrent", c_uint, [c_void_p, c_void_p, c_void_p, c_void_p]),
+        ("eglGetCurrentContext", c_void_p, []),
         ("eglDestroyContext", c_uint, [c_void_p, c_void_p]),
         ("eglGetError", c_int, []),
     ):
@@ -186,13 +207,18 @@ def _egl_current(egl: ctypes.CDLL, display: int | None) -> _Current:
 
     made = need(create_newest(create), "eglCreateContext")
 
-    def destroy() -> None:
+    def let_go() -> None:
         egl.eglMakeCurrent(display, None, None, None)
+
+    def destroy() -> None:
+        let_go()
         egl.eglDestroyContext(display, made)
 
     return _Current(
         egl.eglGetProcAddress,
         lambda: need(egl.eglMakeCurrent(display, None, None, made), "eglMakeCurrent"),
+        lambda: egl.eglGetCurrentContext() == made,
+        let_go,
         destroy,
     )
 
@@ -226,7 +252,14 @@ def _open_osmesa() -> _Current:
         if not make(made, screen, GL_UNSIGNED_BYTE, 64, 64):
             raise NoContext("OSMesaMakeCurrent failed.")
 
-    return _Current(address, make_current, lambda: mesa.OSMesaDestroyContext(c_void_p(made)))
+    mesa.OSMesaGetCurrentContext.restype = c_void_p
+    return _Current(
+        address,
+        make_current,
+        lambda: mesa.OSMesaGetCurrentContext() == made,
+        lambda: make(None, None, GL_UNSIGNED_BYTE, 0, 0),
+        lambda: mesa.OSMesaDestroyContext(c_void_p(made)),
+    )
 
 
 def _open_wgl() -> moderngl.Context:

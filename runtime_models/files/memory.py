@@ -54,6 +54,10 @@ class Account:
         self.whole, self.file, self.size, self.a_byte = whole, file, size, a_byte
         self.taken = 0
 
+    def __reduce__(self) -> tuple:
+        """What travels to another process was read already, and takes nothing of a file there."""
+        return unlimited, ()
+
     def of(self, path: Path, size: int | None = None) -> "Account":
         """Itself: what lies within a file counts for it, under whatever name it is read."""
         return self

@@ -6,12 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shapeshift.runtime_models.files.memory import Account, Memory, unlimited
 from shapeshift.runtime_models.files.part_cache import PartCache
 from shapeshift.runtime_models.model import Finding
+from shapeshift.runtime_models.shapes import check
 from shapeshift.runtime_models.splat_motion import SplatMotion
 
+RAW_SHAPES = {"means": "N 3", "scales": "N 3", "wxyz": "N 4", "opacity": "N", "sh": "N M 3"}
+COEFFICIENTS = (1, 4, 9, 16)  # of SH degrees 0 to 3
 ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")  # of RawSplats and PlainSplats
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
 COLMAP_UP = "-Y"  # x right, y down, z forward: as 3DGS writes its files
@@ -147,6 +151,41 @@ class PlainSplats:
     axes: str = ""  # as of RawSplats
     motion: SplatMotion | None = None  # None: they do not move
     memory: Account = field(default_factory=unlimited, compare=False)  # as of RawSplats
+
+    @classmethod
+    def from_raw(
+        cls, means: ArrayLike, scales: ArrayLike, wxyz: ArrayLike, opacity: ArrayLike,
+        sh: ArrayLike, up: str = "+Y",
+    ) -> "PlainSplats":  # fmt: skip
+        """Splats of parameters as 3DGS and gsplat train them (Kerbl et al. 2023).
+
+        means (N, 3) metres; scales (N, 3) natural logarithms of one sigma; wxyz (N, 4) of any
+        length above 0; opacity (N,) or (N, 1) logits; sh (N, M, 3), M = 1, 4, 9 or 16: what gsplat
+        has as sh0 and shN, one after the other.  up: the axis of these numbers that points up,
+        "-Y" where cameras came from COLMAP.  Everything is copied.  Raises ValueError.
+
+            splats = ss.PlainSplats.from_raw(means, scales, quats, opacities, sh, up="-Y")
+        """
+        from shapeshift.runtime_models.splats.operations.activate import activate
+        from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
+
+        if up not in AXES:
+            raise ValueError(f"up is {up!r}; one of {', '.join(AXES)} is wanted.")
+        given = {"means": means, "scales": scales, "wxyz": wxyz, "opacity": opacity, "sh": sh}
+        arrays = {name: np.array(numbers, np.float32) for name, numbers in given.items()}
+        if arrays["opacity"].ndim == 2 and arrays["opacity"].shape[1] == 1:
+            arrays["opacity"] = arrays["opacity"][:, 0]
+        check(**{name: (array, RAW_SHAPES[name]) for name, array in arrays.items()})
+        if arrays["sh"].shape[1] not in COEFFICIENTS:
+            raise ValueError(f"sh has shape {arrays['sh'].shape}, expected (N, 1, 4, 9 or 16, 3)")
+        raw = RawSplats(**arrays, file="", format="raw parameters", up=up)
+        odd, filed = activate(raw, ours_from_file(up, False))
+        if len(odd):
+            raise ValueError(
+                f"row {odd[0]} is no splat: scales {filed.scales[0].tolist()}, wxyz "
+                f"{filed.wxyz[0].tolist()}, opacity {filed.opacity[0]:g}."
+            )
+        return cls(**{name: getattr(raw, name) for name in ARRAYS}, format=raw.format)
 
     @property
     def dropped(self) -> int:

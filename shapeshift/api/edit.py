@@ -88,6 +88,41 @@ def changed(
     return Document(DrawnScene(objects), file)
 
 
+UNIT = 0.01  # how far from 1 the square of a quaternion's length may be
+
+
+def in_our_coding(splats: PlainSplats) -> PlainSplats:
+    """Float32 arrays of whatever holds the numbers.  ValueError for those that are coded still.
+
+    Logarithms of scales, logits and quaternions of any length are what training keeps; taken for
+    metres, opacities and turns they would draw something that nobody meant.
+    """
+    arrays = {
+        name: np.ascontiguousarray(getattr(splats, name), np.float32)
+        for name in ("means", "scales", "wxyz", "opacity", "sh")
+    }
+    scales, opacity, wxyz = arrays["scales"], arrays["opacity"], arrays["wxyz"]
+    judged = {
+        "scales": (~(scales >= 0), scales, "metres of one sigma, 0 or more, are wanted"),
+        "opacity": (~((opacity >= 0) & (opacity <= 1)), opacity, "0 to 1 is wanted"),
+    }
+    if wxyz.ndim == 2:
+        with np.errstate(over="ignore"):
+            squares = np.einsum("nc,nc->n", wxyz, wxyz)
+        length = np.sqrt(squares)
+        judged["wxyz"] = (~(np.abs(squares - 1) <= UNIT), length, "length 1 is wanted")
+    for name, (odd, numbers, wanted) in judged.items():
+        if np.any(odd & np.isfinite(numbers)):  # NaN and Inf are named by whoever takes the arrays
+            row = np.argwhere(odd & np.isfinite(numbers))[0].tolist()
+            of = "has length" if name == "wxyz" else "is"
+            raise ValueError(
+                f"{name} {of} {numbers[tuple(row)]:g} at {row}; {wanted}. Parameters as training "
+                "keeps them (log scales, logits, quaternions of any length) become splats by "
+                "PlainSplats.from_raw(means, scales, wxyz, opacity, sh)."
+            )
+    return replace(splats, **arrays)
+
+
 def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayers:
     """Each set of splats as a stop of its own.  Raises UsageError, ValueError."""
     from shapeshift.runtime_models.splats.layers.read_layers import join_layers
@@ -98,6 +133,7 @@ def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayer
     names = names or [f"layer {i}" for i in range(1, len(layers) + 1)]
     kind = "layer" if len(layers) > 1 else "rgb"
     stops = tuple(Stop(name, i / last, kind) for i, name in enumerate(names))
+    layers = [in_our_coding(splats) for splats in layers]
     for splats in layers:  # before they are joined, where sizes would no longer be told apart
         SplatLayers(
             splats.means, splats.scales, splats.wxyz, splats.opacity, splats.sh,

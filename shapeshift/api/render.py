@@ -1,6 +1,7 @@
 """Drawing without a window: one Renderer for loops, and the one that all scenes share."""
 
 import atexit
+import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 import numpy as np
 
 from shapeshift.app.drawing import open_renderer
+from shapeshift.rasterizer.device import check_fork
+from shapeshift.renderer.gl.context import let_go
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.scene.appearance import Background
@@ -48,11 +51,13 @@ class Renderer:
         context: Context = "auto",
         settings: RenderSettings | None = None,
     ) -> None:
-        self._stack = ExitStack()
+        self._stack, self._lock = ExitStack(), threading.RLock()
         self._frames: FrameRenderer
         self._ctx: moderngl.Context | None
         opened = open_renderer(context, drawing, report=lambda text: None)
         self._frames, self._ctx = self._stack.enter_context(opened)
+        if self._ctx is not None:
+            let_go(self._ctx)
         self._stats = FrameStats()
         if settings is not None:
             self.settings = settings
@@ -148,16 +153,23 @@ class Renderer:
         self._frames.update(scene.drawn)
         self._stats = self._frames.draw(views)
 
-    def _current(self):
-        """Another part of the program may have made its own GL context the current one."""
-        return nullcontext() if self._ctx is None else self._ctx
+    @contextmanager
+    def _current(self) -> Iterator[None]:
+        """One thread at a time draws, whichever it is; in between the context is nobody's."""
+        check_fork()
+        with self._lock, self._ctx or nullcontext():
+            yield
 
     def close(self) -> None:
         """Gives the memory and the context back; a second time does nothing.
 
         renderer.close()
         """
-        self._stack.close()
+        with self._lock:
+            ctx, self._ctx = self._ctx, None
+            if ctx is not None:
+                ctx.__enter__()  # and the end of the stack lets it go for ever
+            self._stack.close()
 
     def __enter__(self) -> "Renderer":
         return self
@@ -168,6 +180,7 @@ class Renderer:
 
 _lock = threading.RLock()
 _shared: dict[tuple[str, str], Renderer] = {}  # (drawing, context) -> what all scenes draw with
+_of_parent: dict[tuple[str, str], Renderer] = {}  # kept: to give them back would wait for ever
 
 
 @contextmanager
@@ -181,6 +194,7 @@ def shared_renderer(
 
     background: where no settings are given.
     """
+    check_fork()
     with _lock:
         key = (drawing, context)
         if key not in _shared:
@@ -188,6 +202,18 @@ def shared_renderer(
         renderer = _shared[key]
         renderer.settings = settings or replace(RenderSettings(), background=background)
         yield renderer
+
+
+def forget_shared() -> None:
+    """In a forked child: what was open is the parent's, and a lock may be held by no thread."""
+    global _lock
+    _lock = threading.RLock()
+    _of_parent.update(_shared)
+    _shared.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=forget_shared)
 
 
 @atexit.register
