@@ -149,7 +149,8 @@ def cut(
     how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
     if options.complete:
         file, found, planes = completed(device, file, found, capture, how)
-    file, told = upright_scene(file, found, capture.ups, planes or planes_under(found))
+    planes = planes or planes_under(found.model, found.parts)
+    file, told = upright_scene(file, found, capture.ups, planes)
     for sentence in (*told, scale_sentence(found, capture.metres)):
         notice(sentence)
     write_model(found.model, path)
