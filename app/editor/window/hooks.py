@@ -35,5 +35,8 @@ class Hooks:
     marks: list[Callable[[float], None]] = field(default_factory=list)
     # closing: asked when the window is to be closed; False = not yet
     closing: list[Callable[[], bool]] = field(default_factory=list)
+    # asked: what a box asks or a part says by itself; another value is drawn at once, though nobody
+    # has touched anything
+    asked: list[Callable[[], object]] = field(default_factory=list)
     # event_handlers: each sees every event first; True = it was for this
     event_handlers: list[Callable[[Event], bool]] = field(default_factory=list)

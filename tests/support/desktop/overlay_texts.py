@@ -47,7 +47,7 @@ TABLES = {
     "sections.stops_panel": {"MODE_NAMES": VALUES},
 }  # fmt: skip
 TABLES_BESIDE = {
-    "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "LOSE": ALL},
+    "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "UNSAVED": ALL},
     "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},
     "film.window.films": {"AROUND": ALL, "PAST": ALL},
     "inspection.window.inspect_panel": {
@@ -74,7 +74,10 @@ KEY_TABLES = (
     "editor.window.touch", "editor.window.two_pictures", "inspection.window.attach_inspection",
     "inspection.window.attach_ruler",
 )  # fmt: skip
-STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
+STATES = {
+    "files.saving": ("LOSE",), "parts.parts_tool": ("HOW",),
+    "touch_state": ("HOW", "STILL", "MOVING"),
+}  # fmt: skip
 # Texts on their way through variables, as tests/.../look/test_desktop_languages.py has found them.
 BY_VARIABLES = {
     "Budget", "Quality", "Passes", "Counts", "Machine", "drawing", "sort", "vendor", "in the scene",
