@@ -118,12 +118,7 @@ def cut(
     """Writes the labelled model and the scene file; what was found, and what became of each label
     in the photos where a segmenter was asked.  Raises BadFile, UsageError.
     """
-    from shapeshift.app.decomposition.segment_steps import (
-        CompletionSettings,
-        at_rest,
-        begin_writing,
-        completed,
-    )
+    from shapeshift.app.decomposition import segment_steps as steps
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.judge import judged
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
@@ -139,11 +134,11 @@ def cut(
             lambda done, count: progress("evidence of photos", done, count),
         )  # fmt: skip
     else:
-        from shapeshift.app.decomposition.segment_steps import PromptSettings, find_by_prompts
-
         assert specs is not None, "refused before"
-        settings = PromptSettings(options.out, options.segmenter, options.photos, progress, notice)
-        found, counts = find_by_prompts(device, model, capture, specs, settings)
+        settings = steps.PromptSettings(
+            options.out, options.segmenter, options.photos, progress, notice
+        )
+        found, counts = steps.find_by_prompts(device, model, capture, specs, settings)
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
     progress("asking other photos", 0, 1)
@@ -151,16 +146,18 @@ def cut(
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     planes: dict[int, Plane] = {}
-    how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
+    how = steps.CompletionSettings(
+        options.out, options.downscale, options.shadows, progress, notice
+    )
     if options.complete:
-        file, found, planes = completed(device, file, found, capture, how)
+        file, found, planes = steps.completed(device, file, found, capture, how)
     file, told = upright_scene(file, found, capture.ups, planes or planes_under(found))
     for sentence in (*told, scale_sentence(found, capture.metres)):
         notice(sentence)
-    begin_writing(options.out)
+    steps.begin_writing(options.out)
     write_model(found.model, path)
     if options.complete:
-        file, found = at_rest(file, found, how)
+        file, found = steps.at_rest(file, found, how)
     write_scene_file(file, options.out)
     return found, counts
 
