@@ -146,12 +146,12 @@ def cut(
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     planes: dict[int, Plane] = {}
-    how = steps.CompletionSettings(
-        options.out, options.downscale, options.shadows, progress, notice
-    )
+    where = options.out, options.downscale, options.shadows
+    how = steps.CompletionSettings(*where, progress, notice)
     if options.complete:
         file, found, planes = steps.completed(device, file, found, capture, how)
-    file, told = upright_scene(file, found, capture.ups, planes or planes_under(found))
+    planes = planes or planes_under(found.model, found.parts)
+    file, told = upright_scene(file, found, capture.ups, planes)
     for sentence in (*told, scale_sentence(found, capture.metres)):
         notice(sentence)
     steps.begin_writing(options.out)

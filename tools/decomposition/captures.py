@@ -71,6 +71,7 @@ from shapeshift.scene.colliders.collider_pieces import hull_faces  # noqa: E402
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume  # noqa: E402
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape  # noqa: E402
 from tools.decomposition.published_masks import prepare  # noqa: E402
+from tools.decomposition.segmenters import iou  # noqa: E402
 from tools.decomposition.surface_scores import (  # noqa: E402
     score_surfaces,
     surface_of,
@@ -123,10 +124,6 @@ class Case:
         return [ObjectLabel(spec.label, spec.name) for spec in self.specs.objects]
 
 
-def iou(one: np.ndarray, other: np.ndarray) -> float:
-    return float((one & other).sum() / max((one | other).sum(), 1))
-
-
 def seconds_of_all() -> float:
     """Of processor time, with that of children: CoACD runs in one."""
     now = os.times()
@@ -134,7 +131,7 @@ def seconds_of_all() -> float:
 
 
 def export_seconds(found: Segmented) -> float:
-    """Of processor time, to write every object to a package of its own."""
+    """Processor seconds to write every object to a package of its own."""
     begun = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         for part in found.parts:
