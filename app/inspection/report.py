@@ -22,7 +22,7 @@ from shapeshift.app.inspection.outputs import summary_lines, three_pictures
 from shapeshift.app.inspection.pictures import ColorScale, scale_ticks
 from shapeshift.runtime_models.files.plain_text import json_text, one_line
 from shapeshift.runtime_models.model import Stop
-from shapeshift.runtime_models.program import is_installed
+from shapeshift.runtime_models.program import portable_program
 from shapeshift.scene.cameras.camera_list import CameraList, moved
 from shapeshift.scene.cameras.own_cameras import own_rows
 from shapeshift.scene.inspection.mark_photos import photo_pixels
@@ -115,7 +115,7 @@ class InspectionReport:
 
     def command(self, cameras_name: str) -> str:
         """What opens the scene where the first view is, in the folder where both files lie."""
-        program = "shapeshift" if is_installed() else "python3 launch.py"
+        program = portable_program()
         scene, stop, cameras = map(shlex.quote, (self.scene, self.stop, cameras_name))
         at = f" --x {stop}" if self.stop else ""
         return f"{program} view {scene}{at} --camera {cameras}"
