@@ -36,9 +36,7 @@ def planes_under(
     looks, labels = (
         (looks_of(model), model.labels) if isinstance(model, AnchorModel) else splat_places(model)
     )
-    planes = {
-        p.spec.label: support_plane(looks, labels, p.spec.label) for p in parts if p.rows
-    }
+    planes = {p.spec.label: support_plane(looks, labels, p.spec.label) for p in parts if p.rows}
     return {label: plane for label, plane in planes.items() if isinstance(plane, Plane)}
 
 
