@@ -141,14 +141,17 @@ def cut(
         found, counts = find_by_prompts(device, model, capture, specs, settings)
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
+    device.pool.free_held()  # what large photos were drawn in
     progress("asking other photos", 0, 1)
     found = judged(device, found, capture)
+    device.pool.free_held()
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     planes: dict[int, Plane] = {}
     how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
     if options.complete:
         file, found, planes = completed(device, file, found, capture, how)
+        device.pool.free_held()
     planes = planes or planes_under(found.model, found.parts)
     file, told = upright_scene(file, found, capture.ups, planes)
     for sentence in (*told, scale_sentence(found, capture.metres)):

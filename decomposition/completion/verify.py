@@ -133,7 +133,7 @@ class PhotoView:
     """A labelled picture with its photo; None: nothing to compare with."""
 
     labelled: LabelledView
-    photo: np.ndarray | None = None  # (H, W, 3) display sRGB 0..1
+    photo: np.ndarray | None = None  # (H, W, 3) uint8 display sRGB
 
 
 class Cells(NamedTuple):
@@ -238,14 +238,15 @@ def add_view(
         error = float(((first - second)[protected] ** 2).mean())
         tally.alike_db = min(tally.alike_db, decibels(error))
     beside = ndimage.binary_dilation(grown, iterations=AROUND) & protected
-    if view.photo is not None:
-        errors = [((each - view.photo) ** 2).mean(2) for each in (first, second)]
+    photo = None if view.photo is None else view.photo.astype(np.float32) / 255
+    if photo is not None:
+        errors = [((each - photo) ** 2).mean(2) for each in (first, second)]
         tally.beside += int(beside.sum())
         tally.error_before += float(errors[0][beside].sum())
         tally.error_after += float(errors[1][beside].sum())
         tally.own += int(protected.sum())
         tally.own_error += float(errors[0][protected].sum())
-    known = (first if view.photo is None else view.photo)[beside]
+    known = (first if photo is None else photo)[beside]
     place = mask if cells is None else mask & shown_cells(view.labelled.view, cells, 0.5)
     # A training may leave a floor of its background's own colour nearly clear all over.
     clear = OPEN * max(float(p[beside, 3].mean()) for p in pair) if beside.any() else OPEN

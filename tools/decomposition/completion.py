@@ -95,7 +95,10 @@ def labelled_demo(device) -> tuple:
     objects = tuple(ObjectLabel(LABELS[name], name) for name in OBJECTS)
     few = pictures[:: VIEWS // VERIFYING]
     photos = [photograph(each.view, radiance("RGB"), samples=1)[0] for each in few]
-    verifying = [PhotoView(*pair) for pair in zip(few, photos, strict=True)]
+    verifying = [
+        PhotoView(each, np.rint(255 * np.clip(photo, 0, 1)).astype(np.uint8))
+        for each, photo in zip(few, photos, strict=True)
+    ]
     return partition(model, sums, objects), sums[:, 0], verifying
 
 
