@@ -192,7 +192,7 @@ def cells_of(points: np.ndarray, cell_m: float) -> tuple[np.ndarray, tuple[int, 
     """(M,) int64: the cell of each point (M, 3) in a grid around all, and the grid's shape."""
     axes = [((x - x.min()) / cell_m).astype(np.int32) for x in points.T]
     shape = tuple(int(axis.max()) + 1 for axis in axes)
-    return np.ravel_multi_index(tuple(axes), shape), shape
+    return np.asarray(np.ravel_multi_index(tuple(axes), shape)), shape
 
 
 def without_needles(
