@@ -51,7 +51,7 @@ def photo_views(
             labels = np.where(picture.labels == SILENT, labels, picture.labels)
         pixels = None
         if not stop.is_measured:  # false colours are no display values
-            pixels = load_photo(photo, factor).rgb
+            pixels = load_photo(photo, factor).rgb.astype(np.float32) / 255
         fits = pixels is not None and pixels.shape[:2] == labels.shape
         labelled = LabelledView(view, stop.x, labels, photo.path)
         views.append(PhotoView(labelled, pixels if fits else None))

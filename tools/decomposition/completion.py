@@ -95,10 +95,7 @@ def labelled_demo(device) -> tuple:
     objects = tuple(ObjectLabel(LABELS[name], name) for name in OBJECTS)
     few = pictures[:: VIEWS // VERIFYING]
     photos = [photograph(each.view, radiance("RGB"), samples=1)[0] for each in few]
-    verifying = [
-        PhotoView(each, np.rint(255 * np.clip(photo, 0, 1)).astype(np.uint8))
-        for each, photo in zip(few, photos, strict=True)
-    ]
+    verifying = [PhotoView(*pair) for pair in zip(few, photos, strict=True)]
     return partition(model, sums, objects), sums[:, 0], verifying
 
 
@@ -150,7 +147,7 @@ def wrong_stamps(device, model, evidence, views: list, label: int) -> list:
     told = []
     for step, each in wrong.items():
         after = only_background(with_background_copies(apply_stamp(model, each), len(each.rows)))
-        cells = Cells(each.footprint, each.cell_m, plane.normal)
+        cells = Cells(each.footprint, each.cell_m, plane.normal, each.around)
         told.append((step, each, verify(device, before, after, label, views, STUDIO, cells)))
     return told
 
