@@ -36,7 +36,6 @@ LEAVES = {
         "out/cut/report/views.png",
         "out/cut/isolated/0000_x0.000.png",
         "out/cut/throw/00060.png",
-        "out/lifted.png",
     ],
     "touch.md": ["out/mug/thermal.ply", "out/room/00090.png", "out/ready/room.scene.json"],
     "python.md": ["out/python/faded.spz", "out/python/touch.png", "out/python/trained.shift"],
