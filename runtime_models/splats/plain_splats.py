@@ -154,38 +154,37 @@ class PlainSplats:
 
     @classmethod
     def from_raw(
-        cls, means: ArrayLike, scales: ArrayLike, wxyz: ArrayLike, opacity: ArrayLike,
-        sh: ArrayLike, up: str = "+Y",
-    ) -> "PlainSplats":  # fmt: skip
+        cls, means: ArrayLike, scales: ArrayLike, wxyz: ArrayLike, opacity: ArrayLike, sh: ArrayLike
+    ) -> "PlainSplats":
         """Splats of parameters as 3DGS and gsplat train them (Kerbl et al. 2023).
 
-        means (N, 3) metres; scales (N, 3) natural logarithms of one sigma; wxyz (N, 4) of any
-        length above 0; opacity (N,) or (N, 1) logits; sh (N, M, 3), M = 1, 4, 9 or 16: what gsplat
-        has as sh0 and shN, one after the other.  up: the axis of these numbers that points up,
-        "-Y" where cameras came from COLMAP.  Everything is copied.  Raises ValueError.
+        means (N, 3) metres, with +Y up as everything here; scales (N, 3) natural logarithms of one
+        sigma; wxyz (N, 4) of any length above 0; opacity (N,) or (N, 1) logits; sh (N, M, 3), M =
+        1, 4, 9 or 16: what gsplat has as sh0 and shN, one after the other.  Everything is copied.
+        Raises ValueError.
 
-            splats = ss.PlainSplats.from_raw(means, scales, quats, opacities, sh, up="-Y")
+            splats = ss.PlainSplats.from_raw(means, scales, quats, opacities, sh)
         """
-        from shapeshift.runtime_models.splats.operations.activate import activate
-        from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
-
-        if up not in AXES:
-            raise ValueError(f"up is {up!r}; one of {', '.join(AXES)} is wanted.")
         given = {"means": means, "scales": scales, "wxyz": wxyz, "opacity": opacity, "sh": sh}
-        arrays = {name: np.array(numbers, np.float32) for name, numbers in given.items()}
-        if arrays["opacity"].ndim == 2 and arrays["opacity"].shape[1] == 1:
-            arrays["opacity"] = arrays["opacity"][:, 0]
-        check(**{name: (array, RAW_SHAPES[name]) for name, array in arrays.items()})
-        if arrays["sh"].shape[1] not in COEFFICIENTS:
-            raise ValueError(f"sh has shape {arrays['sh'].shape}, expected (N, 1, 4, 9 or 16, 3)")
-        raw = RawSplats(**arrays, file="", format="raw parameters", up=up)
-        odd, filed = activate(raw, ours_from_file(up, False))
-        if len(odd):
+        raw = {name: np.array(numbers, np.float32) for name, numbers in given.items()}
+        if raw["opacity"].ndim == 2 and raw["opacity"].shape[1] == 1:
+            raw["opacity"] = raw["opacity"][:, 0]
+        check(**{name: (array, RAW_SHAPES[name]) for name, array in raw.items()})
+        if raw["sh"].shape[1] not in COEFFICIENTS:
+            raise ValueError(f"sh has shape {raw['sh'].shape}, expected (N, 1, 4, 9 or 16, 3)")
+        with np.errstate(over="ignore"):
+            sigma = np.exp(raw["scales"])
+            alpha = np.float32(1) / (1 + np.exp(-raw["opacity"]))
+            length = np.linalg.norm(raw["wxyz"], axis=1)
+        odd = ~(np.isfinite(sigma).all(axis=1) & np.isfinite(length) & (length > 0))
+        if odd.any():
+            row = int(np.flatnonzero(odd)[0])
             raise ValueError(
-                f"row {odd[0]} is no splat: scales {filed.scales[0].tolist()}, wxyz "
-                f"{filed.wxyz[0].tolist()}, opacity {filed.opacity[0]:g}."
+                f"row {row} is no splat: scales {raw['scales'][row].tolist()}, wxyz "
+                f"{raw['wxyz'][row].tolist()}."
             )
-        return cls(**{name: getattr(raw, name) for name in ARRAYS}, format=raw.format)
+        turns = raw["wxyz"] / length[:, None]
+        return cls(raw["means"], sigma, turns, alpha, raw["sh"], format="raw parameters")
 
     @property
     def dropped(self) -> int:

@@ -27,7 +27,7 @@ DECIMALS = 6  # of values; a palette's step is a thousand times as much
 
 
 @dataclass(frozen=True)
-class Figures:
+class MarkFigures:
     """What a view reads at a mark; NaN where nothing is seen of it."""
 
     least: float = np.nan
@@ -96,7 +96,7 @@ class Laying:
 
     def figures(
         self, picture: ValuePicture, emissivity: float | None
-    ) -> tuple[Figures, float | None]:
+    ) -> tuple[MarkFigures, float | None]:
         """As the picture is corrected now, and by which emissivity its largest value is.
 
         emissivity: of the mark itself; None: that of the surface.
@@ -121,12 +121,12 @@ class Laying:
             low = low if np.isfinite(low) else float(means[known].min())
             found.append((low, high, first, last, own))
         if not found:
-            return Figures(), emissivity
+            return MarkFigures(), emissivity
         coldest = min(found, key=lambda each: each[0])
         hottest = max(found, key=lambda each: each[1])
         first, mean = coldest[2], total / counted
         ends = (float(first) if np.isfinite(first) else -np.inf, float(hottest[3]))
-        return Figures(float(coldest[0]), mean, float(hottest[1]), ends), hottest[4]
+        return MarkFigures(float(coldest[0]), mean, float(hottest[1]), ends), hottest[4]
 
     def words(self) -> str:
         """The moment for people: 2026-11-29 14:05."""

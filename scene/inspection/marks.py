@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from shapeshift.scene.inspection.emissivity import LEAST_EMISSIVITY, Emission
-from shapeshift.scene.inspection.laying import Figures, Laying
+from shapeshift.scene.inspection.laying import Laying, MarkFigures
 from shapeshift.scene.inspection.value_picture import (
     HIDDEN_M,
     HIDDEN_PART,
@@ -110,7 +110,7 @@ class MarkReading:
     depth_m: float = math.nan  # of its middle, along the view
     hottest: tuple[float, float] | None = None  # column, row of the largest value
     profile: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (n, 2) metres, value
-    now: Figures = field(default_factory=Figures)  # of this view
+    now: MarkFigures = field(default_factory=MarkFigures)  # of this view
     ends: tuple[float, float] = (-math.inf, math.inf)  # of what photos showed, at least and most
     emissivity: float | None = None  # of its largest value; None: as photographed, or not known
     hidden: str = ""  # why this view reads nothing: one of HIDDEN; "": it does, or it cannot know
@@ -190,7 +190,7 @@ def _read_now(mark: Mark, picture: ValuePicture) -> MarkReading:
         if not np.isfinite(value):
             return MarkReading(mark, depth_m=depth)
         pixel = tuple(picture.pixel_of(mark.points)[0][0])
-        now = Figures(value, value, value, picture.ends_at(pixel))
+        now = MarkFigures(value, value, value, picture.ends_at(pixel))
         return _reading_of(mark, picture, now, 1, depth, pixel)
     if mark.kind == "line":
         return _read_line(mark, picture, depth)
@@ -202,12 +202,12 @@ def _read_now(mark: Mark, picture: ValuePicture) -> MarkReading:
     pixels = np.stack([columns, rows], axis=1) + 0.5
     coldest, hottest = (tuple(pixels[int(f(values))]) for f in (np.argmin, np.argmax))
     ends = (picture.ends_at(coldest)[0], picture.ends_at(hottest)[1])
-    now = Figures(float(values.min()), float(values.mean()), float(values.max()), ends)
+    now = MarkFigures(float(values.min()), float(values.mean()), float(values.max()), ends)
     return _reading_of(mark, picture, now, len(values), depth, hottest)
 
 
 def _reading_of(
-    mark: Mark, picture: ValuePicture, now: Figures, samples: int, depth_m: float,
+    mark: Mark, picture: ValuePicture, now: MarkFigures, samples: int, depth_m: float,
     hottest: tuple[float, float],
 ) -> MarkReading:  # fmt: skip
     share = mark.emissivity or picture.emissivity_at(hottest)
@@ -291,7 +291,7 @@ def _read_line(mark: Mark, picture: ValuePicture, depth: float) -> MarkReading:
     low, mean, high = (float(f(values)) for f in (np.nanmin, np.nanmean, np.nanmax))
     coldest, hottest = (tuple(pixel) for pixel in picture.pixel_of(ends)[0])
     bounds = (picture.ends_at(coldest)[0], picture.ends_at(hottest)[1])
-    now = Figures(low, mean, high, bounds)
+    now = MarkFigures(low, mean, high, bounds)
     found = _reading_of(mark, picture, now, int(known.sum()), depth, hottest)
     return replace(found, profile=profile)
 

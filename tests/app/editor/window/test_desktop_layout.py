@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import glfw
 import numpy as np
@@ -13,7 +14,7 @@ from shapeshift.app.editor.state.camera.framed import SETTLED_S
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window import monitor
 from shapeshift.app.editor.window.two_pictures import splitting
-from shapeshift.app.editor.window.window import Drag
+from shapeshift.app.editor.window.window import Drag, Drop
 from shapeshift.rasterizer.program import announce
 from shapeshift.renderer.renderer import Renderer
 from tests.support.desktop.desktop_stand import run_frames
@@ -354,9 +355,8 @@ def test_a_first_start_says_what_it_compiles(viewer, monkeypatch):
     monkeypatch.setattr(desktop, "draw_opening", noted)
     clock = [0.0]
     monkeypatch.setattr(desktop.time, "perf_counter", lambda: clock[0])
-    early = Drag("left", 1.0, 0.0)
     with desktop.OpeningCard(window, "ball") as first:
-        window._raw.append(early)
+        window.on_drop(window.handle, ["early.ply"])
         announce("one.cl")  # at once: a start that is nearly over
         clock[0] = desktop.SAY_AGAIN_S
         announce("two.cl")
@@ -377,7 +377,7 @@ def test_a_first_start_says_what_it_compiles(viewer, monkeypatch):
         ).max()
         <= 1
     )
-    assert early in window.begin_frame()
+    assert Drop((Path("early.ply"),)) in window.begin_frame()
     imgui.end_frame()
     with desktop.OpeningCard(window, None):  # pictures for a file: nobody watches
         announce("five.cl")
