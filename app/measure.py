@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from shapeshift.app.document import Document
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.renderer.streaming.stream import has_leaves

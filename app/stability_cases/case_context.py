@@ -10,7 +10,7 @@ import numpy as np
 
 from shapeshift.app.document import Document
 from shapeshift.app.stability_cases.finding import Panel
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.scene.pose import Pose, View

@@ -22,7 +22,7 @@ from shapeshift.app.stability_cases.finding import (
     worst_of,
 )
 from shapeshift.app.stability_cases.scenes import alone, front, glossy, splats
-from shapeshift.renderer.colors import eye_colors
+from shapeshift.renderer.colors import color_cache
 from shapeshift.scene.cameras.framing import distances_from
 from shapeshift.scene.pose import View
 from shapeshift.scene.stereo import PUPILS_M, eyes_apart, stereo_pair
@@ -32,7 +32,7 @@ CANTED = (2.0, 5.0, 10.0)  # degrees between the eyes: each then wants an order 
 NEARLY_PARALLEL = 0.5  # degrees: one order for both by rule (up to 1 degree)
 SAME_DB = 90  # of pictures from the same orders: only what is drawn in another sequence differs
 SHARED_DB = 75  # and where equal depths round differently
-AUTO_DB = eye_colors.SHARED_DB  # below that colours are never shared
+AUTO_DB = color_cache.SHARED_DB  # below that colours are never shared
 SAME_EYE_DB = 75  # of an eye in a pair and alone: other rounding, 16 bits on the way
 SAME_EYE = "an eye in a pair sees what it sees alone"
 AUTO_REASON = (

@@ -11,7 +11,7 @@ from itertools import groupby
 import numpy as np
 
 from shapeshift.rasterizer.device import Device, NoDevice, open_device
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import StreamStats

@@ -187,7 +187,7 @@ def test_cameras_of_the_file_see_the_same_picture_there(near_and_far, tmp_path):
 
 
 def test_the_oracle_draws_both_alike(near_and_far):
-    from shapeshift.renderer.reference.reference import reference_image
+    from shapeshift.renderer.reference import reference_image
     from shapeshift.renderer.settings import RenderSettings
     from shapeshift.scene.cameras.framing import default_view
     from shapeshift.scene.scene import Scene, SceneObject

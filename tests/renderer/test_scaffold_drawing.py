@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.rasterizer.device import NoDevice, open_device
 from shapeshift.renderer.colors.color_cache import reach_of_scaffold
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view, model_points

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.colors.eye_colors import SHARED_DB, EyeColors
+from shapeshift.renderer.colors.color_cache import SHARED_DB, EyeColors
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.colors.color_bounds import color_slope

@@ -25,7 +25,7 @@ from shapeshift.rasterizer.reference import MAX_ALPHA
 from shapeshift.renderer.colors.palette import LUMINANCE
 from shapeshift.renderer.gl.shader import SHADERS
 from shapeshift.renderer.gl.target import MOST_UNIT
-from shapeshift.renderer.reference.reference import JACOBIAN_MARGIN
+from shapeshift.renderer.reference import JACOBIAN_MARGIN
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.web import limits
 from shapeshift.runtime_models.web.web_model import ControlEntry, ModelEntry, Section, SectionKind

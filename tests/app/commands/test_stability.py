@@ -137,7 +137,7 @@ def test_the_case_fails_where_the_renderer_does(case, name, spoil):
 
 def test_colours_of_the_middle_between_the_eyes_fail(case, monkeypatch):
     """What every stereo frame had before each eye got colours of its own."""
-    monkeypatch.setattr("shapeshift.renderer.colors.eye_colors.SHARED_DB", -1e9)
+    monkeypatch.setattr("shapeshift.renderer.colors.color_cache.SHARED_DB", -1e9)
     assert any("glossy ball" in text for text in failures(CASES["stereo"](case)))
 
 

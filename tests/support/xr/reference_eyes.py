@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.app.document import DARK
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import read_models, scene_of
 from shapeshift.scene.pose import View

@@ -10,7 +10,7 @@ from shapeshift.app import cli
 from shapeshift.app.drawing import is_our_png, open_renderer, parse_size, save_png, split_controls
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.colors.palette import palette_colors
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.cameras.read_cameras import read_cameras

@@ -1,4 +1,8 @@
-"""splat_edges: splats as ellipses, points or rings; a debug picture, not a frame's pass."""
+"""splat_edges, overdraw: debug pictures, no passes of a frame.
+
+splat_edges: splats as ellipses, points or rings.
+overdraw: how many splats each pixel blends.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +15,7 @@ from shapeshift.rasterizer.project import Projected
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-KERNEL = Path(__file__).parent / "kernels" / "splat_edges.cl"
+KERNELS = Path(__file__).parent / "kernels"
 GROUP = 64  # work-items
 KINDS = ("ellipses", "points", "rings")
 EDGE_POWER = 4.0  # squared sigmas from the middle to the edge
@@ -30,7 +34,7 @@ def draw_edges(
     """
     width, height = size
     front = device.upload(np.full((height, width), NOBODY, np.int32))
-    kernel = device.program(KERNEL, KIND=KINDS.index(kind))["splat_edges"]
+    kernel = device.program(KERNELS / "splat_edges.cl", KIND=KINDS.index(kind))["splat_edges"]
     count = order.shape[0]
     device.launch(
         kernel, count, GROUP, count, width, height, EDGE_POWER, POINT_PX, BAND_PX,
@@ -50,3 +54,13 @@ def draw_edges(
         colors = colors * (1 - 0.5 * np.clip(power / edge, 0, 1))[:, None]
     image[seen, :3], image[seen, 3] = colors, 1
     return image
+
+
+def count_overdraw(device: Device, projected: Projected, size: tuple[int, int]) -> np.ndarray:
+    """(H, W) int32, row 0 on top, of splats that project or project_arena left; no early stop."""
+    width, height = size
+    number = device.zeros((height, width), np.int32)
+    count = projected.record.shape[0]
+    kernel = device.program(KERNELS / "overdraw.cl")["overdraw"]
+    device.launch(kernel, count, GROUP, count, width, height, projected.record, number)
+    return device.download(number)

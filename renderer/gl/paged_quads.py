@@ -6,12 +6,11 @@ from collections.abc import Iterator
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer import layout
 from shapeshift.renderer.colors.false_colors import Shade
-from shapeshift.renderer.gl.buffers import bind
+from shapeshift.renderer.gl.buffers import MappedPages, bind
 from shapeshift.renderer.gl.gpu import groups_for, overwrite
-from shapeshift.renderer.gl.paging.mapped_pages import MappedPages
 from shapeshift.renderer.gl.quads import QuadsDrawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.runtime_models.leaf_levels import LeafSplats

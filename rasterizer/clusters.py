@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
+from shapeshift.rasterizer.pages import PageMap, defines_of_pages
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-KERNELS = Path(__file__).parents[1] / "kernels" / "clusters"
+KERNELS = Path(__file__).parent / "kernels" / "clusters"
 CLUSTER = 256  # rows; common/limits.cl has it, too
 BOUNDS = 12  # floats of a cluster
 GROUP = 64  # work-items

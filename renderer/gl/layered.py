@@ -1,15 +1,15 @@
 """A window's picture and a layer over it, kept on software GL: only what changes is drawn anew."""
 
-from ctypes import c_int, c_uint, c_void_p
+import ctypes
+import sys
+from collections.abc import Callable
+from ctypes import CFUNCTYPE, c_char_p, c_int, c_uint, c_void_p
+from typing import Any
 
 import moderngl
 import numpy as np
 
-from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
 from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
-
-# A picture in a texture that is laid out as a window's memory is: software GL copies between the
-# two, where it draws from any other.
 
 GL_TEXTURE0, GL_TEXTURE_2D, GL_RGBA, GL_BGRA = 0x84C0, 0x0DE1, 0x1908, 0x80E1
 GL_UNSIGNED_INT_8_8_8_8_REV, GL_NEAREST, GL_COLOR_BUFFER_BIT = 0x8367, 0x2600, 0x4000
@@ -18,9 +18,72 @@ GL_READ_FRAMEBUFFER = 0x8CA8
 PixelBox = tuple[int, int, int, int]  # left, top, right, bottom; the upper left pixel is 0, 0
 
 
+# The few functions of GL that moderngl lacks, found in the context that is current.
+
+LOADERS = (("libEGL.so.1", "eglGetProcAddress", "eglGetCurrentContext"),
+           ("libGLX.so.0", "glXGetProcAddressARB", "glXGetCurrentContext"),
+           ("libGL.so.1", "glXGetProcAddressARB", "glXGetCurrentContext"))  # fmt: skip
+
+
+class NoFunction(RuntimeError):
+    """A function of GL was not found; the message says which, or that there is no context."""
+
+
+class GlFunctions:
+    """Calls by name, with their types; raises NoFunction where no context is current."""
+
+    def __init__(self) -> None:
+        self._address = find_loader()
+        self._found: dict[str, Any] = {}
+
+    def call(self, name: str, result, kinds: tuple, *arguments):
+        """What the function returns.  Raises NoFunction."""
+        if name not in self._found:
+            address = self._address(name)
+            if not address:
+                raise NoFunction(f"the driver has no {name}.")
+            self._found[name] = CFUNCTYPE(result, *kinds)(address)
+        return self._found[name](*arguments)
+
+
+def find_loader() -> Callable[[str], int | None]:
+    """What tells where a function of GL is, for the context that is current.  Raises NoFunction."""
+    if sys.platform == "win32":
+        return _windows_loader()
+    for library, function, current in LOADERS:
+        try:
+            loaded = ctypes.CDLL(library)
+        except OSError:
+            continue
+        asks = getattr(loaded, current)
+        asks.restype = c_void_p
+        if not asks():
+            continue
+        find = getattr(loaded, function)
+        find.restype, find.argtypes = c_void_p, [c_char_p]
+        return lambda name: find(name.encode())
+    raise NoFunction("no OpenGL context of EGL or GLX is current.")
+
+
+def _windows_loader() -> Callable[[str], int | None]:
+    """wglGetProcAddress knows what came after OpenGL 1.1, the library itself what was there."""
+    opengl = getattr(ctypes, "WinDLL")("opengl32")  # noqa: B009  only there
+    opengl.wglGetProcAddress.restype = c_void_p
+    opengl.wglGetProcAddress.argtypes = [c_char_p]
+
+    def address(name: str) -> int | None:
+        found = opengl.wglGetProcAddress(name.encode())
+        if found and found > 3:  # some drivers say 1, 2, 3 or -1 for none
+            return found
+        return ctypes.cast(getattr(opengl, name), c_void_p).value
+
+    return address
+
+
 class WindowBytes:
-    """Such a texture: of no stated size, and given blue first.  Blitted upside down it needs no
-    turn, since GL counts rows from below and a window's memory from above.
+    """A picture in a texture that is laid out as a window's memory is: software GL copies between
+    the two, where it draws from any other.  Of no stated size, and given blue first.  Blitted
+    upside down it needs no turn, since GL counts rows from below and a window's memory from above.
     """
 
     def __init__(self, gpu: Gpu) -> None:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pyopencl as cl
     from pyopencl.array import Array
 
-KERNEL = Path(__file__).parents[1] / "kernels" / "decode" / "decode_heads.cl"
+KERNEL = Path(__file__).parent / "kernels" / "decode" / "decode_heads.cl"
 WIDTH = {"cpu": 16, "gpu": 1}  # anchors at a time: a vector of AVX-512, a work-item of a GPU
 GROUP = {"cpu": 1, "gpu": 64}
 RUN = {"cpu": 16, "gpu": 1}  # blocks of WIDTH anchors a work-item

@@ -8,7 +8,7 @@ from functools import lru_cache
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.fovea.foveate import Fovea
+from shapeshift.rasterizer.foveate import Fovea
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.splat import Splatter

@@ -46,7 +46,7 @@ class Fovea:
         return kinds.astype(np.uint8)
 
 
-KERNELS = Path(__file__).parents[1] / "kernels"
+KERNELS = Path(__file__).parent / "kernels"
 
 
 def rasterize_foveated(

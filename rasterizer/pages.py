@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     # mean_opacity (N, 4), covariance (N, 8), object_index (rows drawn,) and where these lie.
     Arena: TypeAlias = "tuple[Array, Array, Array, PageMap | None]"
 
-KERNEL = Path(__file__).parents[1] / "kernels" / "paging" / "pages.cl"
+KERNEL = Path(__file__).parent / "kernels" / "paging" / "pages.cl"
 PAGE = 32  # rows: the coarsest level of a leaf has 32 to 64 splats, and pages are not shared
 GROUP = 64  # work-items
 
