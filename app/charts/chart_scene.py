@@ -16,9 +16,8 @@ from shapeshift.scene.cameras.framing import (
     framing_view,
     scene_points,
 )
-from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.pose import Pose, View, eyes_apart
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
-from shapeshift.scene.stereo import eyes_apart
 
 WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
 GAP = 1.05  # of the sum of two radii, between neighbours

@@ -24,8 +24,7 @@ from shapeshift.app.stability_cases.finding import (
 from shapeshift.app.stability_cases.scenes import alone, front, glossy, splats
 from shapeshift.renderer.colors import color_cache
 from shapeshift.scene.cameras.framing import distances_from
-from shapeshift.scene.pose import View
-from shapeshift.scene.stereo import PUPILS_M, eyes_apart, stereo_pair
+from shapeshift.scene.pose import PUPILS_M, View, eyes_apart, stereo_pair
 
 DEPTHS = (0.5, 1.0, 3.0, 10.0, 100.0)  # metres
 CANTED = (2.0, 5.0, 10.0)  # degrees between the eyes: each then wants an order of its own

@@ -44,7 +44,7 @@ from shapeshift.renderer.streaming.pages import (
 )
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
-from shapeshift.runtime_models.splats.lod.parents import NodeTree, with_parents
+from shapeshift.runtime_models.splats.parents import NodeTree, with_parents
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 

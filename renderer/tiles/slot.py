@@ -19,7 +19,7 @@ from shapeshift.rasterizer.pack import pack_color
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.colors.light_harmonics import most_light
+from shapeshift.runtime_models.colors.spherical_harmonics import most_light
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import HEADS, AnchorModel, Mlp, Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, is_each

@@ -18,7 +18,7 @@ from PIL import Image
 from shapeshift.runtime_models.gate import gate
 from shapeshift.runtime_models.gate.doors import DOORS, ELSEWHERE
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
+from shapeshift.scene.captures.rare_photo_run import USUAL
 from tests.support.hostile.gate_fuzz import MOST_BYTES, MOST_S, Outcome, fuzz
 from tests.support.hostile.gate_seeds import seeds
 from tests.support.sources import nodes_of

@@ -12,9 +12,8 @@ from shapeshift.runtime_models.colors.color_bounds import color_slope
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import frame_points, scene_points
-from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.scene.pose import View, look_at, perspective, stereo_pair
 from shapeshift.scene.scene import Scene
-from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import without_direction
 from tests.support.renderer.eye_scenes import APART, SCENES, TURNED, eyes
 from tests.support.renderer.frames import draw_counted

@@ -26,7 +26,7 @@ from shapeshift.rasterizer.bin import bin_tiles  # noqa: E402
 from shapeshift.rasterizer.device import Device  # noqa: E402
 from shapeshift.rasterizer.project import Camera, project  # noqa: E402
 from shapeshift.rasterizer.raster import rasterize_rgba  # noqa: E402
-from shapeshift.runtime_models.colors.light_harmonics import turn_light  # noqa: E402
+from shapeshift.runtime_models.colors.spherical_harmonics import turn_light  # noqa: E402
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
 from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402

@@ -10,7 +10,7 @@ from shapeshift.renderer.gl import buffers
 from shapeshift.renderer.gl.gpu import overwrite
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.splats.lod.parents import with_parents
+from shapeshift.runtime_models.splats.parents import with_parents
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject, Tint

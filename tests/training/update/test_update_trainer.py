@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.colors.light_harmonics import WIDTHS
+from shapeshift.runtime_models.colors.spherical_harmonics import WIDTHS
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, BadFile
 from shapeshift.runtime_models.package.write_package import package_files, write_package

@@ -15,9 +15,8 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.cameras.read_cameras import read_cameras
 from shapeshift.scene.metrics import psnr
-from shapeshift.scene.pose import look_at
+from shapeshift.scene.pose import look_at, stereo_pair
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import random_package
 
 TINY = ["--size", "40x30", "--context", "none"]

@@ -7,7 +7,7 @@ from PIL import Image, TiffImagePlugin, WebPImagePlugin  # noqa: F401  or all of
 
 from shapeshift.runtime_models.gate.gate import ask
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.pictures.rare_photo_run import PACKINGS
+from shapeshift.scene.captures.rare_photo_run import PACKINGS
 
 MEGAPIXEL = 28 << 20  # bytes of memory a million pixels, in the process that decodes them
 MOST_SCANS = 100  # of a JPEG: each goes over all of the picture; progressive ones have 10 or so

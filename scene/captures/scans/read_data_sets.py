@@ -1,7 +1,4 @@
-"""nuScenes: one scene out of tables v1.0-*/*.json, the key frames of all six cameras.
-
-FOLDER/scene-0061 names a scene, though nothing lies there: FOLDER is the root of the data set.
-"""
+"""Data sets whose frames have poses: SDFStudio's, sitcoms3D, nuScenes."""
 
 import os
 from collections.abc import Mapping
@@ -13,13 +10,94 @@ from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames, opengl_pose
-from shapeshift.scene.captures.scans.read_sdfstudio import matrix_of
 from shapeshift.scene.pose import Pose
+
+MOST_BYTES = 1 << 28
+
+
+# SDFStudio: meta_data.json with rgb_path, camtoworld and intrinsics a frame.
+
+
+def find_sdfstudio(folder: Path) -> Path | None:
+    return path if (path := folder / "meta_data.json").is_file() else None
+
+
+def sdfstudio_frames(path: Path) -> PosedFrames:
+    """camtoworld with OpenCV axes.  Its depth is a network's guess without a unit, and not read.
+
+    Raises BadFile.
+    """
+    said = Fields(read_json(path, most_bytes=MOST_BYTES), str(path))
+    size = {"w": said.number("width"), "h": said.number("height")}
+    frames = []
+    for row in said.rows("frames", 1 << 20, "frame", 0):
+        pose = matrix_of(row, "camtoworld", ((4, 4), (3, 4)))
+        k = matrix_of(row, "intrinsics", ((4, 4), (3, 3), (3, 4)))
+        pose = np.vstack([pose[:3], [0, 0, 0, 1]])
+        lens = {"fl_x": k[0, 0], "fl_y": k[1, 1], "cx": k[0, 2], "cy": k[1, 2]}
+        frame = {"file_path": row.text("rgb_path"), "transform_matrix": opengl_pose(pose)}
+        frames.append(frame | lens | size)
+    return PosedFrames(path.parent, str(path), frames)
+
+
+def matrix_of(row: Fields, key: str, shapes: tuple) -> np.ndarray:
+    try:
+        values = np.array(row.value(key, None), np.float64)
+    except (TypeError, ValueError, OverflowError):
+        values = np.zeros(0)
+    if values.shape not in shapes or not np.isfinite(values).all():
+        raise BadFile(f"{row.where}: '{key}' must be a matrix of 4 rows of 4 numbers")
+    return values
+
+
+# sitcoms3D: cameras.json with image_name, intrinsics and camtoworld a frame, and images_4/.
+
+TABLE, UP = "cameras.json", (0, 1, 0)
+PEOPLE = "Its masks of people (segmentations/) are not used: who moves will be a smear."
+
+
+def find_sitcoms3d(folder: Path) -> Path | None:
+    """The table of poses."""
+    path = folder / TABLE
+    try:
+        data = read_json(path, most_bytes=MOST_BYTES) if path.is_file() else None
+    except BadFile:  # whoever reads it as another form says what is wrong
+        return None
+    frames = data.get("frames") if isinstance(data, dict) else None
+    first = frames[0] if isinstance(frames, list) and frames else None
+    needed = {"image_name", "camtoworld", "intrinsics"}
+    return path if isinstance(first, dict) and needed <= first.keys() else None
+
+
+def sitcoms3d_frames(path: Path) -> PosedFrames:
+    """camtoworld with OpenGL axes; the lens is of the whole photos, whose middle it has.
+
+    Raises BadFile.
+    """
+    said = Fields(read_json(path, most_bytes=MOST_BYTES), str(path))
+    frames = []
+    for row in said.rows("frames", 1 << 20, "frame", 0):
+        k = matrix_of(row, "intrinsics", ((3, 3), (4, 4), (3, 4)))
+        pose = matrix_of(row, "camtoworld", ((4, 4), (3, 4)))
+        frame = {
+            "file_path": f"images/{row.text('image_name')}",
+            "transform_matrix": [*pose[:3].tolist(), [0, 0, 0, 1]], "up": UP,
+            "w": round(2 * k[0, 2]), "h": round(2 * k[1, 2]),
+            "fl_x": k[0, 0], "fl_y": k[1, 1], "cx": k[0, 2], "cy": k[1, 2],
+        }  # fmt: skip
+        frames.append(frame)
+    masks = any(path.parent.glob("segmentations*"))
+    return PosedFrames(path.parent, str(path), frames, (PEOPLE,) if masks else ())
+
+
+# nuScenes: one scene out of tables v1.0-*/*.json, the key frames of all six cameras.
+#
+# FOLDER/scene-0061 names a scene, though nothing lies there: FOLDER is the root of the data set.
 
 VERSIONS = ("v1.0-mini", "v1.0-trainval", "v1.0-test")
 NEEDED = ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")
-MOST_BYTES = 1 << 29  # of a table; the mini set's have 20 MB
-UP = (0, 0, 1)
+TABLE_BYTES = 1 << 29  # of a table; the mini set's have 20 MB
+NUSCENES_UP = (0, 0, 1)
 UNIT = 1e-3  # by which a quaternion's length may differ from 1
 MOVING = (
     "It has no masks of what moves (masks/CAM_FRONT/NAME.png): cars and people in its photos will "
@@ -101,7 +179,7 @@ def frame_of(row: Fields, rig: Fields, vehicle: Fields, root: Path) -> dict:
     frame = {
         "file_path": name,
         "transform_matrix": opengl_pose(pose_of(vehicle) @ pose_of(rig)),
-        "w": row.number("width"), "h": row.number("height"), "up": UP,
+        "w": row.number("width"), "h": row.number("height"), "up": NUSCENES_UP,
         "fl_x": k[0, 0], "fl_y": k[1, 1], "cx": k[0, 2], "cy": k[1, 2],
     }  # fmt: skip
     photo = Path(name)
@@ -123,7 +201,7 @@ def pose_of(row: Fields) -> np.ndarray:
 def rows_of(tables: Path, name: str) -> list[Fields]:
     """The objects of a table.  Raises BadFile."""
     path = tables / f"{name}.json"
-    data = read_json(path, most_bytes=MOST_BYTES)
+    data = read_json(path, most_bytes=TABLE_BYTES)
     if not (isinstance(data, list) and all(isinstance(row, dict) for row in data)):
         raise BadFile(f"{path}: a list of objects is wanted; copy it again")
     where = path_end(path)
