@@ -32,8 +32,12 @@ from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, ObjectLab
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.rotation import product  # noqa: E402
 from shapeshift.scene.pose import Pose, View, look_at, perspective  # noqa: E402
-from shapeshift.training.synthetic.openness import Clearance  # noqa: E402
-from shapeshift.training.synthetic.placing import frame, inside, turned  # noqa: E402
+from shapeshift.training.synthetic.placing import (  # noqa: E402
+    Clearance,
+    frame,
+    inside,
+    turned,
+)
 from shapeshift.training.synthetic.tracer import Place, look, photograph, shade  # noqa: E402
 from shapeshift.training.synthetic.workshop import GOLDEN, GREY, LIGHT, dome, things  # noqa: E402
 from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402

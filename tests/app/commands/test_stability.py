@@ -12,8 +12,13 @@ from PIL import Image
 
 import shapeshift as ss
 from shapeshift.app.drawing import open_renderer
-from shapeshift.app.stability_cases.case_context import CaseContext
-from shapeshift.app.stability_cases.finding import at_least, at_most, broken_pixels, not_here
+from shapeshift.app.stability_cases.case_context import (
+    CaseContext,
+    at_least,
+    at_most,
+    broken_pixels,
+    not_here,
+)
 from shapeshift.app.stability_cases.scenes import small_model
 from shapeshift.app.stability_cases.table import CASES, COLUMNS, open_table
 from shapeshift.rasterizer.device import NoDevice

@@ -16,10 +16,9 @@ from shapeshift.training.export import with_light
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic import balls
 from shapeshift.training.train import Trainer
-from shapeshift.training.update.begin_update import begin_update
 from shapeshift.training.update.regions import UpdateRegion
 from shapeshift.training.update.trainable import layout_of
-from shapeshift.training.update.update_trainer import UpdateBase
+from shapeshift.training.update.update_trainer import UpdateBase, begin_update
 from tests.support.training.training_runs import bits, run, run_keeping
 
 BALL = (0.15, 0.18, 0.55)  # metres: the yellow one, which is gone at the second visit

@@ -7,19 +7,10 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
+from shapeshift.vr.carried import MIDDLE, MOVES, RESTS, SCROLLS, SLIDES, Carried, carry, left_over
 from shapeshift.vr.frame import LOST, Hand
 from shapeshift.vr.glove import fingertip, glove
-from shapeshift.vr.panel.carried import (
-    MIDDLE,
-    MOVES,
-    RESTS,
-    SCROLLS,
-    SLIDES,
-    Carried,
-    carry,
-    left_over,
-)
-from shapeshift.vr.panel.plane import (
+from shapeshift.vr.plane import (
     ABOVE_M,
     ASIDE,
     NEAR_M,

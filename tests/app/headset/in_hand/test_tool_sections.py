@@ -18,7 +18,7 @@ from shapeshift.renderer.colors.palette import ALL_VALUES
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.scene.sections.section import BoxShape, PlaneShape
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import Wearer, a_state
 from tests.support.vr.vr_tools import AWAY

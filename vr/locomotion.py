@@ -14,7 +14,8 @@ import numpy as np
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import SIDES, Frame, grip_of
-from shapeshift.vr.locomotion.play_space import (
+from shapeshift.vr.one_hand import shared_stick
+from shapeshift.vr.play_space import (
     PlaySpace,
     heading,
     moved,
@@ -25,7 +26,6 @@ from shapeshift.vr.locomotion.play_space import (
     underfoot,
     yaw,
 )
-from shapeshift.vr.one_hand import shared_stick
 
 # Taking hold of the world: one hand draws it along, two turn and stretch it as well.
 #

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import SIDES, Frame, Hand
-from shapeshift.vr.panel.plane import NOBODY, PanelPlane, Pointing, hang, point
+from shapeshift.vr.plane import NOBODY, PanelPlane, Pointing, hang, point
 
 PALM_UP, PALM_AWAY = 0.8, 0.55  # of a palm's normal, up: it opens the panel; it closes it again
 OPENS_S, CLOSES_S = 0.2, 0.4  # so long
