@@ -29,6 +29,7 @@ def save_scene(editor: EditorState) -> bool:
     """The same with the first look that it has."""
     folder = WorkFolders.of().scenes
     saving = Saving(editor, OwnFiles(config_folder()), folder, lambda path: None)
-    if saving.in_place and saving.save():
+    if saving.save():
         return True
+    saving.cancel_name()  # nobody can type one here
     return saving.write(free_path(folder / editor.edited.name))

@@ -242,8 +242,8 @@ class WristMenu:
 
     def _open(self, path: Path) -> None:
         """Another scene; where work would be lost, once it has been chosen twice."""
-        messages, marks = self._state.editor.messages, self._state.tools.inspecting
-        if (unsaved(self._state.editor) or marks.unsaved) and path != self._sure_of:
+        messages = self._state.editor.messages
+        if unsaved(self._state.editor) and path != self._sure_of:
             self._sure_of = path
             messages.say(said(SURE), time.perf_counter())
             return

@@ -266,6 +266,7 @@ class HistoryStep:
     regions: tuple = ()  # edited apart from the file, until it is saved
     bytes: int = 0  # that this step alone keeps
     film: object = None  # the keys of a film, edited apart from the file, too
+    marks: object = None  # and marks and lengths; the same only where they are the very same
 
 
 @dataclass(frozen=True)
@@ -300,18 +301,23 @@ class History:
     def film(self) -> object:
         return self.steps[self.at].film
 
+    @property
+    def marks(self) -> object:
+        return self.steps[self.at].marks
+
     def record(
         self, file: SceneFile, what: str, together: str = "", regions: tuple | None = None,
-        more_bytes: int = 0, film: object = None,
+        more_bytes: int = 0, film: object = None, marks: object = None,
     ) -> "History":  # fmt: skip
-        """After another edit of the file, the regions or a film; what was undone is forgotten."""
-        regions = self.regions if regions is None else regions
-        film = self.film if film is None else film
-        if file is self.file and regions == self.regions and film == self.film:
+        """After another edit of the file, the regions, a film or marks; what was undone is
+        forgotten.
+        """
+        step = self._step(file, regions, film, marks)
+        if step is None:
             return self
         now = self.steps[self.at]
         keep = self.at if together and now.together == together else self.at + 1
-        step = HistoryStep(file, what, together, regions, more_bytes, film)
+        step = replace(step, what=what, together=together, bytes=more_bytes)
         steps = (*self.steps[:keep], step)
         steps = steps[-MOST_STEPS - 1 :]
         while len(steps) > 2 and sum(step.bytes for step in steps) > MOST_BYTES:
@@ -319,15 +325,26 @@ class History:
         return History(steps, len(steps) - 1)
 
     def amend(
-        self, file: SceneFile, regions: tuple | None = None, film: object = None
-    ) -> "History":
+        self, file: SceneFile, regions: tuple | None = None, film: object = None,
+        marks: object = None,
+    ) -> "History":  # fmt: skip
         """What holds now is another, but no edit of its own: a slider has moved."""
-        regions = self.regions if regions is None else regions
-        film = self.film if film is None else film
-        if file is self.file and regions == self.regions and film == self.film:
+        now = self._step(file, regions, film, marks)
+        if now is None:
             return self
-        now = replace(self.steps[self.at], file=file, regions=regions, film=film)
         return replace(self, steps=(*self.steps[: self.at], now, *self.steps[self.at + 1 :]))
+
+    def _step(
+        self, file: SceneFile, regions: tuple | None, film: object, marks: object
+    ) -> HistoryStep | None:
+        """The step of now with other contents, None: as they are; None where nothing is other."""
+        now = self.steps[self.at]
+        regions = now.regions if regions is None else regions
+        film, marks = film or now.film, marks or now.marks
+        same = file is now.file and film is now.film and marks is now.marks
+        if same and regions == now.regions:
+            return None
+        return replace(now, file=file, regions=regions, film=film, marks=marks)
 
     def rest(self) -> "History":
         """The hand has let go: the next edit is a step of its own."""

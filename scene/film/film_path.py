@@ -180,8 +180,15 @@ def is_film_file(path: Path) -> bool:
     return isinstance(data, dict) and MARK in data
 
 
-def read_film_file(path: Path) -> FilmPath:
-    """Raises BadFile, one sentence."""
+def film_beside(scene: Path) -> Path:
+    """Where the film of a scene lies that the window keeps with it."""
+    name = scene.name.removesuffix(".json").removesuffix(".scene")
+    stem = name if name != scene.name else scene.stem
+    return scene.with_name(f"{stem or scene.name}{ENDING}")
+
+
+def read_film_file(path: Path, cameras: int = 1) -> FilmPath:
+    """cameras: how many it has at least.  Raises BadFile, one sentence."""
     fields = Fields(read_json(path, most_bytes=MOST_BYTES), path.name, "see docs/film.md")
     fields.count(MARK, VERSION, VERSION)
     seconds = fields.number("seconds", 10.0, "seconds from 0.01 to 36000", *SECONDS_RANGE)
@@ -195,7 +202,10 @@ def read_film_file(path: Path) -> FilmPath:
         if not (width >= 1 and height >= 1 and width == int(width) and height == int(height)):
             raise fields.error("size", f"[width, height] in whole pixels up to {MOST_SIDE}")
         size = (int(width), int(height))
-    views = read_own_cameras([dict(row.data) for row in rows], CameraReading(), path.name).views
+    views: tuple[View, ...] = ()
+    if rows or cameras:
+        own = [dict(row.data) for row in rows]
+        views = read_own_cameras(own, CameraReading(), path.name).views
     fields.refuse_unknown_keys()
     keys = tuple(
         FilmKey(
@@ -207,7 +217,8 @@ def read_film_file(path: Path) -> FilmPath:
     )
     try:
         check_clock(seconds, fps)
-        check_keys(keys, seconds)
+        if keys or cameras:
+            check_keys(keys, seconds)
         if style:
             read_style_path(style, seconds)
     except ValueError as error:

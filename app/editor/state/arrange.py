@@ -60,7 +60,7 @@ def go_back(state: EditorState, history: History) -> None:
     """Goes to a step that has been before, with every x as it is now."""
     now = state.edited.history
     turn_to(state, history.amend(edits.with_x_of(history.file, now.file)))
-    if isinstance(history.film, FilmKeys) and history.film != state.timeline.keys:
+    if isinstance(history.film, FilmKeys) and history.film is not state.timeline.keys:
         state.timeline.restore(history.film)
     if history.regions != now.regions:
         state.regions.restore(history.regions)

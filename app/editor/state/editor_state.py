@@ -121,7 +121,7 @@ class EditorState:
         """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
         self.edited.amend_regions(self.regions)
         self.edited.record_film(self.timeline)
-        self.edited.saved_regions = self.regions.kept
+        self.edited.saved_regions, self.edited.saved_film = self.regions.kept, self.timeline.keys
 
     def record_regions(self) -> None:
         """What was done to the regions and the film since the last call is a step of history."""

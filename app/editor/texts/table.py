@@ -16,12 +16,13 @@ TEMPLATES = (
     "x of {name}",
 )  # fmt: skip
 DEEDS = (
-    "add a section", "add a view", "background", "beyond a section", "clear the film",
-    "delete a key of a stop", "delete a key of the camera", "edge of a section", "first look",
-    "floor", "ground", "horizon", "keep as it stands", "key of a stop", "key of the camera",
-    "length of the film", "move a key of the camera", "move a key of the stop", "move a section",
-    "move the floor", "open a film", "remove a section", "sky", "switch a section",
-    "way around the scene", "way past the cameras", "zenith",
+    "add a section", "add a view", "alarm", "background", "beyond a section", "clear the film",
+    "delete a key of a stop", "delete a key of the camera", "edge of a section", "emissivity",
+    "first look", "floor", "ground", "horizon", "keep as it stands", "key of a stop",
+    "key of the camera", "known length", "length of the film", "move a key of the camera",
+    "move a key of the stop", "move a section", "move the floor", "open a film",
+    "remove a section", "sky", "switch a section", "way around the scene", "way past the cameras",
+    "zenith",
 )  # fmt: skip
 THE_SCENE = "the scene"  # that has no name
 PATTERNS = {

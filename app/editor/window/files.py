@@ -104,6 +104,10 @@ class Files:
         except OSError:
             self.pictures = None  # the list does without
 
+    def asked(self) -> bool:
+        """Whether the box is open."""
+        return self._box.asking
+
     def handle_event(self, event: Event) -> bool:
         """True for Ctrl+O and Ctrl+N, and while the box is open for keys and what is dropped."""
         match event:

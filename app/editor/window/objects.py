@@ -11,7 +11,7 @@ from shapeshift.app.editor.panels.widgets.boxes import PathBox, answer_row, ques
 from shapeshift.app.editor.state.arrange import edit, undo
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, Progress, read_files
-from shapeshift.app.editor.state.files.saving import Saving, unsaved
+from shapeshift.app.editor.state.files.saving import LOSE, Saving, unsaved, what_is_lost
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.files import poll_opener
@@ -168,6 +168,11 @@ class Objects:
         self._leaving = True
         self._window.close()
 
+    def asked(self) -> tuple:
+        """What boxes ask; another value is drawn at once."""
+        saving = self.saving
+        return saving.name, saving.taken, saving.then is not None, self.adding.asking
+
     def status(self) -> str:
         return said("not saved") if self.unsaved else ""
 
@@ -233,24 +238,24 @@ class Objects:
 
     def draw_boxes(self, ui_scale: float) -> None:
         """The boxes that ask for a name, before something is lost, for what to add."""
-        draw_saving(self.saving, self.state.edited.name, ui_scale)
+        draw_saving(self.saving, self.state, ui_scale)
         self.adding.draw(ui_scale)
 
 
 # The two boxes about saving: one asks for a name, one before something is lost.
 
 OVER = "Over it"  # writes over the file that was opened
-SAVE, LOSE = "Save the scene", "Changes are not saved"
+SAVE, UNSAVED = "Save the scene", "Changes are not saved"
 
 
-def draw_saving(saving: Saving, scene_name: str, ui_scale: float) -> None:
+def draw_saving(saving: Saving, state: EditorState, ui_scale: float) -> None:
     """Whichever box is open."""
     if saving.name:
         if question_box(SAVE, ui_scale):
             _draw_name(saving, ui_scale)
             imgui.end_popup()
-    elif saving.then is not None and question_box(LOSE, ui_scale):
-        _draw_lose(saving, scene_name, ui_scale)
+    elif saving.then is not None and question_box(UNSAVED, ui_scale):
+        _draw_lose(saving, state, ui_scale)
         imgui.end_popup()
 
 
@@ -282,11 +287,14 @@ def _draw_name(saving: Saving, ui_scale: float) -> None:
         imgui.close_current_popup()
 
 
-def _draw_lose(saving: Saving, scene_name: str, ui_scale: float) -> None:
+def _draw_lose(saving: Saving, state: EditorState, ui_scale: float) -> None:
     imgui.push_text_wrap_pos(0)
-    imgui.text_unformatted(said("{name} has changes that are not saved.", name=scene_name))
+    name = state.edited.name
+    imgui.text_unformatted(said("{name} has changes that are not saved.", name=name))
+    for line in what_is_lost(state):
+        imgui.text_unformatted(line)
     imgui.pop_text_wrap_pos()
-    clicked = answer_row(("Save", "Discard", "Cancel"), ui_scale)
+    clicked = answer_row(("Save", LOSE, "Cancel"), ui_scale)
     if clicked:
         imgui.close_current_popup()
         saving.answer(clicked)

@@ -105,11 +105,12 @@ class Viewer:
             lambda: self.settings.temperature,
         )  # fmt: skip
         self.inspecting = attach_inspection(
-            window, state, self.viewpoint, self.hooks, self.parts, seen, options, folders.exports
-        )
+            window, state, self.viewpoint, self.hooks, self.parts, seen,
+            self.objects.saving.save, folders.exports,
+        )  # fmt: skip
         self.ruler = attach_ruler(
             window, state, self.viewpoint, self.hooks, self.parts, seen, self.inspecting,
-            self.settings, self.shell.keep, folders.exports,
+            self.settings, self.shell.keep, self.objects.saving.save, folders.exports,
         )  # fmt: skip
         drawn = (self.shell.draw_settings, self.dial, self.readings)
         self.hooks.sections += plain_sections(state, *drawn)
@@ -120,7 +121,11 @@ class Viewer:
         self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
         self.hooks.opened.append(self._framed.forget)
         self.hooks.event_handlers.insert(0, self.shell.handle_event)
+        hooks = self.hooks
+        hooks.asked += [self.objects.asked, self.files.asked, lambda: state.timeline.problem]
         self._title = ""  # what the window's title says
+        self.is_drawn = False  # what the next frame shows, before it began
+        self._told: tuple = ()  # what is said and asked, as it was drawn last
         self.frames, self._overlay_ms = 0, 0.0  # drawn since the window opened, of the last one
 
     # ---- the parts
@@ -188,6 +193,8 @@ class Viewer:
         """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
         last = time.perf_counter()
         while not (self.window.closing and self.may_close()):
+            if self._told != self._says():
+                self.window.note()
             busy = self.busy()
             watched = self.polling or self.devices.connected
             redraw = self.window.wait(0.0 if busy else POLL_S if watched else SLEEP_S)
@@ -202,6 +209,12 @@ class Viewer:
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
+
+    def _says(self) -> tuple:
+        """All that is said or asked; whoever changes it, the loop sees it and draws."""
+        messages, hooks = self.state.messages, self.hooks
+        asked, words = (tuple(each() for each in row) for row in (hooks.asked, hooks.status))
+        return messages.note, *messages.problems, self.objects.unsaved, asked, words
 
     def may_close(self) -> bool:
         """Whether nothing would be lost; else the window stays, and a box asks."""
@@ -315,7 +328,8 @@ class Viewer:
         if self.state.measure_now or self.shown.due(request, now):
             self.state.measure_now = False
             self.shown.measure(request)
-        force = self.options.screenshot is not None or self.frames < WARM_UP
+        cold = self.frames < WARM_UP and not self.is_drawn
+        force, self.is_drawn = self.options.screenshot is not None or cold, False
         screen, presented = self.window.screen(), self.window.presented
         fresh = self.shown.draw(request, screen, force, presented.show_picture_again)
         if not fresh:
@@ -329,6 +343,7 @@ class Viewer:
 
     def draw_overlay(self) -> None:
         scale, state, layout = self.window.ui_scale, self.state, self.layout
+        self._told = self._says()
         self.readings.flying = self.viewpoint.camera.flying
         covered = []
         if not state.save_picture:

@@ -12,13 +12,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
 from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
 from shapeshift.app.editor.state.user.settings import default_text_size
-from shapeshift.app.editor.window.monitor import (
-    Place,
-    grow_window,
-    monitor_height,
-    open_window,
-    put_window,
-)
+from shapeshift.app.editor.window.monitor import Place, monitor_height, open_window, stand_window
 from shapeshift.app.editor.window.overlay.presented import Presented
 from shapeshift.app.paths import plain
 from shapeshift.runtime_models.files.plain_text import one_line
@@ -167,7 +161,7 @@ class Window:
     def restyle(self) -> None:
         """The next frame has other letters: another language."""
         self._restyle = True
-        self._note()
+        self.note()
 
     def _size_for_monitor(self) -> float:
         """What the monitor under the window asks for, where nobody has chosen a size."""
@@ -179,12 +173,9 @@ class Window:
         """What input and overlay are measured in."""
         return self._window.size
 
-    def stand(self, place: Place | None) -> None:
-        """Where it was before; without that as much larger as its text is, in the middle."""
-        if place is not None:
-            put_window(self.handle, place)
-        else:
-            grow_window(self.handle, self.text_size)
+    def stand(self, place: Place | None) -> bool:
+        """Where it was before, or as large as its text; True: the desktop has less room."""
+        return stand_window(self.handle, place, self.text_size)
 
     @property
     def closing(self) -> bool:
@@ -243,11 +234,14 @@ class Window:
             glfw.wait_events_timeout(seconds)
         if glfw.get_time() >= self._look_again:
             self._look_again = np.inf
-            self._note()
+            self.note()
         return self._unsettled > 0
 
-    def begin_frame(self) -> list[Event]:
-        """Starts an overlay frame; returns the input since the last one that is for the scene."""
+    def begin_frame(self, early: bool = False) -> list[Event]:
+        """Starts an overlay frame; returns the input since the last one that is for the scene.
+
+        `early`: there is no scene yet, so the first frame that has one is given it.
+        """
         if self._restyle:
             self._restyle = False
             theme.apply(self.ui_scale)
@@ -265,7 +259,7 @@ class Window:
         imgui.new_frame()
         if self.popup_open and imgui.is_key_pressed(imgui.Key.escape, False):
             imgui.internal.close_popups_except_modals()  # ImGui does so by its own keys alone
-        events, self._raw = self._raw, []
+        events, self._raw = self._raw, self._raw if early else []
         return events
 
     def end_frame(self) -> None:
@@ -299,7 +293,8 @@ class Window:
         glfw.set_framebuffer_size_callback(handle, lambda *_: self.expose())
         glfw.set_window_content_scale_callback(handle, self._on_content_scale)
 
-    def _note(self, event: Event | None = None) -> None:
+    def note(self, event: Event | None = None) -> None:
+        """Something of the overlay has changed, by an event or by itself: it is drawn."""
         self._unsettled = SETTLE_FRAMES
         if event is not None:
             self._raw.append(event)
@@ -307,11 +302,11 @@ class Window:
     def expose(self) -> None:
         """The screen has lost what the window showed."""
         self.presented.due = True
-        self._note()
+        self.note()
 
     def on_key(self, handle, key: int, scancode: int, action: int, mods: int) -> None:
         io = imgui.get_io()
-        self._note()
+        self.note()
         if key in TEXT_KEYS:
             io.add_key_event(TEXT_KEYS[key], action != glfw.RELEASE)
         if action == glfw.RELEASE:
@@ -328,7 +323,7 @@ class Window:
         if shortcut:
             self._chorded.add(key)
         ctrl = bool(mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER))
-        self._note(KeyDown(key, bool(mods & glfw.MOD_SHIFT), shortcut, ctrl))
+        self.note(KeyDown(key, bool(mods & glfw.MOD_SHIFT), shortcut, ctrl))
 
     def _shortcut(self, key: int, scancode: int, mods: int) -> str:
         """The letter of a shortcut; "" while keys are held to move, where Ctrl means slowly."""
@@ -339,14 +334,14 @@ class Window:
 
     def on_char(self, handle, codepoint: int) -> None:
         imgui.get_io().add_input_character(codepoint)
-        self._note()
+        self.note()
 
     def on_cursor(self, handle, x: float, y: float) -> None:
         imgui.get_io().add_mouse_pos_event(x, y)
         dx, dy = x - self._cursor[0], y - self._cursor[1]
         self._cursor = (x, y)
         self._look_again = glfw.get_time() + HOVER_S
-        self._note(Drag(self._pressed, dx, dy, x, y) if self._pressed else None)
+        self.note(Drag(self._pressed, dx, dy, x, y) if self._pressed else None)
 
     def on_button(self, handle, button: int, action: int, mods: int) -> None:
         if button not in BUTTONS:
@@ -354,40 +349,40 @@ class Window:
         io = imgui.get_io()
         x, y = self._cursor
         io.add_mouse_button_event(button, action == glfw.PRESS)
-        self._note()
+        self.note()
         if action == glfw.RELEASE:
             if self._pressed == BUTTONS[button]:
                 self._pressed = None
-                self._note(Release(BUTTONS[button]))
+                self.note(Release(BUTTONS[button]))
             return
         if self._over_overlay(x, y):
             self._last_click = (x, y, -1.0)  # clicks with one on a panel between are two clicks
             return
         if self._pressed is not None:  # one button at a time: who had the first one hears its end
-            self._note(Release(self._pressed))
+            self.note(Release(self._pressed))
         self._pressed = BUTTONS[button]
-        self._note(Press(BUTTONS[button], x, y))
+        self.note(Press(BUTTONS[button], x, y))
         if button == glfw.MOUSE_BUTTON_LEFT:
             last_x, last_y, when = self._last_click
             close = abs(x - last_x) + abs(y - last_y) <= CLICK_PIXELS
             now = glfw.get_time()
             if close and 0 <= now - when <= DOUBLE_CLICK_S and when >= 0:
-                self._note(DoubleClick(x, y))
+                self.note(DoubleClick(x, y))
                 now = -1.0  # a third click starts anew
             self._last_click = (x, y, now)
 
     def on_scroll(self, handle, dx: float, dy: float) -> None:
         imgui.get_io().add_mouse_wheel_event(dx, dy)
-        self._note(None if self._over_overlay(*self._cursor) else Wheel(dy))
+        self.note(None if self._over_overlay(*self._cursor) else Wheel(dy))
 
     def _on_content_scale(self, handle, x: float, y: float) -> None:
         """The desktop's scale has changed, or the window has gone to another monitor."""
         self._monitor_size = self._size_for_monitor()
         self._restyle = True
-        self._note()
+        self.note()
 
     def on_drop(self, handle, paths: list[str]) -> None:
-        self._note(Drop(tuple(map(plain, paths))))
+        self.note(Drop(tuple(map(plain, paths))))
 
     def _over_overlay(self, x: float, y: float) -> bool:
         """Whether the overlay takes input at that place.

@@ -15,7 +15,7 @@ from typing import IO
 
 from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.saving import unsaved
+from shapeshift.app.editor.state.files.saving import scene_unsaved
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
@@ -269,7 +269,7 @@ def scene_on_disk(state: EditorState) -> tuple[Path, list[str]]:
     """
     if not state.scene.objects:
         raise UsageError("nothing is open.")
-    if unsaved(state):
+    if scene_unsaved(state):
         raise UsageError("the scene has changes that no file has; save it first (Ctrl+S).")
     if state.edited.path is not None:
         return state.edited.path, []

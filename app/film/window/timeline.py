@@ -159,7 +159,7 @@ class Timeline:
         """A film that was read from a file; keys without a time get those that they are met at."""
         views = moved([key.view for key in film.keys], [-float(c) for c in origin])
         keys = [replace(key, view=v) for key, v in zip(film.keys, views, strict=True)]
-        if not film.timed:
+        if keys and not film.timed:
             places = keyed_flight(views).key_places
             times = frame_times(1001, film.seconds)
             met = np.interp(places, eased_places(times, film.seconds, film.ease), times)

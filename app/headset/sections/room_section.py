@@ -50,7 +50,7 @@ def tool_sections(tools: HandTools, save: Callable[[], None]) -> list[Section]:
     return [
         Section("Sections", lambda scale: _draw_sections(tools, save, scale)),
         Section("Regions", lambda scale: _draw_regions(tools, save, scale)),
-        Section("Inspect", lambda scale: _draw_inspect(tools, scale)),
+        Section("Inspect", lambda scale: _draw_inspect(tools, save, scale)),
     ]
 
 
@@ -87,7 +87,7 @@ def _draw_regions(tools: HandTools, save: Callable[[], None], scale: float) -> N
     draw_regions(tools.editor, scale)
 
 
-def _draw_inspect(tools: HandTools, scale: float) -> None:
+def _draw_inspect(tools: HandTools, save: Callable[[], None], scale: float) -> None:
     tool, marks = tools.inspecting, tools.marks
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
     if tool.measured is None:
@@ -98,7 +98,7 @@ def _draw_inspect(tools: HandTools, scale: float) -> None:
     else:
         auto = partial(setattr, marks, "wants_auto", True)
         report = partial(setattr, tools, "wants_report", True) if tools.inspect else None
-        actions = InspectActions(_toggle(tools), auto, report)
+        actions = InspectActions(_toggle(tools), auto, save, report)
         draw_inspect(tool, actions, tools.unit, scale)
         _ends(tools)
     if tool.on:
@@ -110,7 +110,7 @@ def _draw_inspect(tools: HandTools, scale: float) -> None:
             if lit_button(item_label("lengths"), marks.pulls == LENGTHS, width):
                 marks.pulls = LENGTHS
         _hint("marks")
-    if imgui.button(item_label("Undo"), Vec(-1, 0)) and not tool.undo():
+    if imgui.button(item_label("Undo"), Vec(-1, 0)) and not tools.undo():
         _nothing(tools)
 
 

@@ -1,5 +1,6 @@
 """Adds the tool "Inspect" to the viewer: its section, keys, marks over the picture, reports."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -7,7 +8,6 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.panel import Section
 from shapeshift.app.editor.panels.scale_bar import handle_at, has_scale, height_of, share_at
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
@@ -48,20 +48,18 @@ REPORT_PX = 1280  # longer side of a report's pictures
 
 def attach_inspection(
     window: Window, state: EditorState, viewpoint: Viewpoint, hooks: Hooks, parts: PartsTool,
-    seen: Seen, options: Options, folder: Path,
+    seen: Seen, save: Callable[[], object], folder: Path,
 ) -> Inspecting:  # fmt: skip
-    """Adds it to the hooks; folder: of reports."""
+    """Adds it to the hooks; save: all that is not saved; folder: of reports."""
     tool = Inspecting(state)
     mouse = MouseMarks(tool, state, window, viewpoint, parts, seen)
     reports = Reports(tool, state, viewpoint, seen, folder)
-    actions = InspectActions(mouse.toggle, tool.auto, reports.write)
+    actions = InspectActions(mouse.toggle, tool.auto, save, reports.write)
     hooks.event_handlers.insert(1, mouse.handle_event)  # handles in the picture see it before
     hooks.each_frame.append(mouse.each_frame)
     hooks.marks.append(mouse.draw)
     hooks.opened.append(mouse.forget)
     hooks.status.append(mouse.status)
-    if options.screenshot is None:
-        hooks.closing.append(tool.may_close)
     hooks.sections.append(
         Section(
             "Inspect",
@@ -192,8 +190,6 @@ class MouseMarks:
                 tool.chosen = ""
             case glfw.KEY_ESCAPE if tool.on:
                 tool.on = False
-            case _ if tool.on and event.shortcut == "z" and not event.shift:
-                return tool.undo()
             case _:
                 return False
         return True
@@ -310,7 +306,7 @@ class MouseMarks:
         """For the line at the lower edge."""
         if self._tool.on:
             return said("click: a spot, drag: a box, Shift+drag: a line")
-        return said("marks not saved") if self._tool.unsaved else ""
+        return ""
 
     def draw(self, ui_scale: float) -> None:
         """Alarms, marks, and what lies under the mouse."""

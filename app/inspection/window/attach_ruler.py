@@ -49,9 +49,11 @@ from shapeshift.scene.pose import View
 def attach_ruler(
     window: Window, state: EditorState, viewpoint: Viewpoint, hooks: Hooks, parts: PartsTool,
     seen: Seen, inspecting: Inspecting, settings: ProgramSettings, keep: Callable[[], None],
-    folder: Path,
+    save: Callable[[], object], folder: Path,
 ) -> Ruler:  # fmt: skip
-    """Adds it to the hooks, after the tool "Inspect"; folder: of reports."""
+    """Adds it to the hooks, after the tool "Inspect".  keep: writes the settings; save:
+    all that is not saved; folder: of reports.
+    """
 
     def unit() -> str:
         return settings.lengths if settings.lengths in UNITS else "m"
@@ -63,7 +65,7 @@ def attach_ruler(
     ruler = Ruler(inspecting)
     mouse = MouseRuler(ruler, inspecting, state, window, viewpoint, parts, seen, unit)
     reports = LengthReports(inspecting, state, viewpoint, seen, unit, folder)
-    actions = RulerActions(mouse.toggle, inspecting.keep, reports.write, unit, choose_unit)
+    actions = RulerActions(mouse.toggle, save, reports.write, unit, choose_unit)
     hooks.event_handlers.insert(1, mouse.handle_event)
     hooks.each_frame.append(mouse.each_frame)
     hooks.marks.append(mouse.draw)

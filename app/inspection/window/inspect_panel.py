@@ -48,6 +48,7 @@ class InspectActions:
 
     toggle: Callable[[], None]  # the tool
     auto: Callable[[], None]  # level and span of what is seen
+    save: Callable[[], object]
     report: Callable[[], None] | None = None  # None: it is not offered
 
 
@@ -90,7 +91,7 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
     elif clicked:
         tool.ends = tool.value_range
     tips = {
-        "Save marks": "NAME.marks.json beside the scene: read when it is opened again.",
+        "Save marks": "All that is not saved; marks go into NAME.marks.json beside the scene.",
         "Report": "One HTML file with pictures and tables of this view, among the exports.",
     }
     report = actions.report
@@ -98,7 +99,7 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
         del tips["Report"]
     clicked = button_row(tips, ui_scale, len(tips))
     if clicked == "Save marks":
-        tool.keep()
+        actions.save()
     elif clicked and report is not None:
         report()
 
@@ -156,7 +157,7 @@ def _chosen(tool: Inspecting, ui_scale: float) -> None:
     if imgui.button(item_label("Delete"), Vec(-1, 0)) and tool.chosen == name:
         tool.delete(name)
         return
-    tip("Delete the mark; Ctrl+Z brings it back while the tool is on.", ui_scale)
+    tip("Delete the mark; Ctrl+Z brings it back.", ui_scale)
     if tool.chosen == name:
         draw_about_mark(tool, name, ui_scale)
 

@@ -7,13 +7,12 @@ import numpy as np
 
 from shapeshift.app.document import Document
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.edited_file import stamp_of
+from shapeshift.app.editor.state.files.beside import open_beside, source_of
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.inspection.draw_values import MeasuredScene, measured_scene
 from shapeshift.app.inspection.mark_options import free_name
 from shapeshift.app.inspection.pictures import ColorScale, auto_ends
-from shapeshift.app.paths import is_bundled
 from shapeshift.renderer.colors.palette import ALL_VALUES, LEAST_SHARE
 from shapeshift.runtime_models.files.plain_text import name_line
 from shapeshift.runtime_models.model import BadFile
@@ -33,17 +32,9 @@ from shapeshift.scene.inspection.marks import (
     read_mark,
     spot_at,
 )
-from shapeshift.scene.inspection.marks_file import (
-    MarksFile,
-    marks_path,
-    moved_marks,
-    read_marks_file,
-    write_marks_file,
-)
+from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.scene import Scene
-
-MOST_STEPS = 100  # that can be taken back
 
 
 class Inspecting:
@@ -55,18 +46,12 @@ class Inspecting:
     def __init__(self, state: EditorState) -> None:
         self._state = state
         self.on = False  # clicks and drags lay marks
-        self.file = MarksFile()
         self.chosen = ""  # name of a mark; "": none
         self.picture: ValuePicture | None = None
         self.is_current = False
-        self.readings: dict[str, MarkReading] = {}
         self.pointed = (np.nan, np.nan)  # value and metres under the mouse
-        self._saved = self.file
-        self._stamp: tuple = ()  # of the file beside the scene, as it was read or written
-        self._before: list[MarksFile] = []
-        self._left: dict[Path, MarksFile] = {}  # of scenes that were left without saving
-        self._path: Path | None = None
-        self._warned: MarksFile | None = None  # that somebody wanted to close, and was told
+        self._read: tuple = (None, None)  # the marks and the picture that readings are of
+        self._readings: dict[str, MarkReading] = {}
         self._measured: tuple[Scene | None, MeasuredScene | None] = (None, None)
 
     # ---- the scene
@@ -94,58 +79,26 @@ class Inspecting:
     @property
     def source(self) -> Path | None:
         """The file beside which marks lie; None: there is no one file."""
-        if self._state.edited.path is not None:
-            return self._state.edited.path
-        sources = self._state.sources
-        return sources[0].path if len(sources) == 1 else None
+        return source_of(self._state)
 
     def opened(self) -> None:
-        """Another scene: its marks, those that were not saved among them."""
-        if self._path is not None:
-            if self.unsaved:
-                self._left[self._path] = self.file
-            else:
-                self._left.pop(self._path, None)
-        self.on, self.chosen, self._before = False, "", []
-        self.picture, self.is_current, self.readings = None, False, {}
+        """Another scene, with the marks that lie beside it."""
+        self.on, self.chosen = False, ""
+        self.picture, self.is_current = None, False
         self._state.settings = replace(self._state.settings, heat_ends=ALL_VALUES)
-        self.file = self._saved = MarksFile()
-        source = self.source
-        self._path = None if source is None else marks_path(source)
-        self._stamp = ()
-        if self._path is None:
-            return
-        if self._path.exists():
-            try:
-                read = read_marks_file(self._path)
-            except BadFile as error:
-                self._state.problem = str(error)
-                return
-            self._stamp = stamp_of(self._path)
-            self.file = self._saved = moved_marks(read, -self.document.origin)
-        self.file = self._left.get(self._path, self.file)
+        open_beside(self._state)
 
     # ---- marks
 
     @property
-    def unsaved(self) -> bool:
-        return self.file is not self._saved
+    def file(self) -> MarksFile:
+        """All marks, lengths and alarms, as the history has them."""
+        return self._state.edited.marks
 
-    def edit(self, file: MarksFile) -> None:
-        """A step that `undo` takes back."""
-        self._before = [*self._before, self.file][-MOST_STEPS:]
-        self.file = file
-        self.read()
-
-    def undo(self) -> bool:
-        """False: there is nothing to be taken back."""
-        if not self._before:
-            return False
-        self.file = self._before.pop()
-        if self.chosen not in (mark.name for mark in self.file.marks):
-            self.chosen = ""
-        self.read()
-        return True
+    def edit(self, file: MarksFile, what: str, together: str = "") -> None:
+        """A step of the history; those in a row that are `together` are one, such as a drag."""
+        self._state.record_regions()
+        self._state.edited.record_marks(file, what, together)
 
     def lay(
         self, kind: Kind, start: tuple[float, float], end: tuple[float, float],
@@ -174,14 +127,15 @@ class Inspecting:
             self._state.say(str(error))
             return
         self.chosen = name
-        self.edit(replace(self.file, marks=(*self.file.marks, mark)))
+        self.edit(replace(self.file, marks=(*self.file.marks, mark)), what=f"add {name}")
 
     def delete(self, name: str) -> None:
         """The mark, and the differences that name it."""
         marks = tuple(mark for mark in self.file.marks if mark.name != name)
         pairs = tuple(pair for pair in self.file.differences if name not in pair)
         self.chosen = ""
-        self.edit(replace(self.file, marks=marks, differences=pairs))
+        file = replace(self.file, marks=marks, differences=pairs)
+        self.edit(file, what=f"delete {name}")
 
     def name_mark(self, name: str, text: str) -> bool:
         """False where the text is no name, or another mark's."""
@@ -193,7 +147,7 @@ class Inspecting:
             (text if a == name else a, text if b == name else b) for a, b in self.file.differences
         )
         self.chosen = text if self.chosen == name else self.chosen
-        self.edit(replace(self.file, marks=marks, differences=pairs))
+        self.edit(replace(self.file, marks=marks, differences=pairs), what=f"rename {name}")
         return True
 
     def mark(self, name: str) -> Mark:
@@ -203,7 +157,7 @@ class Inspecting:
     def change(self, name: str, changed: Mark) -> None:
         """Another mark in the place of the one of that name."""
         marks = tuple(changed if mark.name == name else mark for mark in self.file.marks)
-        self.edit(replace(self.file, marks=marks))
+        self.edit(replace(self.file, marks=marks), what=f"edit {name}")
 
     def write_note(self, name: str, text: str) -> None:
         """A line about a mark, for tables and reports."""
@@ -234,7 +188,7 @@ class Inspecting:
         """The difference of two marks from now on; "": of none."""
         others = tuple(pair for pair in self.file.differences if pair[0] != name)
         pairs = (*others, (name, less)) if less else others
-        self.edit(replace(self.file, differences=pairs))
+        self.edit(replace(self.file, differences=pairs), what=f"edit {name}")
 
     def difference(self, of: str, less: str) -> float:
         """Mean less mean, as they are read now; NaN: one of them is not seen."""
@@ -252,11 +206,7 @@ class Inspecting:
         if value is not None and np.isfinite(value):
             made = (Isotherm(kind, **{"low" if kind == "above" else "high": float(value)}),)
         file = replace(self.file, isotherms=(*others, *made))
-        before = self._before[-1] if self._before else None
-        if before is not None and _lies_as(before, self.file):
-            self.file = file  # the number is being dragged: one step
-        else:
-            self.edit(file)
+        self.edit(file, what="alarm", together=f"alarm {kind} {bool(made)}")
 
     def radiate(self, surface: SurfaceRadiation | None, air: Air | None = None) -> None:
         """Values become temperatures of such surfaces, behind this air (None: behind what they
@@ -265,13 +215,7 @@ class Inspecting:
         known = self.file.emission or Emission()
         emission = replace(known, surface=surface, air=air or known.air) if surface else None
         file = replace(self.file, emission=emission)
-        before, now = self._before[-1] if self._before else None, self.file
-        same = before and _lies_as(before, now) and before.isotherms is now.isotherms
-        if same and surface and now.emission:
-            self.file = file  # the number is being dragged: one step
-            self.read()
-        else:
-            self.edit(file)
+        self.edit(file, what="emissivity", together=f"emissivity {surface is not None}")
 
     def note(self, sentence: str) -> None:
         """Says for a moment what a hand cannot do."""
@@ -286,7 +230,6 @@ class Inspecting:
     def saw(self, picture: ValuePicture) -> None:
         """What the view has, measured just now."""
         self.picture, self.is_current = self.corrected(picture), True
-        self.read()
 
     def corrected(self, picture: ValuePicture) -> ValuePicture:
         """As the file of marks has the emissivity; values that are no temperatures stay."""
@@ -295,13 +238,19 @@ class Inspecting:
             return picture.corrected(emission)
         return picture.as_photographed()
 
-    def read(self) -> None:
-        """All marks anew in the picture that is there."""
-        if self.picture is not None and self.picture.emission != self.file.emission:
-            self.picture = self.corrected(self.picture)
-        picture = self.picture
-        marks: tuple[Mark, ...] = self.file.marks if picture is not None else ()
-        self.readings = {mark.name: read_mark(mark, picture) for mark in marks if picture}
+    @property
+    def readings(self) -> dict[str, MarkReading]:
+        """Of each mark in the picture that is there, by name; the same object until one changes."""
+        file, picture = self.file, self.picture
+        if picture is not None and picture.emission != file.emission:
+            picture = self.picture = self.corrected(picture)
+        if self._read[0] is not file or self._read[1] is not picture:
+            marks: tuple[Mark, ...] = file.marks if picture is not None else ()
+            self._readings = {mark.name: read_mark(mark, picture) for mark in marks if picture}
+            self._read = (file, picture)
+            if self.chosen not in (mark.name for mark in file.marks):
+                self.chosen = ""  # undone
+        return self._readings
 
     def point(self, pixel: tuple[float, float] | None) -> None:
         """Looks up what lies under a pixel (column, row) of the picture; None: nothing does."""
@@ -347,46 +296,3 @@ class Inspecting:
         """As the legend shows it."""
         assert self.measured is not None, "asked for where there is a value stop"
         return ColorScale(*self.ends, self.measured.stop.palette)
-
-    # ---- files
-
-    def keep(self) -> None:
-        """Writes NAME.marks.json beside the scene; says why not, or where."""
-        state, path = self._state, self._path
-        if path is None:
-            state.problem = said("Save the scene first (Ctrl+S): its marks lie beside it.")
-        elif is_bundled(path):
-            state.problem = said(
-                "{name} came with the program; save the scene in a folder of yours, then its "
-                "marks beside it.",
-                name=(self.source or path).name,
-            )
-        elif stamp_of(path) != self._stamp:
-            state.problem = said(
-                "{name} was written by somebody else, or cannot be read; move it away, then save.",
-                name=path.name,
-            )
-        else:
-            try:
-                write_marks_file(moved_marks(self.file, self.document.origin), path)
-            except OSError as error:
-                why = error.strerror or error
-                state.problem = said("The marks cannot be kept: {why}.", why=why)
-                return
-            self._saved, self._stamp = self.file, stamp_of(path)
-            state.say(said("Saved {path}", path=path))
-
-    def may_close(self) -> bool:
-        """Whether nothing would be lost; asked again with the same marks, it may."""
-        if not self.unsaved or self._warned is self.file:
-            return True
-        self._warned = self.file
-        self._state.problem = said(
-            "Marks or lengths are not saved: save them in the section Measure, or close once more."
-        )
-        return False
-
-
-def _lies_as(before: MarksFile, now: MarksFile) -> bool:
-    """Whether marks and lengths are the same: what differs is a number that is being dragged."""
-    return before.marks is now.marks and before.lengths is now.lengths and before.scale == now.scale

@@ -172,7 +172,8 @@ class RayMarks:
             return
         self.lengths[name] = found
         tool.chosen = name
-        tool.edit(replace(tool.file, marks=(*tool.file.marks, mark)))
+        marks = (*tool.file.marks, mark)
+        tool.edit(replace(tool.file, marks=marks), what=f"add {mark.name}")
 
     def _picked(self) -> Point | None:
         if self.pointed is None or not np.isfinite(self.pointed.metres):

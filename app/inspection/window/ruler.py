@@ -81,20 +81,18 @@ class Ruler:
             return
         made = length_of(free_length_name(self.kind, names), self.kind, points)
         self.chosen = made.name
-        self._keep((*self.lengths, made))
+        self._keep((*self.lengths, made), f"add {made.name}")
 
     def undo(self) -> bool:
-        """The last point, else the last edit of the file; False: there is none."""
-        if self.points:
-            self.points.pop()
-            return True
-        done = self._inspecting.undo()
-        self._forget_gone()
-        return done
+        """The last point; False: there is none, and the last edit of all is meant."""
+        if not self.points:
+            return False
+        self.points.pop()
+        return True
 
     def delete(self, name: str) -> None:
         self.chosen = ""
-        self._keep(tuple(each for each in self.lengths if each.name != name))
+        self._keep(tuple(each for each in self.lengths if each.name != name), f"delete {name}")
 
     def name_length(self, name: str, text: str) -> bool:
         """False where the text is no name, or another one's."""
@@ -134,6 +132,7 @@ class Ruler:
         """Its value, reckoned once: the overlay asks in every frame."""
         if self._measured[0] is not self._inspecting.file:
             self._measured = (self._inspecting.file, {})
+            self.chosen = self.chosen if self.chosen in {e.name for e in self.lengths} else ""
         values = self._measured[1]
         if each.name not in values:
             values[each.name] = each.measured(self.scale)
@@ -151,21 +150,19 @@ class Ruler:
 
     def _change(self, changed: LengthMark, name: str, note: str) -> None:
         new = replace(changed, name=name, note=note)
-        self._keep(tuple(new if each is changed else each for each in self.lengths))
+        lengths = tuple(new if each is changed else each for each in self.lengths)
+        self._keep(lengths, f"edit {name}")
 
     def _named(self, name: str) -> LengthMark:
         return next(each for each in self.lengths if each.name == name)
 
-    def _keep(self, lengths: tuple[LengthMark, ...]) -> None:
-        self._inspecting.edit(replace(self._inspecting.file, lengths=lengths))
+    def _keep(self, lengths: tuple[LengthMark, ...], what: str) -> None:
+        self._inspecting.edit(replace(self._inspecting.file, lengths=lengths), what=what)
 
     def _rescale(self, scale: Scale) -> None:
         file, error = self._inspecting.file, min(scale.error, 1.0)
-        self._inspecting.edit(replace(file, metres_per_unit=scale.factor, scale_error=error))
-
-    def _forget_gone(self) -> None:
-        if self.chosen not in (each.name for each in self.lengths):
-            self.chosen = ""
+        file = replace(file, metres_per_unit=scale.factor, scale_error=error)
+        self._inspecting.edit(file, what="known length")
 
 
 def parse_length(text: str, unit: str) -> float | None:

@@ -20,7 +20,7 @@ KIND_TIPS = {
     "Area": "Of three corners or more, in order; Enter or a click on the first one ends it.",
 }
 ACTIONS = {
-    "Save lengths": "NAME.marks.json beside the scene: read when it is opened again.",
+    "Save lengths": "All that is not saved; lengths go into NAME.marks.json beside the scene.",
     "Report": "One HTML file with a picture and a table of this view, among the exports.",
 }
 
@@ -30,7 +30,7 @@ class RulerActions:
     """What the section's buttons do, and the unit in which it speaks."""
 
     toggle: Callable[[], None]
-    save: Callable[[], None]
+    save: Callable[[], object]
     report: Callable[[], None]
     unit: Callable[[], str]
     choose_unit: Callable[[str], None]
@@ -47,7 +47,7 @@ def draw_ruler(ruler: Ruler, actions: RulerActions, ui_scale: float) -> None:
     unit = actions.unit()
     if ruler.lengths:
         _table(ruler, unit, ui_scale)
-    if ruler.chosen:
+    if ruler.chosen in {each.name for each in ruler.lengths}:
         _chosen(ruler, actions, unit, ui_scale)
     imgui.set_next_item_width(-1)
     labels = [said("lengths in {unit}", unit=name) for name in UNITS]
@@ -120,7 +120,7 @@ def _chosen(ruler: Ruler, actions: RulerActions, unit: str, ui_scale: float) -> 
     if imgui.button(item_label("Delete"), Vec(-1, 0)):
         ruler.delete(name)
         return
-    tip("Delete it; Ctrl+Z brings it back while the tool is on.", ui_scale)
+    tip("Delete it; Ctrl+Z brings it back.", ui_scale)
     if not theme.has_keys():
         return
     imgui.set_next_item_width(-1)

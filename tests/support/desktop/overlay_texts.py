@@ -47,7 +47,7 @@ TABLES = {
     "sections.stops_panel": {"MODE_NAMES": VALUES},
 }  # fmt: skip
 TABLES_BESIDE = {
-    "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "LOSE": ALL},
+    "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "UNSAVED": ALL},
     "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},
     "film.window.films": {"AROUND": ALL, "PAST": ALL},
     "inspection.window.inspect_panel": {
@@ -62,8 +62,7 @@ HEADSET_TABLES = {
         "TURN_NAMES": VALUES, "MODEL_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL, "ROOM": ALL,
         "NO_ROOM": ALL, "SHARP": ALL, "SHARP_NAMES": VALUES, "LATER": ALL, "NO_INSETS": ALL,
     },
-    "sections.tool_sections": {"HOW": VALUES},
-    "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL},
+    "sections.room_section": {"HOW_TOOLS": VALUES, "QUALITY_NAMES": VALUES, "HOW": ALL},
     "wrist_menu": {"NONE": ALL, "HELP": ALL, "SURE": ALL},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called
@@ -74,7 +73,10 @@ KEY_TABLES = (
     "editor.window.touch", "editor.window.two_pictures", "inspection.window.attach_inspection",
     "inspection.window.attach_ruler",
 )  # fmt: skip
-STATES = {"parts.parts_tool": ("HOW",), "touch_state": ("HOW", "STILL", "MOVING")}
+STATES = {
+    "files.saving": ("LOSE",), "parts.parts_tool": ("HOW",),
+    "touch_state": ("HOW", "STILL", "MOVING"),
+}  # fmt: skip
 # Texts on their way through variables, as tests/.../look/test_desktop_languages.py has found them.
 BY_VARIABLES = {
     "Budget", "Quality", "Passes", "Counts", "Machine", "drawing", "sort", "vendor", "in the scene",

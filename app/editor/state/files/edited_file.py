@@ -15,9 +15,11 @@ from shapeshift.scene.document import edits
 from shapeshift.scene.document.edits import History
 from shapeshift.scene.document.scene_file import ENDING, HULLS, SceneFile, SceneItem
 from shapeshift.scene.document.write_scene_file import moved
+from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
 
+NO_MARKS = MarksFile()
 ModelKey = tuple  # what makes two objects have the same model: path, mode, up, flip, part
 
 
@@ -29,6 +31,9 @@ class EditedFile:
     saved: SceneFile  # as it was opened or lies there; an edit gives another object
     path: Path | None = None  # of the scene file; None: it is none yet
     saved_regions: tuple = ()  # the regions then
+    saved_film: object = None  # the keys of a film
+    saved_marks: MarksFile = NO_MARKS
+    stamps: dict[Path, tuple] = field(default_factory=dict)  # of what lies beside it
     stamp: tuple = ()  # of the file when it was read or written here: changed by others since?
     sources: dict[ModelKey, Source] = field(default_factory=dict)
     pieces: dict[str, Piece] = field(default_factory=dict)  # by what stands for their models
@@ -39,6 +44,12 @@ class EditedFile:
     @property
     def file(self) -> SceneFile:
         return self.history.file
+
+    @property
+    def marks(self) -> MarksFile:
+        """Marks and lengths, metres in the world of the window."""
+        marks = self.history.marks
+        return marks if isinstance(marks, MarksFile) else NO_MARKS
 
     @property
     def changed(self) -> bool:
@@ -94,6 +105,15 @@ class EditedFile:
             self.file, timeline.did, timeline.together, film=timeline.keys
         )
         timeline.did = ""
+
+    def begin_with(self, **parts: object) -> None:
+        """What lay beside the scene is there from the first step on: marks, film."""
+        steps = tuple(replace(step, **parts) for step in self.history.steps)
+        self.history = replace(self.history, steps=steps)
+
+    def record_marks(self, marks: MarksFile, what: str, together: str = "") -> None:
+        """Makes other marks or lengths a step of the history."""
+        self.history = self.history.record(self.file, what, together, marks=marks)
 
     def amend_regions(self, regions: Regions) -> None:
         """Takes regions over that nobody's hand has changed: their objects have."""

@@ -1,18 +1,30 @@
 """Saving the scene that is open, and asking before something is lost."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.beside import (
+    beside_alone,
+    due_beside,
+    film_unsaved,
+    origin_of_source,
+    write_beside,
+)
 from shapeshift.app.editor.state.files.edited_file import beside, stamp_of, with_regions
 from shapeshift.app.editor.state.parts.write_pieces import with_written_pieces
 from shapeshift.app.editor.state.user.own_files import OwnFiles
-from shapeshift.app.editor.texts.table import said
+from shapeshift.app.editor.texts.table import THE_SCENE, said
 from shapeshift.app.paths import is_bundled, plain
+from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import ENDING, FAR_M, SceneFile
 from shapeshift.scene.document.write_scene_file import write_scene_file
 
 LONGEST_PATH = 1000  # letters
+MOST_NAMES = 8  # of one kind of what would be lost
+LOSE = "Do not save"
 
 
 class Saving:
@@ -26,6 +38,7 @@ class Saving:
         self.name = ""  # as it is typed; "" = the box is not open
         self.taken = False  # a file of that name is there, and nobody has said to replace it
         self.then: Callable[[], None] | None = None  # what waits for an answer
+        self.refused: Callable[[], None] = lambda: None  # hears that nothing is to be saved
 
     @property
     def asking(self) -> bool:
@@ -40,8 +53,15 @@ class Saving:
         return self._own.has(edited.path, edited.stamp)
 
     def save(self) -> bool:
-        """Writes over what was saved before, else asks for a name; True when it did."""
-        edited = self._state.edited
+        """Writes over what was saved before, else asks for a name; True when it did.
+
+        Marks and a film alone go beside what was opened.
+        """
+        edited, state = self._state.edited, self._state
+        if unsaved(state) and not scene_unsaved(state):
+            source = beside_alone(state)
+            if source is not None:
+                return self._save_beside(source)
         if edited.path is None or not self.in_place:
             self.ask_name()
             return False
@@ -82,7 +102,7 @@ class Saving:
         if path.exists() and not untouched and not replace:
             self.name, self.taken = str(path), True
             return False
-        return self.write(path)
+        return self.write(path, over=replace)
 
     def ask_over(self) -> None:
         """The file that was opened is meant: that is asked once more."""
@@ -98,18 +118,39 @@ class Saving:
         edited = self._state.edited
         return edited.path is not None and edited.path.absolute() == path.absolute()
 
-    def write(self, path: Path) -> bool:
-        """Writes the file; what is wrong is said."""
+    def _save_beside(self, source: Path) -> bool:
+        """Marks and film, of a scene that has not changed."""
+        state = self._state
+        try:
+            due = due_beside(state, source, origin_of_source(state))
+            written = write_beside(state, due)
+        except (OSError, ValueError) as error:
+            self._say_failed(source, error)
+            return False
+        state.say(said("Saved {path}", path=", ".join(map(str, written))))
+        self._go_on()
+        return True
+
+    def _say_failed(self, path: Path, error: OSError | ValueError) -> None:
+        reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
+        why = {"name": path.name, "why": reason}
+        self._state.problem = said("{name} cannot be saved: {why}.", **why)
+
+    def write(self, path: Path, over: bool = False) -> bool:
+        """Writes the file and what belongs beside it; what is wrong is said.
+
+        over: a scene that is there goes, with what lies beside it.
+        """
         state = self._state
         edited = state.edited
         try:
+            due = due_beside(state, path.absolute(), np.zeros(3), over)
             pieces = with_written_pieces(edited, checked(edited.file), path.absolute())
             file = filed(pieces, state, path)
             path.parent.mkdir(parents=True, exist_ok=True)
             write_scene_file(file, path)
         except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
-            state.problem = said("{name} cannot be saved: {why}.", name=path.name, why=reason)
+            self._say_failed(path, error)
             return False
         self.name = ""
         path = path.absolute()
@@ -123,7 +164,13 @@ class Saving:
             )
         edited.saved, edited.saved_regions = edited.file, state.regions.kept
         self._remember(path)
-        self._state.say(said("Saved {path}", path=path))
+        try:
+            written = write_beside(state, due)
+        except OSError as error:
+            self._say_failed(path, error)
+            return False
+        names = ", ".join([str(path), *(each.name for each in written)])
+        self._state.say(said("Saved {path}", path=names))
         self._go_on()
         return True
 
@@ -135,10 +182,11 @@ class Saving:
             then()
 
     def answer(self, word: str) -> None:
-        """One of Save, Discard, Cancel."""
+        """One of Save, Do not save, Cancel."""
         if word == "Save":
             self.save()
-        elif word == "Discard":
+        elif word == LOSE:
+            self.refused()
             self._go_on()
         else:
             self.then = None
@@ -162,8 +210,55 @@ def free_path(path: Path) -> Path:
 
 
 def unsaved(state: EditorState) -> bool:
-    """Whether something would be lost: edits, regions, paint; not a lens, nor where x stands."""
+    """Whether something would be lost: edits, regions, paint, marks, lengths, a film; not a lens,
+    nor where x stands.
+    """
+    edited = state.edited
+    return scene_unsaved(state) or edited.marks is not edited.saved_marks or film_unsaved(state)
+
+
+def scene_unsaved(state: EditorState) -> bool:
+    """The same of what the scene file says."""
     return state.edited.unsaved or state.regions.kept != state.edited.saved_regions
+
+
+def what_is_lost(state: EditorState) -> list[str]:
+    """A line for each kind of what would be lost, by name."""
+    edited, lines = state.edited, []
+    changed = edits.changes(edited.saved, edited.file)
+    changed = [change for change in changed if change.fields != {"x"}]
+    items = [change.after or change.before for change in changed]
+    names = [item.name for item in items if item is not None]
+    if edited.unsaved and not names:
+        names = [said(THE_SCENE)]
+    if names:
+        lines.append(said("Objects: {names}", names=_listed(names)))
+    regions = _other(edited.saved_regions, state.regions.kept)
+    if regions:
+        lines.append(said("Regions: {names}", names=_listed(regions)))
+    before, now = edited.saved_marks, edited.marks
+    if now is not before:
+        names = _other(before.marks, now.marks) + _other(before.lengths, now.lengths)
+        names = names or [said("values")]
+        lines.append(said("Marks and lengths: {names}", names=_listed(names)))
+    if film_unsaved(state):
+        keys = state.timeline.keys
+        count = len(keys.cameras) + len(keys.stops)
+        lines.append(said("Film: {count} keys", count=count))
+    return lines
+
+
+def _other(before: Sequence, now: Sequence) -> list[str]:
+    """Names of what is not the same in both."""
+    old, new = {id(each) for each in before}, {id(each) for each in now}
+    rows = [each for each in now if id(each) not in old]
+    rows += [each for each in before if id(each) not in new]
+    return list(dict.fromkeys(each.name for each in rows))
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = [said("{count} more", count=len(names) - MOST_NAMES)] * (len(names) > MOST_NAMES)
+    return ", ".join([*names[:MOST_NAMES], *more])
 
 
 def checked(file: SceneFile) -> SceneFile:

@@ -2,6 +2,7 @@
 
 import glfw
 import pytest
+from imgui_bundle import imgui
 
 from shapeshift.app.editor.state.camera.camera import EditorCamera
 from shapeshift.app.editor.window.viewer import SLEEP_S
@@ -83,6 +84,52 @@ def test_an_event_draws_the_overlay_and_then_it_rests_again(viewer, monkeypatch)
     frames, draws, presents = rounds.go()
     assert 0 < frames < WAITS / 2 and draws == 0
     assert presents == (0 if viewer.window.presented.kept else frames)  # kept: not even resolved
+
+
+def delete_and_close(viewer) -> None:
+    """As the X of the title bar does, with the mouse there: no event follows."""
+    viewer.state.add_region("sphere")
+    viewer.state.record_regions()
+
+    def ask_once() -> bool:
+        viewer.hooks.closing.clear()
+        return viewer.objects.may_close()
+
+    viewer.hooks.closing.append(ask_once)
+    viewer.window.close()
+
+
+# What is set, and what is to be read then; each by nobody's hand: from a thread, a poll, a close.
+SPOKEN = {
+    "note": (lambda v: v.state.say("a note"), "a note"),
+    "problem": (lambda v: setattr(v.state, "problem", "a problem"), "a problem"),
+    "failure": (lambda v: v.state.messages.fail("a failure"), "a failure"),
+    "status": (lambda v: v.hooks.status.append(lambda: "working 3 %"), "working 3 %"),
+    "name": (lambda v: v.objects.saving.ask_name(), "Cancel"),
+    "closing": (delete_and_close, "Regions: sphere 1"),
+    "open": (lambda v: v.files.ask(), "Cancel"),
+    "add": (lambda v: v.objects.adding.ask(), "Cancel"),
+}
+
+
+@pytest.mark.parametrize("kind", SPOKEN)
+def test_what_is_said_or_asked_is_drawn_at_once_with_the_mouse_at_rest(viewer, kind, monkeypatch):
+    settle(viewer)
+    texts: list[str] = []
+    for name in ("text_unformatted", "text_disabled", "text_wrapped", "button"):
+        draw = getattr(imgui, name)
+        monkeypatch.setattr(
+            imgui, name, lambda text, *more, draw=draw: (texts.append(text), draw(text, *more))[1]
+        )
+    say, words = SPOKEN[kind]
+    rounds = Rounds(viewer, monkeypatch)
+    say(viewer)
+    frames, *_ = rounds.go()
+    assert any(words in text for text in texts), texts
+    assert 0 < frames < WAITS / 2, "and then it rests"
+    assert rounds.asked.index(SLEEP_S) < WAITS / 2
+    viewer.state.problem, viewer.hooks.status[:] = "", viewer.hooks.status[:-1]
+    imgui.internal.close_popups_except_modals()
 
 
 def hide(viewer, display) -> None:

@@ -156,7 +156,7 @@ def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
         hands.click(*widgets.middle("Things to touch"))
     assert viewer.files.busy or viewer.objects.saving.asking
     until_opened(viewer)
-    viewer.objects.saving.answer("Discard")
+    viewer.objects.saving.answer("Do not save")
     run_frames(viewer, 2)
     assert viewer.state.edited.path == TOUCH and len(viewer.window.covered) == 3
 

@@ -197,7 +197,7 @@ def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
     viewer.open_soon((tmp_path / "ball.shift",))
     until_opened(viewer)
     assert viewer.objects.saving.asking and "cube" in names(viewer)
-    viewer.objects.saving.answer("Discard")
+    viewer.objects.saving.answer("Do not save")
     run_frames(viewer, 2)
     assert names(viewer) == ["ball"] and not viewer.objects.unsaved
 

@@ -99,7 +99,7 @@ def test_values_of_a_report_are_those_of_surfaces_where_the_panel_says_so(wearer
     (mark,) = tool.file.marks
     texts = []
     for emission in (None, Emission(SurfaceRadiation(0.5, 0.0))):
-        tool.edit(replace(tool.file, emission=emission))
+        tool.edit(replace(tool.file, emission=emission), what="emissivity")
         tools.wants_report = True
         act(wearer)
         texts.append(max(tools.folder.glob("*.html"), key=lambda p: p.name).read_text())

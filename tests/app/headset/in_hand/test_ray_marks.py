@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.in_hand.tools_drawn import with_tools, words
+from shapeshift.app.headset.save_start import save_scene
 from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.inspection.window.inspecting import Inspecting
 from shapeshift.app.inspection.window.probe import Probe
@@ -20,7 +22,7 @@ from shapeshift.renderer.colors.palette import ALL_VALUES
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.contours import MOST_LINES, contour_lines
 from shapeshift.scene.inspection.marks import Isotherm
-from shapeshift.scene.inspection.marks_file import read_marks_file
+from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.vr.carried import Carried
@@ -124,7 +126,7 @@ def test_a_spot_is_laid_found_again_chosen_and_removed(inspector):
     assert inspector.tool.chosen == "Sp1"
     inspector.pull(place, secondary=True)
     assert inspector.names() == ["Sp2"]
-    assert inspector.tool.undo() and inspector.names() == ["Sp1", "Sp2"]
+    assert inspector.tools.undo() and inspector.names() == ["Sp1", "Sp2"]
 
 
 def test_labels_face_the_head_and_are_as_large_to_it_wherever_they_hang(inspector):
@@ -160,7 +162,7 @@ def test_two_pulls_are_a_length_with_its_uncertainty_and_marks_are_ends(inspecto
     assert 0 < found.uncertainty < 0.02
     assert words(inspector.tools, line) == f"{found.value:.3f} \u00b1 {found.uncertainty:.3f} m"
     inspector.marks.lengths.clear()  # read from a file
-    inspector.tool.file = replace(inspector.tool.file, metres_per_unit=2.0)
+    inspector.tool.edit(replace(inspector.tool.file, metres_per_unit=2.0), what="known length")
     assert words(inspector.tools, line) == f"{2 * found.value:.3f} m"
 
 
@@ -272,15 +274,17 @@ def test_contours_leave_out_what_is_not_known_torn_or_never_crossed():
     assert contour_lines(a_plane(np.ones((3, 3))), Isotherm("above", low=0.5)).shape == (0, 2, 3)
 
 
-def test_marks_are_kept_beside_the_scene_as_on_the_desktop(inspector, ctx, tmp_path):
+def test_marks_are_kept_beside_the_scene_as_on_the_desktop(inspector, ctx, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path / "documents"))
     inspector.pull(TABLE)
-    inspector.tool.keep()
-    assert "came with the program" in inspector.editor.problem
+    assert save_scene(inspector.editor), "what came with the program is left alone"
+    beside = marks_path(inspector.editor.edited.path)
+    assert beside.is_relative_to(tmp_path) and len(read_marks_file(beside).marks) == 1
     mine = Inspector(ctx, Path(shutil.copy(DEMO, tmp_path / "mine.shift")))
     mine.pull(TABLE)
-    assert mine.tool.unsaved
-    mine.tool.keep()
-    assert not mine.editor.problem and not mine.tool.unsaved
+    assert unsaved(mine.editor)
+    assert save_scene(mine.editor)
+    assert not mine.editor.problem and not unsaved(mine.editor) and mine.editor.edited.path is None
     (mark,) = read_marks_file(tmp_path / "mine.marks.json").marks
     wanted = mine.tool.file.marks[0].place + mine.tool.document.origin
     np.testing.assert_allclose(mark.place, wanted, atol=1e-5)

@@ -17,6 +17,7 @@ from shapeshift.app.paths import DEMO
 from shapeshift.renderer.colors.palette import ALL_VALUES
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.inspection.marks import Mark
+from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from shapeshift.scene.sections.section import BoxShape, PlaneShape
 from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import a_frame, hand_at
@@ -126,13 +127,14 @@ def test_paint_has_a_size_and_takes_the_trigger_from_marks(picture):
     assert not {"name", "brush", "Place"} & set(wearer.labels()), "nothing here needs keys"
 
 
-def test_heat_is_measured_from_the_panel_without_keys(picture, monkeypatch):
+def test_heat_is_measured_from_the_panel_without_keys(picture, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path))
     wearer = Wearer(picture, demo())
     tools, tool = wearer.state.tools, wearer.state.tools.inspecting
     press(wearer, "Room", "Touch", "Inspect", "lay marks")
     assert tool.on
     spot = Mark("Sp1", "spot", np.zeros((1, 3)))
-    tool.edit(replace(tool.file, marks=(spot,)))
+    tool.edit(replace(tool.file, marks=(spot,)), what="add Sp1")
     tool.chosen = "Sp1"
     wearer.wait()
     reach(wearer, "Delete")
@@ -156,8 +158,9 @@ def test_heat_is_measured_from_the_panel_without_keys(picture, monkeypatch):
     assert tools.marks.pulls == LENGTHS
     press(wearer, "Undo")
     assert tool.file.isotherms == ()
-    press(wearer, "Save marks")
-    assert "came with the program" in wearer.editor.problem
+    press(wearer, "above", "Save marks")
+    beside = marks_path(wearer.editor.edited.path)
+    assert beside.is_relative_to(tmp_path) and len(read_marks_file(beside).isotherms) == 1
 
 
 @pytest.mark.parametrize("code", ["de", "ja"])

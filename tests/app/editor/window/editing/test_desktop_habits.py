@@ -106,7 +106,7 @@ def test_new_is_empty_and_asks_first(viewer, hands, monkeypatch):
     hands.click(*widgets.middle("Cancel"))
     assert viewer.state.scene.objects
     hands.key("n", "Control_L")
-    hands.click(*widgets.middle("Discard"))
+    hands.click(*widgets.middle("Do not save"))
     run_frames(viewer, 3)
     assert not viewer.state.scene.objects and not viewer.objects.unsaved
     assert "The demo" in widgets.boxes  # what can be opened instead

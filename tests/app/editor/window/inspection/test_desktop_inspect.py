@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from shapeshift.app.editor.panels.scale_bar import height_of
+from shapeshift.app.editor.state.files.saving import what_is_lost
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.inspection.air import Air
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
@@ -189,25 +190,28 @@ def test_marks_are_laid_read_found_again_kept_and_reported(
 
     # Saved beside the scene by the button alone, then read when it is opened.
     beside = marks_path(wall)
-    assert tool.unsaved and not beside.exists()
+    assert viewer.objects.unsaved and not beside.exists()
     run_frames(viewer, 2)
     hands.click(*widgets.middle("Save marks"))
-    assert not tool.unsaved and [m.name for m in read_marks_file(beside).marks] == ["Motor", "Ar1"]
+    assert [m.name for m in read_marks_file(beside).marks] == ["Motor", "Ar1"]
+    assert not viewer.objects.unsaved and str(beside) in state.messages.note
     hands.click(*widgets.middle("Report"))
     (report,) = (wall.parent / "work" / "exports").glob("*.html")
     text = report.read_text()
     assert "Motor" in text and text.count("data:image/png") == 2 and "Ar1" in text
     again = viewer_on_wall(window, renderer, wall, "Thermal")
     assert [m.name for m in again.inspecting.file.marks] == ["Motor", "Ar1"]
-    assert not again.inspecting.unsaved and again.may_close()
+    assert not again.objects.unsaved and again.may_close()
     again.parts.finder.close()
 
     # Somebody else's file is not written over.
     beside.write_text(json.dumps({"shapeshift_marks": 1, "marks": []}))
     tool.delete("Motor")
-    tool.keep()
-    assert "somebody else" in state.problem and tool.unsaved
-    assert not tool.may_close() and tool.may_close()  # told once
+    assert not viewer.objects.saving.save()
+    assert "somebody else" in state.problem and viewer.objects.unsaved
+    assert what_is_lost(state) == ["Marks and lengths: Motor"]
+    assert not viewer.may_close() and not viewer.may_close()  # as often as it is asked
+    viewer.objects.saving.answer("Cancel")
 
 
 def test_emissivity_by_hand(viewer, hands, monkeypatch):
@@ -236,12 +240,14 @@ def test_emissivity_by_hand(viewer, hands, monkeypatch):
     run_frames(viewer, 2)
     assert tool.pointed[0] == pytest.approx(want, abs=3 * NEAR_C)  # twice the slope of what is seen
     hands.move(*on_wall(viewer, 0.0, 0.25))
-    hands.key("z", "Control_L")
-    assert tool.file.emission is None and tool.readings["Sp1"].mean == pytest.approx(seen, abs=0.01)
+    for wanted in (Emission(surface), None):
+        hands.key("z", "Control_L")
+        assert tool.file.emission == wanted
+    assert tool.readings["Sp1"].mean == pytest.approx(seen, abs=0.01)
 
 
 def test_air_by_hand(viewer, hands, monkeypatch):
-    """Typed metres of air: readings are those of the formula, one step back takes them away."""
+    """Typed metres of air: readings are those of the formula; each number is a step to go back."""
     tool, widgets = viewer.inspecting, Widgets(monkeypatch)
     hands.key("y")
     settle(viewer)
@@ -262,7 +268,9 @@ def test_air_by_hand(viewer, hands, monkeypatch):
     assert want > bare + 0.5  # the wall is warmer than the air: what the air adds is less
     assert tool.readings["Sp1"].mean == pytest.approx(want, abs=0.02)
     hands.move(*on_wall(viewer, 0.0, 0.25))
-    hands.key("z", "Control_L")
+    for _ in range(4):
+        assert tool.file.emission is not None
+        hands.key("z", "Control_L")
     assert tool.file.emission is None and tool.readings["Sp1"].mean == pytest.approx(seen, abs=0.01)
 
 

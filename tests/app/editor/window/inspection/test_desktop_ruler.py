@@ -135,5 +135,5 @@ def test_lengths_are_clicked_scaled_noted_kept_and_reported(
     assert f"{ruler.measured(ruler.lengths[0]).words('m')}" in text and not state.problem
     again = viewer_on_wall(window, renderer, wall)
     assert again.ruler.measured(again.ruler.lengths[0]).value == pytest.approx(values[0], abs=1e-4)
-    assert not again.inspecting.unsaved and again.may_close()
+    assert not again.objects.unsaved and again.may_close()
     again.parts.finder.close()
