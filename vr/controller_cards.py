@@ -13,7 +13,7 @@ from shapeshift.vr.cards import Card
 from shapeshift.vr.frame import SIDES, Frame, Hand
 from shapeshift.vr.glove import LIT, MIRROR, Capsule
 from shapeshift.vr.locomotion import Rules
-from shapeshift.vr.plane import facing
+from shapeshift.vr.panel import facing
 
 # A controller as capsules, of our own making: what one holds, with its buttons where they are.
 #

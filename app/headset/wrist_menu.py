@@ -52,9 +52,18 @@ from shapeshift.app.headset.sections.room_section import (
 from shapeshift.app.headset.session.recorder import Recorder
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
-from shapeshift.vr.carried import MIDDLE, Carried, Palm, carry, left_over, scroll, slide
 from shapeshift.vr.frame import Frame
-from shapeshift.vr.plane import NOBODY, Place
+from shapeshift.vr.panel import (
+    MIDDLE,
+    NOBODY,
+    Carried,
+    Palm,
+    Place,
+    carry,
+    left_over,
+    scroll,
+    slide,
+)
 from shapeshift.vr.play_space import resized
 
 TICK = (0.25, 0.012)  # strength and seconds of the buzz when something is pointed at

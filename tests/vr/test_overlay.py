@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.carried import Carried, carry
 from shapeshift.vr.drawn import FINE as FINE_INK
 from shapeshift.vr.drawn import WRONG, Drawn, PanelQuad, arc, drawn_of
 from shapeshift.vr.frame import LOST
 from shapeshift.vr.glove import LIT, Capsule
 from shapeshift.vr.locomotion import Arc, Comfort
 from shapeshift.vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
+from shapeshift.vr.panel import Carried, carry
 from shapeshift.vr.play_space import PlaySpace
 from shapeshift.vr.touching import Touched
 from tests.support.renderer.frames import texture_target

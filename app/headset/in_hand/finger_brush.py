@@ -11,9 +11,9 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import ADD, REMOVE, REPLACE, PartsTool
 from shapeshift.app.editor.state.regions import within_balls
 from shapeshift.scene.pose import View
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.frame import Frame, Hand
 from shapeshift.vr.glove import fingertip
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.play_space import PlaySpace
 
 PRESSED, LET_GO = 0.6, 0.4  # of a trigger, or a pinch

@@ -35,9 +35,9 @@ from shapeshift.scene.sections.section import (
     moved_shape,
     plane_through,
 )
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.frame import SIDES, Frame, Hand
 from shapeshift.vr.locomotion import GRIPS_AT, LETS_GO_AT
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.play_space import PlaySpace
 
 # A hand that takes hold of a section or a region: it follows the hand, and stays when let go.

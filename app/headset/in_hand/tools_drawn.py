@@ -13,11 +13,10 @@ from shapeshift.app.inspection.window.marks_over import words_of
 from shapeshift.scene.inspection.lengths import length
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.vr.cards import Card
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.drawn import DOT_M, FINE, PALE, WRONG, Drawn
 from shapeshift.vr.frame import SIDES, Frame
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.plane import facing
+from shapeshift.vr.panel import Carried, facing
 from shapeshift.vr.play_space import PlaySpace
 
 THIN_M, THICK_M = 0.0012, 0.0022  # radii of lines, metres of the room

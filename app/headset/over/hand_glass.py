@@ -15,7 +15,6 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
 from shapeshift.vr.frame import SIDES, Frame, Hand
@@ -29,6 +28,7 @@ from shapeshift.vr.glass import (
     frame_of,
     held_glass,
 )
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.see_through import SeeThrough
 from shapeshift.vr.touching import shows

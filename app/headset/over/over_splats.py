@@ -18,7 +18,6 @@ from shapeshift.scene.control import control_key
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.vr.cards import Card
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.controller_cards import (
     HeldController,
     controller,
@@ -33,7 +32,7 @@ from shapeshift.vr.frame import LOST, SIDES, Frame, grip_of
 from shapeshift.vr.glove import Capsule
 from shapeshift.vr.openxr.session import Session
 from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
-from shapeshift.vr.plane import facing
+from shapeshift.vr.panel import Carried, facing
 from shapeshift.vr.shadow import STRAY, Blocks, Cast, Shadow, Shadows, blocks_of, shadow_on
 
 

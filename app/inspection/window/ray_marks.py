@@ -17,8 +17,8 @@ from shapeshift.scene.inspection.marks import MOST_MARKS, Mark
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.frame import Frame, Hand
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.play_space import PlaySpace
 
 PRESSED, LET_GO = 0.6, 0.4  # of a trigger

@@ -10,8 +10,8 @@ import pytest
 from shapeshift.app.headset.in_hand.finger_brush import PartsHand
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.frame import Frame
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.play_space import PlaySpace
 from tests.support.splat_scenes import random_layers
 from tests.support.vr.vr_hands import a_frame, hand_at

@@ -10,10 +10,9 @@ from shapeshift.app.headset.in_hand.finger_brush import FIRST_M, LEAST_M, MOST_M
 from shapeshift.app.headset.panel_picture import PANEL
 from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.selectors.selector import Painted
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.frame import LOST
 from shapeshift.vr.glove import fingertip
-from shapeshift.vr.plane import Pointing
+from shapeshift.vr.panel import Carried, Pointing
 from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import hand_at, moved
 from tests.support.vr.vr_panel import a_state, an_editor, item

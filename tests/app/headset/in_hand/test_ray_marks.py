@@ -25,9 +25,9 @@ from shapeshift.scene.inspection.marks import Isotherm
 from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import Pose, View, look_at
-from shapeshift.vr.carried import Carried
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.frame import LOST
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import a_state
