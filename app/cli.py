@@ -357,8 +357,21 @@ def answer(arguments: list[str]) -> int:
         if isinstance(error, FileNotFoundError) and is_folder_gone():
             return refuse(f"{command}: the folder that this was started in is gone; go to another.")
         return refuse(f"{command}: {error.strerror or error}: {error.filename or 'no file named'}")
+    except MemoryError as error:
+        return refuse(f"{command}: {no_room(str(error))}")
     except Exception as error:
+        if "failed to map segment" in str(error):  # of a library that is loaded late
+            return refuse(f"{command}: {no_room(str(error))}")
         return report_fault(command, error)
+
+
+def no_room(text: str) -> str:
+    """What is said where memory is full; text: the error's own."""
+    what = f" ({text.splitlines()[0]})" if text else ""
+    return (
+        f"this process got no more memory{what}; end other programs, raise its limit (ulimit -v), "
+        "or give it less: --max-splats, --downscale, a smaller --size."
+    )
 
 
 def is_folder_gone() -> bool:
