@@ -1,6 +1,4 @@
-"""Clusters behind what is drawn are left out: pictures stay the same to the bit, whatever is
-guessed of depths.
-"""
+"""Clusters behind what is drawn are left out: pictures stay the same to the bit."""
 
 from contextlib import suppress
 from dataclasses import replace
