@@ -15,6 +15,7 @@ from shapeshift.app.drawing import parse_size, read_cuts
 from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.journal import Journal
 from shapeshift.app.editor.state.files.open_scene import first_look, named_cameras, opened_scene
 from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.app.editor.state.layout import Box
@@ -29,7 +30,7 @@ from shapeshift.app.editor.window.two_pictures import TwoPictures, splitting
 from shapeshift.app.editor.window.viewer import Viewer
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.app.errors import UsageError
-from shapeshift.app.paths import DEMO, TOUCH, config_folder, plain
+from shapeshift.app.paths import DEMO, TOUCH, config_folder, data_folder, plain
 from shapeshift.app.streaming.refine import Refiner, show_level
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile, SplatLayers
@@ -74,6 +75,9 @@ def run(options: Options) -> int:
                 window.stand(settings.place)
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, state, options, settings, own_files)
+            if options.screenshot is None:
+                journal = Journal(state, data_folder() / "journals")
+                viewer.objects.recovering.begin(journal, viewer.hooks)
             hooks, upload = viewer.hooks, viewer.shown.upload
             attach_budget(renderer, state, hooks)
             attach_refiner(refiner, state, hooks, upload, viewer.dial.scene_changed)
@@ -90,6 +94,7 @@ def run(options: Options) -> int:
             with two, viewer.parts.finder:
                 viewer.loop()
             viewer.shell.keep_place()
+            viewer.objects.recovering.close()
     return 0
 
 
