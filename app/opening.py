@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from shapeshift.app.command_line import EXPERT, Opt
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.model import Finding, Model
+from shapeshift.runtime_models.program import program
 from shapeshift.runtime_models.splats.plain_splats import Reading
 
 if TYPE_CHECKING:
@@ -68,9 +69,9 @@ class DrawingOptions(ReadingOptions):
     """What a command that draws scenes takes besides."""
 
     budget: Annotated[str, Opt(metavar="SPLATS")] = ""
-    """Of scenes in levels of detail (launch.py lod, streamed SOG) draw at most so many splats, such
-    as 2M, finer where more pixels show it; auto: what suits this machine.  Default: one level for
-    the whole scene."""
+    """Of scenes in levels of detail (of the command lod, streamed SOG) draw at most so many splats,
+    such as 2M, finer where more pixels show it; auto: what suits this machine.  Default: one level
+    for the whole scene."""
     cache_mb: Annotated[int, EXPERT] = 2048
     """MB of memory for such a scene: what is drawn of it, and its decoded files, those used last,
     as far as there is room; 64 at least for them."""
@@ -155,7 +156,7 @@ def say_levels(models: Iterable[Model], path: Path, options: ReadingOptions) -> 
     if asked and all(getattr(model, "leaves", None) is None for model in models):
         say(
             f"{path.name} has no levels of detail, so --budget changes nothing; make them with "
-            "`launch.py lod`."
+            f"`{program()} lod`."
         )
 
 

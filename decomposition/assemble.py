@@ -77,7 +77,10 @@ def candidates_of(
             parts = tuple(part for part in pressed(parts, plane) if hull_volume(part) > 0)
         found[PIECES] = Collider(parts, mesh)
     up = (0.0, 1.0, 0.0) if plane is None else plane.normal
-    found |= {shape: collider_of_shape(mesh, shape, up) for shape in SHAPES}
+    for shape in SHAPES:  # round ones, too, stand on a base: else they roll
+        whole = collider_of_shape(mesh, shape, up)
+        parts = whole.parts if plane is None else tuple(pressed(whole.parts, plane))
+        found[shape] = replace(whole, parts=parts)
     if given is not None:
         found[given.name] = collider_of_mesh(given, making)
     return found
@@ -166,7 +169,15 @@ def assemble(
         except BadFile as why:
             failed[label] = str(why)
     places = {label: np.array(part_of(model, label)[1]) for label in proxies}
-    cut, _ = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
+    cut, inside = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
+    again = {label for pair in inside for label in pair if proxies[label].name in SHAPES}
+    for label in sorted(again):
+        # One hull reaches over the hollow in which its neighbour lies; pieces follow the thing.
+        proxies[label] = proxy_of(
+            model, label, planes.get(label), evidence.own, views, objects[label], making, PIECES
+        )
+    if again:
+        cut, _ = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
     proxies = {label: replace(proxy, collider=cut[label]) for label, proxy in proxies.items()}
     told: list[Completion] = []
     whole = model
@@ -198,8 +209,12 @@ def proxy_of(
     views: Sequence[PhotoView],
     given: Path | None,
     making: Making,
+    only: str | None = None,
 ) -> Proxy:
-    """What is touched of one object, in its own frame.  Raises BadFile."""
+    """What is touched of one object, in its own frame; only: the candidate of that name.
+
+    Raises BadFile.
+    """
     assert model.labels is not None, "assemble() asks for them"
     part, at = part_of(model, label)
     assert isinstance(part, AnchorModel), "a part of one"
@@ -208,6 +223,9 @@ def proxy_of(
     world_from_part = np.eye(4)
     world_from_part[:3, 3] = at
     pictures = most_of([view.labelled for view in views], label)
+    if only is not None:
+        candidates = candidates_of(mesh, here, making, given)
+        return choose_proxy({only: candidates[only]}, world_from_part, label, pictures)[0]
     simple = candidates_of(mesh, here, making, given, cut=False)
     best = choose_proxy(simple, world_from_part, label, pictures)[0]
     # Pieces follow the mesh: where that is hardly better, they would not be chosen.
@@ -243,6 +261,9 @@ LEAST_OPACITY = 0.05
 # Of the longest side: corners so little above the lowest lie on the plane.  A spanner of 15 pieces
 # whose bases differ by .9 mm creeps 4 mm a second; on one plane it sleeps.
 SNAP = 0.0125
+MOST_PRESSED = 0.4  # of its height: above, what a thing stood on is not of its own shape
+LEANS = 10.0  # degrees: a thing that stood in photos does not tip before
+ON_BASE = 1e-4  # of the longest side from the plane: rounding
 FEWEST = 30  # splats: with fewer the rules above leave too little
 
 
@@ -280,14 +301,56 @@ def pressed(pieces: Sequence[np.ndarray], plane: Plane) -> list[np.ndarray]:
     """Corners (V, 3) float32 of pieces of one object that stands on the plane.
 
     What lies below, and what hardly lies above the lowest, is moved onto the plane: the object
-    touches it with all of its base, and does not fall the last millimetres.
+    touches it with all of its base, and does not fall the last millimetres.  Photos do not show
+    the base, but that it stood there: so much more is moved, up to MOST_PRESSED of its height,
+    until it stands.
     """
-    corners = np.concatenate(pieces)
-    longest = float(np.ptp(corners, axis=0).max())
+    corners = np.concatenate(pieces).astype(np.float64)
+    step = SNAP * float(np.ptp(corners, axis=0).max())
     heights = [plane.height(piece.astype(np.float64)) for piece in pieces]
-    base = max(float(np.concatenate(heights).min()), 0.0) + SNAP * longest
-    out = []
-    for piece, height in zip(pieces, heights, strict=True):
-        down = np.where(height < base, height, 0.0)[:, None] * plane.normal
-        out.append((piece - down).astype(np.float32))
-    return out
+    every = np.concatenate(heights)
+    low = max(float(every.min()), 0.0)
+    top = max(low + MOST_PRESSED * (float(every.max()) - low), low + step)
+    base = low + step
+    while True:
+        out = []
+        for piece, height in zip(pieces, heights, strict=True):
+            down = np.where(height < base, height, 0.0)[:, None] * plane.normal
+            out.append((piece - down).astype(np.float32))
+        if base >= top or stands(out, plane):
+            return out
+        base = min(base + step, top)
+
+
+def stands(pieces: Sequence[np.ndarray], plane: Plane) -> bool:
+    """Whether what pieces (V, 3) have on the plane carries them when it leans by LEANS."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    corners = np.concatenate(pieces).astype(np.float64)
+    height = plane.height(corners)
+    flat = corners[np.abs(height) < ON_BASE * np.ptp(corners, axis=0).max()] @ plane.axes().T
+    try:
+        edges = ConvexHull(flat).equations  # (E, 3) outward normals
+    except (QhullError, ValueError):
+        return False
+    middle = middle_of(pieces)
+    inside = -(edges[:, :2] @ (plane.axes() @ middle) + edges[:, 2]).max()
+    return bool(inside >= np.tan(np.radians(LEANS)) * plane.height(middle[None])[0])
+
+
+def middle_of(pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """(3,) metres: the centre of mass of the hulls of pieces (V, 3), what they share twice."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    total, moment = 0.0, np.zeros(3)
+    for piece in pieces:
+        corners = piece.astype(np.float64)
+        try:
+            faces = corners[ConvexHull(corners).simplices]  # (F, 3, 3)
+        except (QhullError, ValueError):
+            continue
+        inner = corners.mean(0)
+        volume = np.abs(np.linalg.det(faces - inner))  # of tetrahedra, times 6
+        total += volume.sum()
+        moment += volume @ ((inner + faces.sum(axis=1)) / 4)
+    return moment / total if total > 0 else np.concatenate(pieces).mean(0)

@@ -5,23 +5,28 @@ What made an object says nothing of it: a wrong mask confirms itself.  docs/benc
 how the figure goes with the truth.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy import sparse
 from scipy.ndimage import label as pieces_of
+from scipy.spatial import cKDTree
 
+from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.label_pictures import LabelPictures
-from shapeshift.decomposition.masks.anchor_walk import nodes_of
+from shapeshift.decomposition.masks.anchor_walk import Nodes, nodes_of
 from shapeshift.decomposition.masks.pixel_walk import walk_together
 from shapeshift.decomposition.masks.segmenter import Prompt
 from shapeshift.decomposition.masks.work_photos import WorkPhoto, work_photos
 from shapeshift.decomposition.segment_scene import ObjectJudgement, Segmented, SegmentedPart
 from shapeshift.decomposition.shown import ShownAnchors
+from shapeshift.decomposition.upright_scene import planes_under
 from shapeshift.decomposition.walk_objects import ON_PLANE, heat_of, heights_of
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.model import AnchorModel, BadFile, SplatLayers
+from shapeshift.runtime_models.stop import Stop
 from shapeshift.scene.captures.capture import Capture
 
 MOST_VIEWS, BEST = 5, 3  # that are asked; that count: masks made afresh fail, too, here and there
@@ -97,33 +102,48 @@ def judge(
     """
     tallies = {part.spec.label: AskedTally() for part in parts if part.rows}
     views = views_to_ask(photos, used)
+    seconds: dict[int, float] = {}
     if views and tallies:
-        ask(device, model, views, tallies)
+        eyes = np.array([photo.view.world_from_eye.position for photo in views])
+        nodes = nodes_of(model, eyes.mean(0).astype(np.float32))
+        ask(device, model, views, nodes, tallies)
+        seconds = second_things(model, parts, nodes)
     names = {part.spec.label: part.spec.name for part in parts}
-    found = []
-    for part in parts:
-        tally = tallies.get(part.spec.label, AskedTally())
-        agreement, doubt = tally.agreement(), ""
-        if part.pixels < FEW:
-            agreement, doubt = np.nan, f"too little seen: {part.pixels:,.0f} pixels"
-        elif not tally.ious:
-            doubt = "no other photo shows it"
-        else:
-            doubt = doubt_of(tally, names)
-        found.append(ObjectJudgement(part.spec.name, agreement, len(tally.ious), doubt))
-    return tuple(found)
+    return tuple(
+        judgement(
+            part,
+            tallies.get(part.spec.label, AskedTally()),
+            seconds.get(part.spec.label, 0.0),
+            names,
+        )
+        for part in parts
+    )
+
+
+def judgement(
+    part: SegmentedPart, tally: AskedTally, second: float, names: dict[int, str]
+) -> ObjectJudgement:
+    """second: what part of the object is another thing; names: of all objects, by label."""
+    agreement, doubt = tally.agreement(), ""
+    if part.pixels < FEW:
+        agreement, doubt = np.nan, f"too little seen: {part.pixels:,.0f} pixels"
+    elif not tally.ious:
+        doubt = "no other photo shows it"
+    else:
+        doubt = "; ".join(filter(None, (doubt_of(tally, names), TWO if second else "")))
+        agreement *= 1 - second  # no more than that of it is the one thing
+    return ObjectJudgement(part.spec.name, agreement, len(tally.ious), doubt)
 
 
 def ask(
     device: Device,
     model: AnchorModel | SplatLayers,
     views: Sequence[WorkPhoto],
+    nodes: Nodes,
     tallies: dict[int, AskedTally],
 ) -> None:
     """Adds to the tallies what each view says; masks are made there by a walk over its pixels."""
     shown, drawn = ShownAnchors(device, model), LabelPictures(device, model)
-    eyes = np.array([photo.view.world_from_eye.position for photo in views])
-    nodes = nodes_of(model, eyes.mean(0).astype(np.float32))
     for photo in views:
         labels = drawn.label_map(photo.view, photo.stop.x)
         boxes = {k: box for k in tallies if (box := box_of(labels == k)) is not None}
@@ -155,6 +175,124 @@ def doubt_of(tally: AskedTally, names: dict[int, str]) -> str:
     if said:
         return max(said)[1]
     return "other photos show it otherwise" if low else ""
+
+
+# Two things that are marked as one come out as one in every photo.  The scene itself parts them: in
+# two halves, each of its own hue and to one side, that hardly touch and both reach down to what
+# carries them.  A thing with a label or a handle, or with a shade on a stem, fails at one of these.
+
+TWO = "may be two things side by side"
+MOST_NODES, LEAST_NODES = 1500, 40  # of an object, among which halves are looked for
+NEAR = 10  # neighbours of an anchor
+ROUNDS = 25  # of expectation and maximization
+LEAST_HALF = 0.12  # of the anchors
+STANDS = 0.22  # of the object's height, to which the feet of both halves reach
+FOOT, TOP = 3, 98  # percent of heights
+DARK = 0.06  # of 1: colours so dark have no hue
+HUES = 0.4  # logarithms of ratios of red, green and blue, by which the halves differ
+TOUCH = 0.03  # what links between the halves count, a root of the smaller one's anchors
+MIXED = 0.165  # above which they are one: pairs have at most .146, single things .18 and more
+
+
+def second_things(
+    model: AnchorModel | SplatLayers, parts: Sequence[SegmentedPart], nodes: Nodes
+) -> dict[int, float]:
+    """By label what part of the object's anchors is another thing, of those that may be two."""
+    columns = color_columns(model.stops)
+    labels = model.labels
+    if columns is None or labels is None:
+        return {}
+    found = {}
+    for label, plane in planes_under(model, parts).items():
+        at = np.flatnonzero(labels[nodes.rows] == label)
+        at = at[:: len(at) // MOST_NODES + 1]
+        colors = nodes.colors[at][:, columns]
+        finite = np.isfinite(colors).all(1)
+        second = second_thing(nodes.means[at][finite], colors[finite], plane)
+        if second > 0:
+            found[label] = second
+    return found
+
+
+def color_columns(stops: Sequence[Stop]) -> slice | None:
+    """Where a node has the colours of the first stop that shows colours; None without one."""
+    at = 0
+    for stop in stops:
+        if not stop.is_measured:
+            return slice(at, at + 3)
+        at += 1
+    return None
+
+
+def second_thing(places: np.ndarray, colors: np.ndarray, plane: Plane) -> float:
+    """The smaller half's share of an object that may be two things; 0: it is one.
+
+    places (N, 3) metres, colors (N, 3) 0..1; plane: what the object stands on.
+    """
+    if len(places) < LEAST_NODES:
+        return 0.0
+    height = plane.height(places)
+    least = STANDS * float(np.percentile(height, TOP))
+    logs = np.log(colors + DARK)
+    hues = logs[:, [0, 2]] - logs[:, 1:2]  # (N, 2), the same in light and shadow
+    at = cKDTree(places).query(places, NEAR + 1)[1][:, 1:]
+    edges = np.repeat(np.arange(len(places)), NEAR), at.ravel()
+    best, share = MIXED, 0.0
+    for half in halves_of(places, hues, edges):
+        small = int(min(half.sum(), (~half).sum()))
+        if not small >= LEAST_HALF * len(half):
+            continue
+        feet = [np.percentile(height[side], FOOT) for side in (half, ~half)]
+        apart = np.linalg.norm(hues[half].mean(0) - hues[~half].mean(0))
+        touch = (half[edges[0]] != half[edges[1]]).sum() / (2 * NEAR * np.sqrt(small))
+        mixed = 2 - parted(hues, half) - parted(places, half) + TOUCH * touch
+        if max(feet) <= least and apart >= HUES and mixed < best:
+            best, share = mixed, small / len(half)
+    return share
+
+
+def halves_of(
+    places: np.ndarray, hues: np.ndarray, edges: tuple[np.ndarray, np.ndarray]
+) -> Iterator[np.ndarray]:
+    """(N,) bool each: what is not joined to the largest piece, and pairs of Gaussians of hue and
+    place, begun at the median along each axis of the hues and of the places.
+    """
+    count = len(places)
+    links = sparse.coo_array((np.ones(len(edges[0])), edges), shape=(count, count))
+    pieces = sparse.csgraph.connected_components(links, directed=False)[1]
+    yield pieces != np.bincount(pieces).argmax()
+    centered = places - places.mean(0)
+    size = max(float(np.linalg.norm(centered.std(0))), 1e-12)
+    points = np.concatenate([hues, centered / size], axis=1)  # (N, 5)
+    for columns in (hues - hues.mean(0), centered):
+        for axis in np.linalg.svd(columns, full_matrices=False)[2]:
+            along = columns @ axis
+            share = (along > np.median(along)).astype(float)
+            for _ in range(ROUNDS):
+                odds = log_density(points, share) - log_density(points, 1 - share)
+                share = 1 / (1 + np.exp(-np.clip(odds, -50, 50)))
+            yield share > 0.5
+
+
+def log_density(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(N,) of points (N, C) in the Gaussian that weights (N,) make of them, times their part."""
+    total = max(float(weights.sum()), 1e-9)
+    away = points - weights @ points / total
+    spread = (weights[:, None] * away).T @ away / total + 2e-3 * np.eye(points.shape[1])
+    squares = np.einsum("nc,cd,nd->n", away, np.linalg.inv(spread), away)
+    return np.log(total / len(points)) - (squares + np.linalg.slogdet(spread)[1]) / 2
+
+
+def parted(points: np.ndarray, half: np.ndarray) -> float:
+    """0.5 to 1: how often one of a half lies further along than one of the other, in the direction
+    that parts them best (Fisher 1936); points (N, C), half (N,) bool.
+    """
+    one, other = points[half], points[~half]
+    spread = np.cov(one.T) + np.cov(other.T)
+    spread += 1e-6 * max(float(np.trace(spread)), 1e-12) * np.eye(points.shape[1])
+    rank = (points @ np.linalg.solve(spread, one.mean(0) - other.mean(0))).argsort().argsort()
+    wins = rank[half].sum() - len(one) * (len(one) - 1) / 2
+    return float(wins / (len(one) * len(other)))
 
 
 def views_to_ask(photos: Sequence[WorkPhoto], used: set[Path]) -> list[WorkPhoto]:

@@ -25,6 +25,7 @@ from shapeshift.runtime_models.model import (
     SplatLayers,
     is_antialiased,
 )
+from shapeshift.runtime_models.program import program
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.pose import View
 
@@ -53,7 +54,7 @@ class ViewEvidence:
         if not isinstance(model, AnchorModel | SplatLayers):
             raise BadFile(
                 "a Scaffold-GS model's splats depend on the eye, so no label stays with them; "
-                "export it as plain splats, or train one with `launch.py train`."
+                f"export it as plain splats, or train one with `{program()} train`."
             )
         self._device, self._model = device, model
         self._x: tuple[Controls] | None = None

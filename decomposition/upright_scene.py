@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.decomposition.completion.plane import AnchorLooks, Plane, looks_of, support_plane
-from shapeshift.decomposition.segment_scene import Segmented
+from shapeshift.decomposition.segment_scene import Segmented, SegmentedPart
 from shapeshift.runtime_models.model import AnchorModel, SplatLayers
 from shapeshift.runtime_models.parts import find_label, part_of
 from shapeshift.runtime_models.shapes import four, three
@@ -28,15 +28,16 @@ EXTENT = (2, 98)  # percent of a thing's anchors, between which it is so long
 LEAST_OPACITY = 0.1  # of a splat, to be there at all
 
 
-def planes_under(found: Segmented) -> dict[int, Plane]:
+def planes_under(
+    model: AnchorModel | SplatLayers, parts: Sequence[SegmentedPart]
+) -> dict[int, Plane]:
     """What each object stands on, by label, in the model's frame."""
-    model = found.model
     assert model.labels is not None, "it is labelled"
     looks, labels = (
         (looks_of(model), model.labels) if isinstance(model, AnchorModel) else splat_places(model)
     )
     planes = {
-        p.spec.label: support_plane(looks, labels, p.spec.label) for p in found.parts if p.rows
+        p.spec.label: support_plane(looks, labels, p.spec.label) for p in parts if p.rows
     }
     return {label: plane for label, plane in planes.items() if isinstance(plane, Plane)}
 

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 # Called each time a device has been opened: the compiler in its driver takes signals over.
 opened: list[Callable[[], None]] = []
 GPU = "SHAPESHIFT_GPU"  # in the environment: which GPU, where several processes share them
+# Bytes of address space: where PoCL's threads and compiler find less, it ends the process or waits
+# for ever.  Opening takes 210 to 440 MB.
+ROOM = 450 << 20
 INSTALL = (
     "on Debian or Ubuntu run `apt-get install pocl-opencl-icd` (fastest on a CPU), elsewhere "
     f"`{sys.executable} -m pip install pocl-binary-distribution`, or install the driver of your GPU"
@@ -170,11 +173,30 @@ def _literal(value) -> str:
     return f"{value!r}f" if isinstance(value, float) else str(int(value))
 
 
+def refuse_little_room() -> None:
+    """Raises NoMemory where a limit leaves this process too little to open a device in."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if most == resource.RLIM_INFINITY:
+        return
+    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    if most - taken < ROOM:
+        raise NoMemory(
+            f"OpenCL wants {ROOM >> 20} MB of address space, and of the {most >> 20} MB that this "
+            f"process may have {max(most - taken, 0) >> 20} are left; raise the limit (ulimit -v)."
+        )
+
+
 def open_device(kind: str | None = None) -> Device:
     """The best OpenCL device: a GPU, else a CPU, the system's PoCL before the wheel's.
 
-    kind: "gpu" or "cpu" to insist on one.  Raises NoDevice.
+    kind: "gpu" or "cpu" to insist on one.  Raises NoDevice, of which NoMemory is one kind.
     """
+    if not _opened.cache_info().currsize:
+        refuse_little_room()
     import pyopencl as cl
 
     try:

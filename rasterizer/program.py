@@ -25,6 +25,9 @@ NAME = re.compile(r"(?<![\w.])[A-Za-z]\w*")  # those of compilers begin with _
 SCALARS = {"int": np.int32, "uint": np.uint32, "float": np.float32}  # that kernels take
 LOG_LINE = re.compile(r"(?:<[^>]*>|[^\s:]*\.cl):(\d+):(\d+)?")
 
+# Called with the name of each file of kernels or shaders before a compiler begins with it.
+compiling: list[Callable[[str], None]] = []
+
 Lines = list[tuple[str, int, str]]  # file, line number in it, text
 
 
@@ -95,6 +98,12 @@ def joined(lines: Lines) -> str:
     return "\n".join(text for _, _, text in lines) + "\n"
 
 
+def announce(name: str) -> None:
+    """Says to all who want to know that a compiler begins with a file."""
+    for each in compiling:
+        each(name)
+
+
 def build(context, path: Path, options: list[str]) -> dict:
     """Kernels by name of one file for `context`.  Raises BuildError.
 
@@ -104,6 +113,7 @@ def build(context, path: Path, options: list[str]) -> dict:
     import pyopencl as cl
 
     text, origins = read_source(path, GIVEN.findall(" ".join(options)))
+    announce(path.name)
     try:
         with warnings.catch_warnings():
             # pyopencl warns of every log that is not empty; that of NVIDIA never is.

@@ -14,6 +14,7 @@ from shapeshift.runtime_models.model import (
     Model,
     SplatLayers,
 )
+from shapeshift.runtime_models.program import program
 from shapeshift.runtime_models.shapes import three
 
 BACKGROUND = 0  # its label
@@ -45,7 +46,7 @@ def find_label(model: Model, part: int | str, where: str) -> int:
     labels = model.labels if isinstance(model, AnchorModel | SplatLayers) else None
     if labels is None:
         raise BadFile(
-            f"{where} has no labels of objects, so no parts; `launch.py segment` makes them."
+            f"{where} has no labels of objects, so no parts; `{program()} segment` makes them."
         )
     objects = model.objects if isinstance(model, AnchorModel) else ()
     label = part

@@ -26,6 +26,11 @@ def program() -> str:
     return f'{python} "{door}"' if os.name == "nt" else f"{python} {shlex.quote(door)}"
 
 
+def portable_program() -> str:
+    """The same for files that are read on other machines: no path of this one."""
+    return "shapeshift" if is_installed() else "python3 launch.py"
+
+
 def version() -> str:
     """As pyproject.toml says; installed, as the package's metadata does."""
     project = ROOT / "pyproject.toml"

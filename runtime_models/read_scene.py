@@ -34,6 +34,7 @@ from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, f
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.refit_encoding import encoding_findings
 from shapeshift.runtime_models.parts import splat_labels
+from shapeshift.runtime_models.program import program
 from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold, read_scaffold
 from shapeshift.runtime_models.splats.foreign_files import is_address, refusal
 from shapeshift.runtime_models.splats.formats import format_of, head_of
@@ -157,7 +158,7 @@ def nothing_to_show(folder: Path) -> str:
     """What is said of a folder without a scene; one of photos can become a scene."""
     places = (folder, *(p for p in folder.iterdir() if p.is_dir()))
     if any(p.suffix.lower() in PHOTOS for place in places for p in place.iterdir()):
-        command = shlex.join(["python3", "launch.py", "train", str(folder), "--out", "SCENE.shift"])
+        command = f"{program()} {shlex.join(['train', str(folder), '--out', 'SCENE.shift'])}"
         return f"{folder} holds photos and no scene; make one of them with `{command}`."
     return f"{folder} holds nothing to show; wanted is {KNOWN}."
 

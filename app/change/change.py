@@ -8,6 +8,7 @@ from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.runtime_models.program import program
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def run(options: Options) -> int:
     else:
         print_places(found.change, documents[0].origin)
     if options.out is not None:
-        say(f"written to {full(options.out)}; look: launch.py {full(options.out / 'layers')}")
+        say(f"written to {full(options.out)}; look: {program()} {full(options.out / 'layers')}")
     return 0
 
 

@@ -9,6 +9,7 @@ from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, say
+from shapeshift.runtime_models.program import portable_program
 
 if TYPE_CHECKING:
     from shapeshift.app.charts.chart_scene import ChartScene, Walk
@@ -179,7 +180,7 @@ def measure_rows(pricing, file, settings, pictures: bool) -> None:
 
 def command_line(options: Options) -> str:
     """What makes these rows again, with file names alone: they are read on other machines."""
-    words = ["python3 launch.py chart", *(path.name for path in options.scenes)]
+    words = [portable_program(), "chart", *(path.name for path in options.scenes)]
     plain = Options()
     for name in ("cameras", "size", "drawing", "context", "frames", "x", "mode"):
         value = getattr(options, name)

@@ -11,6 +11,7 @@ from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import DrawingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, print_json, say
+from shapeshift.runtime_models.program import portable_program
 
 if TYPE_CHECKING:
     from shapeshift.app.document import Document
@@ -129,7 +130,7 @@ def measure(work, options, quality_size: tuple[int, int]) -> dict:
 def command_line() -> str:
     """What was typed, with file names alone: rows are read on other machines."""
     words = [Path(w).name if os.sep in w else w for w in sys.argv[1:]]
-    return " ".join(["python3 launch.py", *words])
+    return " ".join([portable_program(), *words])
 
 
 def check_counts(options) -> None:

@@ -86,7 +86,7 @@ def run(options: Options) -> int:
     if options.encoding != "kept" and not package:
         raise UsageError("--encoding is of packages; name --out NAME.shift, or leave it out.")
     if options.out.suffix.lower() == LEVELS_ENDING:
-        raise UsageError(f"--out {options.out}: levels of detail are written by `launch.py lod`.")
+        raise UsageError(f"--out {options.out}: levels of detail are written by `{program()} lod`.")
     if options.for_ != "any" and not page:
         raise UsageError(
             "--for is of pages; name --out NAME.html or .zip, or --web, or leave it out."

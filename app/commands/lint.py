@@ -11,6 +11,7 @@ from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after
 from shapeshift.app.scene_files import open_scene_file
 from shapeshift.app.terminal import open_console, print_json
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.program import program
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def uneven(model, file: str) -> tuple:
         f"between two stops a step of the slider by 0.01 changes the picture {step:.1f} times as "
         f"much as an even one would, {EVEN_ENOUGH:g} times are smooth"
     )
-    done = f"shown as it is; `launch.py export {file} --out NEW.shift` gives it an even pace"
+    done = f"shown as it is; `{program()} export {file} --out NEW.shift` gives it an even pace"
     return (Finding(what, 0, done, file=file, repaired=False),)
 
 

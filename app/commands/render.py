@@ -73,7 +73,7 @@ class Options(DrawingOptions):
     """By which the opacity of every splat is multiplied, 0 to 1."""
     foveation: Literal["off", "low", "medium", "high"] = "off"
     """Draw all pixels only within 35 (low), 25 or 15 degrees of straight on, and a quarter of them
-    beyond, as launch.py vr --foveation does: to see and measure it without a headset."""
+    beyond, as `vr --foveation` does: to see and measure it without a headset."""
     drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
     """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
     context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"

@@ -72,6 +72,7 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.decomposition.segment_steps import note_of, write_report
     from shapeshift.app.progress import working
     from shapeshift.decomposition.masks.specs import read_specs
     from shapeshift.decomposition.segment_scene import scores_of
@@ -95,10 +96,9 @@ def run(options: Options) -> int:
         print_tables(found, scores)
     tell_gaps(found)
     if options.report is not None:
-        from shapeshift.app.decomposition.segment_steps import write_report
-
         write_report(device, found, options.report, options.overwrite)
         say(f"pictures in {full(options.report)}")
+    note_of(options.out).unlink(missing_ok=True)
     path = model_path(options, model)
     say(
         f"{full(options.out)} and {path.name} beside it; next: {program()} view {full(options.out)}"
@@ -118,7 +118,7 @@ def cut(
     """Writes the labelled model and the scene file; what was found, and what became of each label
     in the photos where a segmenter was asked.  Raises BadFile, UsageError.
     """
-    from shapeshift.app.decomposition.segment_steps import CompletionSettings, at_rest, completed
+    from shapeshift.app.decomposition import segment_steps as steps
     from shapeshift.app.errors import UsageError
     from shapeshift.decomposition.judge import judged
     from shapeshift.decomposition.segment_scene import named_objects, scene_of_parts, segment
@@ -134,11 +134,11 @@ def cut(
             lambda done, count: progress("evidence of photos", done, count),
         )  # fmt: skip
     else:
-        from shapeshift.app.decomposition.segment_steps import PromptSettings, find_by_prompts
-
         assert specs is not None, "refused before"
-        settings = PromptSettings(options.out, options.segmenter, options.photos, progress, notice)
-        found, counts = find_by_prompts(device, model, capture, specs, settings)
+        settings = steps.PromptSettings(
+            options.out, options.segmenter, options.photos, progress, notice
+        )
+        found, counts = steps.find_by_prompts(device, model, capture, specs, settings)
     if not any(part.rows for part in found.parts):
         raise UsageError("no object got any part of the scene; look at the label maps.")
     progress("asking other photos", 0, 1)
@@ -146,15 +146,18 @@ def cut(
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     planes: dict[int, Plane] = {}
-    how = CompletionSettings(options.out, options.downscale, options.shadows, progress, notice)
+    where = options.out, options.downscale, options.shadows
+    how = steps.CompletionSettings(*where, progress, notice)
     if options.complete:
-        file, found, planes = completed(device, file, found, capture, how)
-    file, told = upright_scene(file, found, capture.ups, planes or planes_under(found))
+        file, found, planes = steps.completed(device, file, found, capture, how)
+    planes = planes or planes_under(found.model, found.parts)
+    file, told = upright_scene(file, found, capture.ups, planes)
     for sentence in (*told, scale_sentence(found, capture.metres)):
         notice(sentence)
+    steps.begin_writing(options.out)
     write_model(found.model, path)
     if options.complete:
-        file, found = at_rest(file, found, how)
+        file, found = steps.at_rest(file, found, how)
     write_scene_file(file, options.out)
     return found, counts
 
@@ -209,7 +212,7 @@ def refuse_inputs(options: Options) -> None:
 
 
 def refuse_outputs(options: Options) -> None:
-    """Before any work.  Raises UsageError."""
+    """Before any work; what a run that was killed has left may be replaced.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.document.scene_file import ENDING, is_scene_file
 
@@ -224,19 +227,20 @@ def refuse_outputs(options: Options) -> None:
     if options.complete:
         written.append(options.out.with_name(stem + ".colliders"))
     read = {options.scene.resolve(), options.capture.resolve()}
+    replaced = options.overwrite or options.out.with_name(stem + ".unfinished").is_file()
     for path in written:
         if path.resolve() in read:
             raise UsageError(f"{path} is read in this run; choose another --out.")
-        if path.exists() and not options.overwrite:
+        if path.exists() and not replaced:
             raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
     folder = options.report
     if folder is not None and folder.exists() and not folder.is_dir():
         raise UsageError(f"--report is {folder}, which is a file; name a folder.")
-    if folder is not None and folder.is_dir() and any(folder.iterdir()) and not options.overwrite:
+    if folder is not None and folder.is_dir() and any(folder.iterdir()) and not replaced:
         raise UsageError(f"{folder} holds files; choose another --report or add --overwrite.")
     if options.segmenter is not None:
         maps = options.out.with_name(stem + ".masks")
-        if maps.exists() and not (options.overwrite and maps.is_dir()):
+        if maps.exists() and not (replaced and maps.is_dir()):
             raise UsageError(f"{maps} exists; choose another --out or add --overwrite.")
 
 

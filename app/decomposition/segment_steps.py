@@ -117,6 +117,7 @@ def write_colliders(
     specs = [part.spec for part in found.parts if part.spec.label in made.proxies]
     proxies = {spec.name: made.proxies[spec.label] for spec in specs}
     paths = collider_paths([BACKGROUND, *proxies], out)
+    begin_writing(out)
     make_folders(out.parent, colliders_folder(out).name)
     for name, proxy in proxies.items():
         write_collider(proxy.collider.parts, proxy.collider.mesh, paths[name])
@@ -193,7 +194,11 @@ def sentences_of(made: "Assembled", names: dict[int, str]) -> Iterator[str]:
 #
 # Nothing is printed here: `notice` takes sentences, `progress` what is done now.
 
-MASKS, WORK = ".masks", ".masks.unfinished"  # after the scene file's name, without its ending
+MASKS, WORK, UNFINISHED = (
+    ".masks",
+    ".masks.unfinished",
+    ".unfinished",
+)  # after the scene file's name, without its ending
 
 
 @dataclass(frozen=True)
@@ -265,6 +270,7 @@ def find_by_segmenter(
     except KeyboardInterrupt:
         settings.notice(f"{full(work)} keeps the masks so far; the same command goes on there.")
         raise
+    begin_writing(settings.out)
     write_label_maps(labels, beside(settings.out, MASKS))
     pictures = [
         LabelledView(photo.view, photo.stop.x, here, photo.photo.path)
@@ -276,6 +282,20 @@ def find_by_segmenter(
     )  # fmt: skip
     discard_folder(work)
     return found, labels.counts
+
+
+def note_of(out: Path) -> Path:
+    """A file beside the scene file that is there from before the first of a run's files is written
+    until all are: what a killed run left is not refused as somebody's.
+    """
+    return beside(out, UNFINISHED)
+
+
+def begin_writing(out: Path) -> None:
+    from shapeshift.runtime_models.files.whole_file import write_whole
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(note_of(out), b"segment has not ended here; the same command goes on.\n")
 
 
 def digest_of(model: "AnchorModel | SplatLayers") -> str:

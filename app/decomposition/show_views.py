@@ -5,6 +5,7 @@ from dataclasses import replace
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.parts import BACKGROUND
+from shapeshift.runtime_models.program import program
 from shapeshift.scene.four_views import ALONE, FOUR_VIEWS, FULL, has_objects, parts_of, shown_as
 from shapeshift.scene.scene import Scene
 
@@ -30,8 +31,8 @@ def show_objects(scene: Scene, text: str, said: str = "--show") -> Scene:
         return scene
     if not has_objects(scene):
         raise UsageError(
-            f"{said} {show}: the scene has no objects beside a background; `launch.py segment` "
-            "makes them."
+            f"{said} {show}: the scene has no objects beside a background; "
+            f"`{program()} segment` makes them."
         )
     if name and not any(parts_of(obj) is not None for obj in scene.objects):
         objects = [obj for obj in scene.objects if obj.label != BACKGROUND]

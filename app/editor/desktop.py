@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import glfw
 import numpy as np
+from imgui_bundle import imgui
 
 from shapeshift.app.camera_files import camera_reading
 from shapeshift.app.charts.comparison import MOST_DB, Comparison
 from shapeshift.app.commands.compared import SceneSide, open_side
 from shapeshift.app.drawing import parse_size, read_cuts
 from shapeshift.app.editor.options import Options
+from shapeshift.app.editor.panels.empty_panel import draw_opening
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.journal import Journal
@@ -32,6 +34,7 @@ from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import DEMO, TOUCH, config_folder, data_folder, plain
 from shapeshift.app.streaming.refine import Refiner, show_level
+from shapeshift.rasterizer.program import compiling
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.program import program
@@ -41,6 +44,7 @@ from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Selector
 from shapeshift.scene.selectors.selector_texts import read_selector
 
+SAY_AGAIN_S = 0.5  # between two pictures of what a first start does
 WINDOW_SIZE = "1280x720"  # of the window, pixels at a text size of 1
 
 
@@ -70,9 +74,10 @@ def run(options: Options) -> int:
     )
     speak_first(settings, state.messages)
     with refiner, state.bodies, Window("Shapeshift", size, settings.text_size) as window:
-        with Renderer(window.ctx, drawing=options.drawing) as renderer:
-            if not options.size and options.screenshot is None:
-                window.stand(settings.place)
+        if not options.size and options.screenshot is None and window.stand(settings.place):
+            settings.panel_open = None  # that was for a larger window
+        card = OpeningCard(window, state.title if options.screenshot is None else None)
+        with card, Renderer(window.ctx, drawing=options.drawing) as renderer:
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, state, options, settings, own_files)
             if options.screenshot is None:
@@ -92,10 +97,68 @@ def run(options: Options) -> int:
                     lambda: Renderer(window.ctx, drawing=options.drawing),
                 )  # fmt: skip
             with two, viewer.parts.finder:
+                if options.screenshot is None:
+                    viewer.draw_splats()  # all that is compiled for them is
+                    viewer.is_drawn = True
+                card.end()
                 viewer.loop()
             viewer.shell.keep_place()
             viewer.objects.recovering.close()
     return 0
+
+
+class OpeningCard:
+    """What the window shows until it has a picture: no black one, and what is compiled, once.
+
+    Use it in a `with`; nothing else may draw into the window until `end`.
+    """
+
+    def __init__(self, window: Window, title: str | None) -> None:
+        """`title` None: nobody watches, so nothing is shown."""
+        self._window, self._title = window, title
+        self._began = self._shown = time.perf_counter()
+        self._count = 0  # compilers that have begun
+
+    def __enter__(self) -> "OpeningCard":
+        if self._title is not None:
+            compiling.append(self._compile)
+            self._show(said("Opening {name}", name=self._title or "Shapeshift"))
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """The window has its first picture; called again, nothing."""
+        if self._compile in compiling:
+            compiling.remove(self._compile)
+
+    def _compile(self, name: str) -> None:
+        """A start that finds everything compiled is over before there is something to read."""
+        self._count += 1
+        now = time.perf_counter()
+        if now - self._shown < SAY_AGAIN_S:
+            return
+        seconds = round(now - self._began)
+        done = {"name": name, "count": self._count, "seconds": seconds}
+        self._show(
+            said("Preparing this graphics device, once"),
+            said("Compiling {name} ({count} so far, {seconds} s)", **done),
+            said("The next start finds it ready."),
+        )
+
+    def _show(self, *lines: str) -> None:
+        window = self._window
+        window.wait(0.0)  # the desktop sees that the program is alive
+        for last in (False, True):  # ImGui knows the size of a text once it has laid it out
+            window.begin_frame(early=True)
+            draw_opening(window.logical_size, lines, window.ui_scale)
+            if not last:
+                imgui.end_frame()
+        window.screen().clear()
+        window.end_frame()
+        window.swap()
+        self._shown = time.perf_counter()
 
 
 def read_selectors(texts: tuple[str, ...], state: EditorState) -> tuple[Selector, ...]:

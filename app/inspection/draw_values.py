@@ -14,9 +14,10 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stops.stop_formula import read_formula, sources_of
 from shapeshift.scene.appearance import NEUTRAL
 from shapeshift.scene.cameras.framing import default_background
+from shapeshift.scene.inspection.emissivity import KELVINS
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import View, look_at
-from shapeshift.scene.scene import Scene
+from shapeshift.scene.scene import Scene, Tint
 
 if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer
@@ -148,6 +149,7 @@ def draw_values(renderer: "Renderer", measured: MeasuredScene, view: View) -> Va
         rgba = renderer.image(0).astype(np.float64)
         alpha, share = rgba[..., 3], rgba[..., :3] @ LUMINANCE
         share = share / np.maximum(alpha, 1e-6) if behind is None else share + (1 - alpha) * behind
+    owners = draw_owners(renderer, measured.scene, view) if measured.stop.unit in KELVINS else None
     assert measured.stop.value_range is not None  # measured_scene has seen to it
     low, high = measured.stop.value_range
     values = low + (high - low) * np.clip(share, 0, 1)
@@ -161,6 +163,9 @@ def draw_values(renderer: "Renderer", measured: MeasuredScene, view: View) -> Va
         float(np.percentile(away[known], 95)) if away is not None and known.any() else None,
         is_heat=measured.stop.kind != "values",
         digits=measured.stop.digits,
+        stop=measured.stop.name,
+        owner_names=tuple(obj.name for obj in measured.scene.objects),
+        owners=owners,
     )
 
 
@@ -173,7 +178,35 @@ def _by_formula(renderer: "Renderer", measured: MeasuredScene, view: View) -> Va
     return ValuePicture(
         view, values, np.where(np.isfinite(values), depth, np.nan), measured.stop.unit,
         measured.stop.value_range, is_heat=False, digits=measured.stop.digits, may_exceed=True,
+        stop=measured.stop.name,
     )  # fmt: skip
+
+
+BITS = 3  # of an object's number that one picture holds: red, green, blue
+
+
+def draw_owners(renderer: "Renderer", scene: Scene, view: View) -> np.ndarray:
+    """(H, W) int: the object that has most of a pixel, counted from 0; -1: less than half is
+    covered.  Objects are drawn in colours that are the digits of their numbers.
+    """
+    width, height = view.size
+    count = len(scene.objects)
+    if count == 1:
+        return np.zeros((height, width), int)
+    owners, alpha = np.zeros((height, width), int), np.zeros((height, width))
+    for shift in range(0, (count - 1).bit_length(), BITS):
+        tinted = []
+        for number, obj in enumerate(scene.objects):
+            color = np.array([number >> (shift + bit) & 1 for bit in range(BITS)], np.float32)
+            tinted.append(replace(obj, tint=Tint(color, 1.0)))
+        with renderer.levels.all_whole():
+            renderer.update(Scene(tuple(tinted)))
+            renderer.draw([view])
+            rgba = renderer.image(0).astype(np.float64)
+        alpha = rgba[..., 3]
+        bits = rgba[..., :BITS] > alpha[..., None] / 2
+        owners += (bits << (shift + np.arange(BITS))).sum(axis=2)
+    return np.where((alpha >= SOLID) & (owners < count), owners, -1)
 
 
 def depth_picture(renderer: "Renderer", scene: Scene, view: View) -> ValuePicture:

@@ -1,6 +1,6 @@
-"""Emissivity as `thermal` is told of it: of all that is seen, and of single marks."""
+"""Emissivity as `thermal` is told of it: of all that is seen, of single marks and objects."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -8,8 +8,12 @@ from typing import Protocol, TypeVar
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.air import Air
-from shapeshift.scene.inspection.camera_settings import camera_settings
-from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation, scale_of
+from shapeshift.scene.inspection.emissivity import (
+    Emission,
+    SurfaceRadiation,
+    camera_settings,
+    scale_of,
+)
 from shapeshift.scene.inspection.marks_file import MarksFile
 
 Made = TypeVar("Made")
@@ -53,7 +57,7 @@ def choose_emission(
             raise UsageError(f"--emissivity has {of_all:g} and {share:g} for all; one is wanted.")
         else:
             of_all = share
-    marked = own or any(mark.emissivity is not None for mark in file.marks)
+    marked = own or file.objects or any(mark.emissivity is not None for mark in file.marks)
     before = file.emission
     given = (
         of_all, options.reflected, options.taken_with, options.air, options.taken_air,
@@ -110,15 +114,24 @@ def as_set(camera: tuple[SurfaceRadiation, Air] | None) -> Emission:
     return Emission(surface, surface, air, air)
 
 
-def with_emissivities(file: MarksFile, own: dict[str, float]) -> MarksFile:
-    """The file with these marks' own emissivities.  Raises UsageError: there is no such mark."""
+def with_emissivities(
+    file: MarksFile, own: dict[str, float], objects: Sequence[str] = (), left_out: Collection = ()
+) -> MarksFile:
+    """The file with these emissivities of marks, else of the scene's objects, by name.
+
+    left_out: names of marks that could not be laid.  Raises UsageError: nothing is called so.
+    """
     names = [mark.name for mark in file.marks]
     for name in own:
-        if name not in names:
-            known = ", ".join(names) or "none"
-            raise UsageError(f"--emissivity: no mark is called '{name}'; there are {known}.")
+        if name not in (*names, *objects, *left_out):
+            known = ", ".join(dict.fromkeys((*names, *objects))) or "none"
+            raise UsageError(
+                f"--emissivity: no mark and no object is called '{name}'; there are {known}."
+            )
     marks = (replace(m, emissivity=own.get(m.name, m.emissivity)) for m in file.marks)
-    return replace(file, marks=tuple(marks))
+    of_objects = {n: share for n, share in own.items() if n in objects and n not in names}
+    kept = tuple((dict(file.objects) | of_objects).items())
+    return replace(file, marks=tuple(marks), objects=kept)
 
 
 def _why(number: str, error: ValueError) -> str:

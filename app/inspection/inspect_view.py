@@ -11,7 +11,6 @@ import numpy as np
 
 from shapeshift.app.document import Document
 from shapeshift.app.inspection.draw_values import MeasuredScene, draw_values
-from shapeshift.scene.inspection.emissivity import Emission
 from shapeshift.scene.inspection.length_marks import LengthMark
 from shapeshift.scene.inspection.marks import Isotherm, Mark, MarkReading, read_mark
 from shapeshift.scene.inspection.marks_file import MarksFile
@@ -22,7 +21,9 @@ if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer
 
 TABLE_DIGITS = 3  # of a value in a table for programs, more than for people
-COLUMNS = ("mark", "kind", "min", "mean", "max", "samples", "depth", "place")
+HERE = "this view"  # what it reads instead of a mark's value; empty: the same
+COLUMNS = ("mark", "kind", "min", "mean", "max", HERE, "samples", "depth", "place")
+OF_LAYING = ("laid", "min_here", "mean_here", "max_here", "here")  # columns of a table
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would compute what begins so
 
 
@@ -56,14 +57,11 @@ def inspect_view(
     measured: MeasuredScene,
     photo_stop: str,
     view: View,
-    emission: Emission | None = None,
 ) -> InspectedView:
-    """The values of a view, and its photo where photo_stop names a stop; nothing is marked yet.
-    emission: what corrects values, which are temperatures then.
+    """The values of a view as photographed, and its photo where photo_stop names a stop; nothing
+    is marked yet.
     """
     values = draw_values(renderer, measured, view)
-    if emission is not None:
-        values = values.corrected(emission)
     photo = None
     if photo_stop:
         renderer.update(document.placed(photo_stop, "the photo's stop").scene)
@@ -80,10 +78,10 @@ def first_photo(document: Document, measured: MeasuredScene) -> str:
 
 
 def with_readings(inspected: InspectedView, file: MarksFile, unit: str = "m") -> InspectedView:
-    """The view with what it reads of all marks, differences and isotherms of a file, and with its
-    lengths; unit: of these.
+    """The view with the values of surfaces as a file says, what it reads of all its marks,
+    differences and isotherms, and its lengths; unit: of these.
     """
-    values = inspected.values
+    values = file.of_surfaces(inspected.values)
     readings = {mark.name: read_mark(mark, values) for mark in file.marks}
     differences = tuple((a, b, readings[a].mean - readings[b].mean) for a, b in file.differences)
     isotherms = tuple(_isotherm(each, values) for each in file.isotherms)
@@ -115,10 +113,21 @@ def place_text(mark: Mark, origin: np.ndarray) -> str:
 
 def reading_row(reading: MarkReading, values: ValuePicture, origin: np.ndarray) -> tuple[str, ...]:
     """The cells of COLUMNS."""
-    texts = list(map(values.text, (reading.least, reading.mean, reading.most)))
+    figures = (reading.least, reading.mean, reading.most)
+    texts = [values.text(figure, reading.ends) for figure in figures]
     depth = f"{reading.depth_m:.3f} m" if np.isfinite(reading.depth_m) else "--"
     mark = reading.mark
-    return (mark.name, mark.kind, *texts, str(reading.samples), depth, place_text(mark, origin))
+    here = reading.hidden or now_text(reading, values)
+    place = place_text(mark, origin)
+    return (mark.name, mark.kind, *texts, here, str(reading.samples), depth, place)
+
+
+def now_text(reading: MarkReading, values: ValuePicture) -> str:
+    """What this view reads instead of the mark's value; "": the same, as people see it."""
+    if reading.mark.laid is None or not reading.samples:
+        return ""
+    now = values.text(reading.value_now, reading.now.ends)
+    return "" if now == values.text(reading.value, reading.ends) else now
 
 
 def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
@@ -139,7 +148,7 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
         "y_m",
         "z_m",
     )
-    rows.writerow((*head, "note", "emissivity"))
+    rows.writerow((*head, "note", "emissivity", *OF_LAYING))
     for number, each in enumerate(inspected):
         for reading in each.readings:
             mark = reading.mark
@@ -156,7 +165,10 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
                     number_cell(reading.depth_m),
                     *map(number_cell, mark.place + origin),
                     cell(mark.note),
-                    number_cell(used_emissivity(mark, each.values)),
+                    number_cell(used_emissivity(reading)),
+                    mark.laid.moment if mark.laid is not None else "",
+                    *(number_cell(f, digits) for f in now_figures(reading)),
+                    reading.hidden,
                 )
             )
         for a, b, value in each.differences:
@@ -173,16 +185,65 @@ def csv_text(inspected: Sequence[InspectedView], origin: np.ndarray) -> str:
                     *gone,
                     "",
                     "",
+                    *("",) * len(OF_LAYING),
                 )
             )
     return held.getvalue()
 
 
-def used_emissivity(mark: Mark, values: ValuePicture) -> float:
-    """By which a mark is read; NaN: its values are as photographed."""
-    if mark.emissivity is not None:
-        return mark.emissivity
-    return math.nan if values.emission is None else values.emission.surface.emissivity
+def readings_json(inspected: Sequence[InspectedView], file: MarksFile, origin: np.ndarray) -> dict:
+    """All readings for programs: values as they are, null where nothing is known."""
+    views = []
+    for each in inspected:
+        values = each.values
+        (column, row), most = values.hottest() if values.known.any() else ((0.0, 0.0), math.nan)
+        share = values.emissivity_at((column, row)) if np.isfinite(most) else None
+        views.append(
+            {
+                "unit": values.unit,
+                "marks": [_mark_json(reading, origin) for reading in each.readings],
+                "differences": [
+                    {"of": a, "less": b, "value": _known(v)} for a, b, v in each.differences
+                ],
+                "isotherms": [
+                    {"is": alarm.isotherm.words(values.unit), "share": alarm.share,
+                     "min": _known(alarm.least), "max": _known(alarm.most)}
+                    for alarm in each.isotherms
+                ],
+                "hottest": {"value": _known(most), "pixel": [column, row], "emissivity": share},
+            }
+        )  # fmt: skip
+    error = None if file.held_out is None else vars(file.held_out)
+    return {"views": views, "held_out": error}
+
+
+def _mark_json(reading: MarkReading, origin: np.ndarray) -> dict:
+    mark, names = reading.mark, ("min", "mean", "max")
+    figures = (reading.least, reading.mean, reading.most)
+    return {
+        "name": mark.name, "kind": mark.kind,
+        **{name: _known(value) for name, value in zip(names, figures, strict=True)},
+        "emissivity": _known(used_emissivity(reading)),
+        "laid": mark.laid.moment if mark.laid is not None else None,
+        "this_view": {n: _known(v) for n, v in zip(names, now_figures(reading), strict=True)}
+        | {"samples": reading.samples, "hidden": reading.hidden},
+        "place": [round(float(metres), 5) for metres in mark.place + origin], "note": mark.note,
+    }  # fmt: skip
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def now_figures(reading: MarkReading) -> tuple[float, float, float]:
+    """Least, mean and most of this view."""
+    return reading.now.least, reading.now.mean, reading.now.most
+
+
+def used_emissivity(reading: MarkReading) -> float:
+    """By which a mark's largest value is read; NaN: it is as photographed, or nothing is known."""
+    used = reading.emissivity if reading.emissivity is not None else reading.mark.emissivity
+    return math.nan if used is None else used
 
 
 def profile_csv(reading: MarkReading, unit: str, digits: int = 1) -> str:

@@ -28,6 +28,7 @@ from shapeshift.scene.inspection.marks import (
 )
 from shapeshift.scene.inspection.marks_file import (
     MarksFile,
+    laid,
     marks_path,
     moved_marks,
     read_marks_file,
@@ -78,21 +79,32 @@ def open_marks(options: MarkOptions) -> tuple[Path, MarksFile]:
 
 def with_new_marks(
     options: MarkOptions, file: MarksFile, inspected: InspectedView, document: Document
-) -> MarksFile:
-    """The file's marks in the scene's own metres, with those of the options; one of the same name
-    is replaced.  Raises UsageError.
+) -> tuple[MarksFile, dict[str, str]]:
+    """The file's marks in the scene's own metres, with those of the options, laid in this view; one
+    of the same name is replaced.  And by name, why marks of the options lie nowhere: they are left
+    out.  Raises UsageError: all of them do, or one is no mark.
     """
     marks = {mark.name: mark for mark in moved_marks(file, -document.origin).marks}
-    bounds = document.bounds()
+    bounds, left_out, asked = document.bounds(), {}, 0
     for kind in KINDS:
         for text in getattr(options, kind):
-            mark = make_mark(kind, text, marks, inspected.values, document.origin, bounds)
-            marks[mark.name] = mark
+            asked += 1
+            taken = (*marks, *left_out)
+            try:
+                mark = make_mark(kind, text, taken, inspected.values, document.origin, bounds)
+            except NowhereError as error:
+                left_out[error.name] = str(error)
+                continue
+            marks[mark.name] = laid(mark, inspected.values)
+    if left_out and len(left_out) == asked:
+        raise UsageError(" ".join(left_out.values()))
     if len(marks) > MOST_MARKS:
         raise UsageError(f"{len(marks):,} marks are too many; at most {MOST_MARKS:,} fit one file.")
     pairs = list(file.differences)
     for text in options.difference:
         first, _, second = (word.strip() for word in text.partition(","))
+        if first in left_out or second in left_out:
+            continue
         for name in (first, second):
             if name not in marks:
                 known = ", ".join(marks) or "none"
@@ -102,7 +114,16 @@ def with_new_marks(
         pairs.append((first, second))
     isotherms = tuple(dict.fromkeys((*file.isotherms, *choose_isotherms(options))))
     pairs = list(dict.fromkeys(pairs))
-    return replace(file, marks=tuple(marks.values()), differences=tuple(pairs), isotherms=isotherms)
+    found = tuple(marks.values())
+    return replace(file, marks=found, differences=tuple(pairs), isotherms=isotherms), left_out
+
+
+class NowhereError(UsageError):
+    """A mark that lies where nothing of the scene is."""
+
+    def __init__(self, name: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.name = name
 
 
 def choose_isotherms(options: MarkOptions) -> list[Isotherm]:
@@ -123,11 +144,17 @@ def choose_isotherms(options: MarkOptions) -> list[Isotherm]:
     return found
 
 
-def with_remarks(file: MarksFile, remarks: Sequence[str], photos: Sequence[str]) -> MarksFile:
+def with_remarks(
+    file: MarksFile, remarks: Sequence[str], photos: Sequence[str], left_out: Collection[str] = ()
+) -> MarksFile:
     """The file with the notes and photos of NAME=TEXT and NAME=FILE; "NAME=" takes one away.
 
-    Raises UsageError, BadFile, one sentence.
+    left_out: names of marks that could not be laid.  Raises UsageError, BadFile, one sentence.
     """
+    remarks, photos = (
+        [text for text in texts if not text.startswith(tuple(f"{name}=" for name in left_out))]
+        for texts in (remarks, photos)
+    )
     for text in remarks:
         mark, note = _of_mark(file, text, "--remark")
         file = _with(file, replace(mark, note=name_line(note.strip()) if note.strip() else ""))
@@ -226,13 +253,14 @@ def make_mark(
             return _in_pixels(kind, name, numbers, picture)
         mark = _in_metres(kind, name, np.array(numbers), picture, origin)
     except ValueError as error:
-        raise UsageError(str(error)) from None
+        raise NowhereError(name, str(error)) from None
     centre, radius = bounds
     if not np.linalg.norm(mark.place - centre) <= OUTSIDE * radius:
         x, y, z = centre + origin
-        raise UsageError(
+        raise NowhereError(
+            name,
             f"{kind} {name} lies outside of the scene, which is {radius:.3g} m about "
-            f"{x:.3g},{y:.3g},{z:.3g}; move it."
+            f"{x:.3g},{y:.3g},{z:.3g}; move it.",
         )
     return mark
 

@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.app.inspection.draw_values import MeasuredScene
 from shapeshift.app.inspection.inspect_view import (
     COLUMNS,
+    HERE,
     InspectedView,
     csv_text,
     profile_csv,
@@ -41,11 +42,14 @@ def print_readings(
     console = open_console(stderr=False)
     unit = measured.stop.unit
     for number, each in enumerate(shown):
-        table = Table(*COLUMNS[:-1])
-        table.add_column(COLUMNS[-1], overflow="fold")  # to be typed again
-        for reading in each.readings:
-            row = reading_row(reading, each.values, origin)
-            table.add_row(*map(Text, row))
+        rows = [reading_row(reading, each.values, origin) for reading in each.readings]
+        shown_columns = [n for n, name in enumerate(COLUMNS)
+                         if name != HERE or any(row[n] for row in rows)]  # fmt: skip
+        table = Table()
+        for n in shown_columns:  # a place is to be typed again
+            table.add_column(COLUMNS[n], overflow="fold" if COLUMNS[n] == "place" else "ellipsis")
+        for row in rows:
+            table.add_row(*(Text(row[n]) for n in shown_columns))
         if len(shown) > 1:
             console.print(Text(f"view {number}"))
         if each.readings:
@@ -73,19 +77,17 @@ def correction_line(values: ValuePicture, emission: Emission) -> str:
 def summary_lines(inspected: InspectedView) -> list[str]:
     """Differences, isotherms and the hottest place of a view."""
     values = inspected.values
-    lines = [f"{a} less {b}: {values.text(value, False)}" for a, b, value in inspected.differences]
+    lines = [f"{a} less {b}: {values.text(value)}" for a, b, value in inspected.differences]
     for each in inspected.isotherms:
         least = f"{each.least:.{values.digits}f}"
-        ends = f", {least} to {values.text(each.most, False)}" if each.share else ""
+        ends = f", {least} to {values.text(each.most)}" if each.share else ""
         words = each.isotherm.words(values.unit)
         lines.append(f"{words}: {100 * each.share:.2f} % of what is seen{ends}")
     if values.known.any():
-        (column, row), value = values.hottest()
         word = "hottest" if values.is_heat else "highest"
-        lines.append(f"{word}: {values.text(value)} at pixel {column:g},{row:g}")
+        lines.append(f"{word}: {place_line(values, *values.hottest())}")
         if not values.is_heat:
-            (column, row), value = values.lowest()
-            lines.append(f"lowest: {values.text(value)} at pixel {column:g},{row:g}")
+            lines.append(f"lowest: {place_line(values, *values.lowest())}")
     else:
         lines.append("nothing is covered by a half in this view")
     if values.emission is not None:
@@ -96,6 +98,15 @@ def summary_lines(inspected: InspectedView) -> list[str]:
             "0 to 1.7) away from its colours"
         )
     return lines
+
+
+def place_line(values: ValuePicture, pixel: tuple[float, float], value: float) -> str:
+    """A pixel's value, with its emissivity where that is its own."""
+    line = f"{values.text(value, values.ends_at(pixel))} at pixel {pixel[0]:g},{pixel[1]:g}"
+    share, emission = values.emissivity_at(pixel), values.emission
+    if share is None or emission is None or share == emission.surface.emissivity:
+        return line
+    return f"{line}, of emissivity {share:g}"
 
 
 def three_pictures(inspected: InspectedView, scale: ColorScale) -> list[tuple[str, np.ndarray]]:

@@ -7,14 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.renderer.colors.palette import palette_values
-from shapeshift.scene.inspection.marks import FACES, Isotherm, MarkReading
+from shapeshift.scene.inspection.marks import FACES, OUTSIDE, Isotherm, MarkReading
 from shapeshift.scene.inspection.value_picture import ValuePicture
 
 NOTHING = 0.16  # grey of pixels without a value
 ALARMS = {"above": (1.0, 0.15, 0.1), "below": (0.1, 0.45, 1.0), "between": (0.2, 0.85, 0.3)}
 ALARM_SHARE = 0.7  # of an alarm's colour over the photo
 DIMMED = 0.45  # of the photo beside it, where there is an alarm
-LINE, BEHIND = (255, 255, 255), (16, 16, 16)
+LINE, BEHIND, ASIDE = (255, 255, 255), (16, 16, 16), (170, 170, 170)
+# Where a label is tried, in its own widths and heights: the nearest first, below before above.
+LABEL_STEPS = np.array(
+    sorted(
+        ((x, y) for x in (0, -1, 1) for y in range(-12, 13)),
+        key=lambda at: (abs(at[0]) * 3 + abs(at[1]), -at[1]),
+    ),
+    np.float64,
+)
 AUTO = (1.0, 99.0)  # percentiles between which --auto shows
 BAR_PART, BAR_LEAST = 28, 14  # the scale bar is a part of the width, or so many pixels
 
@@ -84,29 +92,63 @@ def with_marks(
     draw = ImageDraw.Draw(drawn)
     height = max(10, drawn.height // 36)  # pixels of a letter
     font = letters(height)
-    taken: list[tuple[float, float, float, float]] = []  # boxes of names
+    labels: list[tuple[str, str, float]] = []  # of a mark, beside it in grey, pixels of the first
+    corners, sizes = [], []
     for reading in readings:
-        if not reading.samples:
+        if reading.hidden == OUTSIDE or not (reading.samples or np.isfinite(reading.value)):
             continue
         outline = outline_of(reading, picture, height)
-        for color, width in ((BEHIND, 3), (LINE, 1)):
+        if not np.all(np.isfinite(np.concatenate(outline))):
+            continue  # behind the eye, in whole or in part
+        for color, width in ((BEHIND, 3), (LINE if reading.samples else ASIDE, 1)):
             for line in outline:
                 draw.line([tuple(p) for p in line], fill=color, width=width)
-        value = reading.most if reading.mark.kind != "spot" else reading.mean
-        text = drawable(f"{reading.mark.name} {value:.{picture.digits}f}", height)
-        wide = draw.textlength(text, font) + 4
-        corner = np.concatenate(outline).max(axis=0) + 2
-        left = min(max(corner[0], 0), drawn.width - wide)
-        top = min(max(corner[1], 0), drawn.height - height - 6)
-        while any(
-            left < r and left + wide > a and top < d and top + height + 4 > t
-            for a, t, r, d in taken
-        ):
-            top += height + 5  # under the name that is there
-        taken.append((left, top, left + wide, top + height + 4))
-        draw.rectangle(taken[-1], fill=BEHIND)
+        digits, now = picture.digits, reading.value_now
+        text = drawable(f"{reading.mark.name} {reading.value:.{digits}f}", height)
+        aside = reading.hidden or f"{now:.{digits}f}"
+        aside = "" if text.endswith(f" {aside}") else drawable(f" {aside}", height)
+        wide = draw.textlength(text, font)
+        labels.append((text, aside, wide))
+        corners.append(np.concatenate(outline).max(axis=0) + 2)
+        sizes.append((wide + draw.textlength(aside, font) + 4, height + 4))
+    for label, place, size in zip(
+        labels, label_places(corners, sizes, drawn.size), sizes, strict=True
+    ):
+        if place is None:
+            continue
+        (left, top), (text, aside, wide) = place, label
+        draw.rectangle((left, top, left + size[0], top + size[1]), fill=BEHIND)
         draw.text((left + 2, top + 1), text, fill=LINE, font=font)
+        draw.text((left + 2 + wide, top + 1), aside, fill=ASIDE, font=font)
     return np.asarray(drawn, np.float32) / 255
+
+
+def label_places(
+    corners: Sequence[np.ndarray], sizes: Sequence[tuple[float, float]], room: tuple[int, int]
+) -> list[tuple[float, float] | None]:
+    """Left upper corners of labels that do not overlap and lie in the room (w, h): each as near as
+    may be to where it is wanted, the first ones nearest; None: there is no room for it.
+    """
+    taken = np.zeros((0, 4))  # left, top, right, bottom
+    places: list[tuple[float, float] | None] = []
+    for corner, (wide, high) in zip(corners, sizes, strict=True):
+        most = np.array([room[0] - wide - 1, room[1] - high - 1])
+        if not (most >= 0).all():
+            places.append(None)
+            continue
+        first = np.clip(corner, 0, most)
+        tried = first + LABEL_STEPS * (wide + 2, high + 2)
+        tried = tried[np.logical_and.reduce((tried >= 0) & (tried <= most), axis=1)]
+        low, end = tried[:, None], tried[:, None] + (wide + 1, high + 1)  # (c, 1, 2)
+        apart = (end <= taken[:, :2]) | (low >= taken[:, 2:])  # (c, taken, 2)
+        free = np.array([bool(each.any(axis=1).all()) for each in apart])
+        if not free.any():
+            places.append(None)
+            continue
+        left, top = tried[int(np.argmax(free))]
+        taken = np.append(taken, [[left, top, left + wide + 1, top + high + 1]], axis=0)
+        places.append((float(left), float(top)))
+    return places
 
 
 def outline_of(reading: MarkReading, picture: ValuePicture, size: int) -> list[np.ndarray]:
@@ -125,7 +167,7 @@ def outline_of(reading: MarkReading, picture: ValuePicture, size: int) -> list[n
     if mark.kind == "line":
         return [pixels[np.isfinite(pixels).all(axis=1)]]
     if not np.isfinite(pixels).all():
-        return [np.array([reading.hottest, reading.hottest])]
+        return [np.array([reading.hottest or (np.nan, np.nan)] * 2)]
     edge_on = _rectangle(pixels)
     return [edge_on] if edge_on is not None else [pixels[[*face, face[0]]] for face in FACES]
 

@@ -22,7 +22,7 @@ from shapeshift.app.inspection.outputs import summary_lines, three_pictures
 from shapeshift.app.inspection.pictures import ColorScale, scale_ticks
 from shapeshift.runtime_models.files.plain_text import json_text, one_line
 from shapeshift.runtime_models.model import Stop
-from shapeshift.runtime_models.program import is_installed
+from shapeshift.runtime_models.program import portable_program
 from shapeshift.scene.cameras.camera_list import CameraList, moved
 from shapeshift.scene.cameras.own_cameras import own_rows
 from shapeshift.scene.inspection.mark_photos import photo_pixels
@@ -40,7 +40,7 @@ VALUES_WORDS = (
     "of the range."
 )
 NO_ERROR = "The error of these values was not measured; --capture CAPTURE measures it."
-TEXT_COLUMNS = ("mark", "length", "kind", "note")  # of tables; the others are figures
+TEXT_COLUMNS = ("mark", "length", "kind", "note", "this view")  # of tables; the others are figures
 SMALL_PX = 480  # a mark's own photo is no wider
 JUMP = 8.0  # times the usual step along a line: it goes from one surface to another
 PROFILE_SIZE, PROFILE_EDGES = (640, 170), (56, 10, 10, 28)  # px; left, right, top, bottom
@@ -115,7 +115,7 @@ class InspectionReport:
 
     def command(self, cameras_name: str) -> str:
         """What opens the scene where the first view is, in the folder where both files lie."""
-        program = "shapeshift" if is_installed() else "python3 launch.py"
+        program = portable_program()
         scene, stop, cameras = map(shlex.quote, (self.scene, self.stop, cameras_name))
         at = f" --x {stop}" if self.stop else ""
         return f"{program} view {scene}{at} --camera {cameras}"
@@ -145,6 +145,11 @@ def report_of(
         notes = [f"{mark.name}: {mark.note}" for mark in marks if mark.note]
         own = [mark for mark in marks if mark.emissivity is not None]
         notes += [f"{mark.name}: emissivity {mark.emissivity:g}" for mark in own]
+        notes += [
+            f"{mark.name}: read {mark.laid.words()}, {camera_words(mark.laid.view, origin)}"
+            for mark in marks
+            if mark.laid is not None
+        ]
         pictures = three_pictures(each, scale)
         photos = mark_photos(marks) if not number else []  # once, they are of no view
         lines = summary_lines(each)
@@ -199,6 +204,8 @@ def settings_rows(
     emission = shown[0].values.emission
     if emission is not None:
         rows.append(("corrected for", emission.words(unit)))
+    for name, share in shown[0].values.by_object.items():
+        rows.append((f"emissivity of {name}", f"{share:g}"))
     for number, each in enumerate(shown):
         name = f"camera {number + 1}" if len(shown) > 1 else "camera"
         rows.append((name, camera_words(each.values.view, origin)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
-from shapeshift.app.terminal import say
+from shapeshift.app.terminal import print_json, say
 
 if TYPE_CHECKING:
     from shapeshift.app.document import Document
@@ -58,9 +58,9 @@ class Options(ReadingOptions):
     """An isotherm: all that is colder, or lower.  Default: none."""
     between: tuple[float, float] | None = None
     """An isotherm: all from one value to another.  Default: none."""
-    emissivity: Annotated[tuple[str, ...], Opt(metavar="[MARK=]NUMBER")] = ()
-    """Of what is seen, 0.1 to 1, or of one mark's surface, as Sp1=0.3: values become temperatures
-    of surfaces.  Default: what the file of marks has, else values are as photographed."""
+    emissivity: Annotated[tuple[str, ...], Opt(metavar="[NAME=]NUMBER")] = ()
+    """Of what is seen, 0.1 to 1, or of one mark's or object's surface, as Sp1=0.3: values become
+    temperatures of surfaces.  Default: as the file of marks has it, else values as photographed."""
     reflected: float | None = None
     """The temperature of what surfaces mirror.  Default: that of the file of marks, else 20."""
     taken_with: tuple[float, float] | None = None
@@ -100,6 +100,8 @@ class Options(ReadingOptions):
     report: tuple[Path, ...] = ()
     """A .html, one file that loads nothing from anywhere, or a .pdf, or both; the cameras go
     beside it as NAME.camera.json.  Default: none."""
+    json: bool = False
+    """Print all readings as JSON instead of tables."""
     save: bool = False
     """Keep all marks, differences, isotherms and the held-out error in the file of marks."""
     marks: Path | None = None
@@ -154,12 +156,14 @@ class Inspection:
     file: "MarksFile"  # marks, differences, isotherms, error: in metres of the document
     measured: "MeasuredScene"
     scale: "ColorScale"  # of its pictures
+    left_out: tuple[str, ...] = ()  # a sentence each of the marks that lie nowhere
 
 
 def run(options: Options) -> int:
     from shapeshift.app.camera_files import named_cameras
     from shapeshift.app.document import open_document
     from shapeshift.app.drawing import open_renderer, parse_size
+    from shapeshift.app.inspection.inspect_view import readings_json
     from shapeshift.app.inspection.mark_options import open_marks
     from shapeshift.app.inspection.outputs import print_readings
     from shapeshift.app.opening import open_capture
@@ -177,7 +181,12 @@ def run(options: Options) -> int:
     views = choose_views(options, document, cameras, size)
     with open_renderer(options.context, options.drawing) as (renderer, _):
         found = inspect(renderer, options, subject, views, capture, tracked)
-    print_readings(found.views, found.file, found.measured, document.origin)
+    for sentence in found.left_out:
+        say(f"Left out: {sentence}")
+    if options.json:
+        print_json(readings_json(found.views, found.file, document.origin))
+    else:
+        print_readings(found.views, found.file, found.measured, document.origin)
     write_all(options, found, path, document, say)
     return 0
 
@@ -218,17 +227,19 @@ def inspect(
     document, measured, file = subject.document, subject.measured, subject.file
     renderer.settings = replace(renderer.settings, background=document.background)
     shown = [
-        inspect_view(renderer, document, measured, subject.photo, view, file.emission)
+        inspect_view(renderer, document, measured, subject.photo, view)
         for view in one_by_one(views, "measuring")
     ]
-    new = with_new_marks(options, file, shown[0], document)
-    file = with_emissivities(new, subject.emissivities)
-    file = with_remarks(file, options.remark, options.mark_photo)
+    new, left_out = with_new_marks(options, file, shown[0], document)
+    objects = [obj.name for obj in document.scene.objects]
+    file = with_emissivities(new, subject.emissivities, objects, left_out)
+    file = with_remarks(file, options.remark, options.mark_photo, left_out)
     if capture is not None:
         error = held_out_error(renderer, measured, document, capture, one_by_one)
         file = replace(file, held_out=error)
     shown = [with_readings(each, file) for each in shown]
-    return Inspection(tuple(shown), file, measured, choose_scale(options, measured, shown))
+    scale = choose_scale(options, measured, shown)
+    return Inspection(tuple(shown), file, measured, scale, tuple(left_out.values()))
 
 
 def write_all(

@@ -20,6 +20,7 @@ from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Coarser
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, open_package
 from shapeshift.runtime_models.package.read_manifest import read_manifest
 from shapeshift.runtime_models.package.write_package import zip_files
+from shapeshift.runtime_models.program import program
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.scene.cameras.framing import orbit_path
 from shapeshift.scene.pose import View
@@ -141,7 +142,7 @@ def refuse_other(model: Model, path: Path) -> AnchorModel:
     if isinstance(model, BlockModel):
         raise UsageError(
             f"{path} is a scene in blocks, which has no levels; make one package of it with "
-            "`launch.py export`, and levels of that."
+            f"`{program()} export`, and levels of that."
         )
     if not isinstance(model, AnchorModel):
         raise UsageError(

@@ -20,6 +20,7 @@ from shapeshift.app.training.train_options import (
     with_settings,
 )
 from shapeshift.app.training.train_options import Options as TrainOptions
+from shapeshift.runtime_models.program import portable_program
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.left_options import LEFT
 from shapeshift.training.settings import TrainSettings
@@ -268,7 +269,7 @@ def rows_of(
 
 def command_line(options: Options) -> str:
     """The command without folders: what else is asked for stands in it, methods aside."""
-    words = ["python3 launch.py table", options.capture.resolve().name]
+    words = [portable_program(), "table", options.capture.resolve().name]
     named = {each.name: getattr(options, each.name) for each in fields(options)}
     places = ("cluster", "certificates", "gpus", "only", "resume")
     for unnamed in ("capture", "out", "methods", "asked", "splats", "settings", *places):

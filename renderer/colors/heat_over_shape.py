@@ -6,7 +6,6 @@ its broad brightness is not, so colours keep telling values.
 """
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from shapeshift.renderer.colors.palette import LUMINANCE
 
@@ -22,6 +21,8 @@ def heat_over_shape(heat: np.ndarray, photo: np.ndarray, detail: float = 1.0) ->
 
         both = ss.heat_over_shape(scene.render(x="Thermal"), scene.render(x="RGB"))
     """
+    from scipy.ndimage import gaussian_filter1d  # loaded when first wanted: half a second
+
     luminance = np.asarray(photo, np.float32) @ LUMINANCE.astype(np.float32)
     broad = luminance
     for axis in (0, 1):

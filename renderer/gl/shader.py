@@ -9,7 +9,7 @@ from typing import Any
 
 import moderngl
 
-from shapeshift.rasterizer.program import Lines, check_names, joined, read_lines
+from shapeshift.rasterizer.program import Lines, announce, check_names, joined, read_lines
 from shapeshift.renderer import layout
 
 SHADERS = Path(__file__).parents[1] / "shaders"
@@ -40,6 +40,7 @@ def compile_compute(ctx: moderngl.Context, name: str, **defines: Any) -> moderng
     """The program of one .comp file; ShaderError where it does not compile."""
     lines = read_shader(name, **defines)
     check_names(lines, (), ShaderError)
+    announce(name)
     try:
         return ctx.compute_shader(joined(lines))
     except moderngl.Error as failure:
@@ -53,6 +54,7 @@ def compile_program(
     stages = [read_shader(name, folder, **defines) for name in (vertex, fragment)]
     for lines in stages:
         check_names(lines, (), ShaderError)
+    announce(fragment)
     try:
         return ctx.program(vertex_shader=joined(stages[0]), fragment_shader=joined(stages[1]))
     except moderngl.Error as failure:

@@ -44,6 +44,7 @@ from shapeshift.renderer.streaming.pages import (
 )
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
+from shapeshift.runtime_models.program import program
 from shapeshift.runtime_models.splats.lod.parents import NodeTree, with_parents
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
@@ -86,7 +87,8 @@ class Stream:
         if not self.left > 0:
             raise BadFile(
                 f"objects without levels of detail have {fixed:,} splats and the budget is "
-                f"{self.budget:,}; give a larger --budget, or make levels of them: launch.py lod."
+                f"{self.budget:,}; give a larger --budget, or make levels of them, "
+                f"`{program()} lod`."
             )
         nodes, self.tree = self._nodes()
         made = {id(source): steps_of(source.levels) for source in self._sources}

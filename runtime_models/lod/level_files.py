@@ -34,7 +34,7 @@ MOST_LEVELS = 16
 MOST_COUNT = 1 << 31  # anchors or splats
 MOST_PIXELS = 1e6
 MOST_DB = 1000.0
-ADVICE = "write it again with `launch.py lod`"
+ADVICE = "write it again with the command lod"
 STORED = "float16"
 
 

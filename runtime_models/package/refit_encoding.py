@@ -19,6 +19,7 @@ from shapeshift.runtime_models.model import (
     Finding,
     Stop,
 )
+from shapeshift.runtime_models.program import program
 from shapeshift.runtime_models.stop_weights import StopBlend
 
 LEAST_GAP = 1 / 63  # of x between two stops; nearer ones would need more units than are allowed
@@ -47,8 +48,9 @@ def encoding_findings(model: AnchorModel, file: str) -> tuple[Finding, ...]:
         "photo has taught what they do"
     )
     done = (
-        "blends of its stops are shown instead; for programs that know of none `launch.py export "
-        f"{file} --encoding stops --out NEW.shift` writes it anew, the same at every stop"
+        "blends of its stops are shown instead; for programs that know of none "
+        f"`{program()} export {file} --encoding stops --out NEW.shift` writes it anew, the same "
+        "at every stop"
     )
     return (Finding(what, 0, done, file=file, repaired=False),)
 

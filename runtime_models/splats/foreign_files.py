@@ -27,7 +27,7 @@ class Foreign:
         return name.endswith(self.endings) if self.endings else head.startswith(self.marks)
 
 
-NO_SPLATS = "it holds no splats; train them from photos (launch.py train), or name their file"
+NO_SPLATS = "it holds no splats; train them from photos (the command train), or name their file"
 FOREIGN = (
     Foreign("a SuperSplat page", "save the scene in it as .ply or .sog: SuperSplat, File, Export",
             within=b"supersplat"),

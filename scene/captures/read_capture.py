@@ -10,6 +10,7 @@ import numpy as np
 
 from shapeshift.runtime_models.files.json_fields import Fields, read_json, saved_object
 from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.program import program
 from shapeshift.scene.cameras.colmap_cameras import camera_pose, other_lengths
 from shapeshift.scene.capture_files import find_file
 from shapeshift.scene.capture_found import FileTable
@@ -160,7 +161,7 @@ def how_to_pose(photos: Path) -> str:
         return f"the poses lie below, name that: {below}"
     if known := known_beside(photos):
         return known
-    command = shlex.join(["python3", "launch.py", "poses", str(photos), "--out", "CAPTURE"])
+    command = f"{program()} {shlex.join(['poses', str(photos), '--out', 'CAPTURE'])}"
     if blank := blank_beside(photos):
         return f"{blank}: export it again, or find the poses, `{command}`, and name that folder"
     return f"find them first, `{command}`, and name that folder then"

@@ -8,9 +8,13 @@ through and adds 1 - t of its own, at its temperature (air.py).
 """
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.plain_text import path_end
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.radiometric.number_photos import is_radiometric, read_radiometric
 from shapeshift.scene.inspection.air import NO_AIR, Air
 
 PLANCK = 14387.77 / 9.8  # kelvins: h c / (wavelength k), CODATA 2018, at 9.8 micrometres
@@ -57,10 +61,11 @@ class Emission:
     taken_air: Air = NO_AIR  # what the camera was set to: of this its values are free already
 
     def corrected(
-        self, values: np.ndarray, unit: str, emissivity: float | None = None
+        self, values: np.ndarray, unit: str, emissivity: float | np.ndarray | None = None
     ) -> np.ndarray:
         """(...) surface temperatures of values (...), both in `unit`; NaN where less arrives than
-        what is mirrored.  emissivity: of this surface alone.  Raises ValueError: no temperatures.
+        what is mirrored.  emissivity: of this surface alone, or (...) of each value's.  Raises
+        ValueError: no temperatures.
         """
         share = self.surface.emissivity if emissivity is None else emissivity
         mirrored = radiance(self.surface.reflected, unit)
@@ -121,3 +126,30 @@ def scale_of(unit: str) -> tuple[float, float]:
             f"the stop's values are in '{unit}'; emissivity is of temperatures in °C, °F or K."
         )
     return KELVINS[unit]
+
+
+def camera_settings(path: Path) -> tuple[SurfaceRadiation, Air]:
+    """The surface and the air for which a thermal camera made a radiometric JPEG's °C.
+
+    Raises BadFile, one sentence.
+    """
+    where = path_end(path)
+    if not path.is_file():
+        raise BadFile(f"{where}: there is no such photo.")
+    if not is_radiometric(path):
+        raise BadFile(f"{where} is no radiometric JPEG; one of a FLIR camera is wanted.")
+    told = read_radiometric(path)[1]
+    try:
+        surface = SurfaceRadiation(
+            float(told["emissivity"]), float(told["reflected_apparent_temperature"]) - ZERO_C
+        )
+        metres, humidity, kelvins = (
+            float(told[name])
+            for name in ("object_distance", "relative_humidity", "atmospheric_temperature")
+        )
+        return surface, Air(metres, 100 * humidity, kelvins - ZERO_C)
+    except (KeyError, TypeError, ValueError) as error:
+        raise BadFile(
+            f"{where}: what its camera was set to is not known ({error}); say it by --taken-with "
+            "and --taken-air."
+        ) from None

@@ -1,13 +1,19 @@
 """Marks: spots, lines, circles and boxes that stand in the world, and what a view reads at them."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from shapeshift.scene.inspection.emissivity import LEAST_EMISSIVITY, Emission
-from shapeshift.scene.inspection.value_picture import ValuePicture, world_points
+from shapeshift.scene.inspection.laying import Figures, Laying
+from shapeshift.scene.inspection.value_picture import (
+    HIDDEN_M,
+    HIDDEN_PART,
+    ValuePicture,
+    world_points,
+)
 
 PREFIX = {"spot": "Sp", "line": "Li", "circle": "Ci", "box": "Ar"}  # as thermographers number them
 MOST_MARKS = 1000
@@ -18,6 +24,8 @@ SLACK = 0.01  # part of a box's depth, and of that depth itself: its own pixels 
 Kind = Literal["spot", "line", "circle", "box"]
 KINDS: tuple[Kind, ...] = ("spot", "line", "circle", "box")
 Bound = Literal["above", "below", "between"]
+# Something stands before it; its surface is not there any more; it lies beside the picture.
+BEHIND, GONE, OUTSIDE = HIDDEN = ("hidden", "surface gone", "outside the view")
 # The corners of the six faces of a box: near ones 0 1 2 3 around, far ones 4 5 6 7 behind them.
 FACES = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 
@@ -38,6 +46,7 @@ class Mark:
     note: str = ""
     emissivity: float | None = None  # of its surface; None: as the picture has it
     photo: bytes = b""  # a small JPEG of it, for reports
+    laid: Laying | None = None  # what it read when it was laid: its value; None: as a view reads it
 
     def __post_init__(self) -> None:
         """Refuses what is none: ValueError, one sentence."""
@@ -87,16 +96,34 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class MarkReading:
-    """What one view reads at a mark, in the picture's unit; NaN where nothing is seen of it."""
+    """A mark's value, in the picture's unit, and what one view reads there.
+
+    least, mean, most are those of the laying where the mark has one, else this view's; NaN where
+    nothing is known.
+    """
 
     mark: Mark
     least: float = math.nan
     mean: float = math.nan
     most: float = math.nan
-    samples: int = 0  # pixels, of a line points
+    samples: int = 0  # of this view: pixels, of a line points
     depth_m: float = math.nan  # of its middle, along the view
     hottest: tuple[float, float] | None = None  # column, row of the largest value
     profile: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (n, 2) metres, value
+    now: Figures = field(default_factory=Figures)  # of this view
+    ends: tuple[float, float] = (-math.inf, math.inf)  # of what photos showed, at least and most
+    emissivity: float | None = None  # of its largest value; None: as photographed, or not known
+    hidden: str = ""  # why this view reads nothing: one of HIDDEN; "": it does, or it cannot know
+
+    @property
+    def value(self) -> float:
+        """The one that stands beside its name: of a spot its own, else the largest."""
+        return self.mean if self.mark.kind == "spot" else self.most
+
+    @property
+    def value_now(self) -> float:
+        """The same as this view reads it."""
+        return self.now.mean if self.mark.kind == "spot" else self.now.most
 
 
 @dataclass(frozen=True)
@@ -132,34 +159,108 @@ class Isotherm:
 
 
 def read_mark(mark: Mark, picture: ValuePicture) -> MarkReading:
-    """What a view reads at a mark.
+    """The value of a mark, and what a view reads there.
 
     A spot is read between the nearest pixels.  A circle or box has all pixels whose surface lies in
     it: what stands before or behind it does not count.  A mark with an emissivity of its own is
-    read at that; nothing is, where the values are no temperatures.
+    read at that (nothing is, where the values are no temperatures), another one at its surface's.
     """
-    if mark.emissivity is not None:
+    if mark.emissivity is None:
+        picture = picture.beneath or picture
+    else:
         if not picture.is_temperature:
             return MarkReading(mark)
-        picture = picture.corrected(picture.emission or Emission(), mark.emissivity)
+        corrected = picture.corrected(picture.emission or Emission(), mark.emissivity)
+        picture = replace(corrected, by_object=picture.by_object)
+    read = _read_now(mark, picture)
+    if not read.samples:
+        read = replace(read, hidden=_why_hidden(mark, picture))
+    if mark.laid is None or not mark.laid.is_of(picture):
+        return read
+    laid, share = mark.laid.figures(picture, mark.emissivity)
+    return replace(
+        read, least=laid.least, mean=laid.mean, most=laid.most, ends=laid.ends, emissivity=share
+    )
+
+
+def _read_now(mark: Mark, picture: ValuePicture) -> MarkReading:
     depth = float(picture.pixel_of(mark.place[None])[1][0])
     if mark.kind == "spot":
         value = float(picture.values_at(mark.points)[0])
-        seen = int(np.isfinite(value))
-        pixel = tuple(picture.pixel_of(mark.points)[0][0]) if seen else None
-        return MarkReading(mark, value, value, value, seen, depth, pixel)
+        if not np.isfinite(value):
+            return MarkReading(mark, depth_m=depth)
+        pixel = tuple(picture.pixel_of(mark.points)[0][0])
+        now = Figures(value, value, value, picture.ends_at(pixel))
+        return _reading_of(mark, picture, now, 1, depth, pixel)
     if mark.kind == "line":
         return _read_line(mark, picture, depth)
+    rows, columns = pixels_inside(mark, picture)
+    if not len(rows):
+        return MarkReading(mark, depth_m=depth)
+    values = picture.values[rows, columns]
+    depth = float(np.median(picture.depth_m[rows, columns]))
+    pixels = np.stack([columns, rows], axis=1) + 0.5
+    coldest, hottest = (tuple(pixels[int(f(values))]) for f in (np.argmin, np.argmax))
+    ends = (picture.ends_at(coldest)[0], picture.ends_at(hottest)[1])
+    now = Figures(float(values.min()), float(values.mean()), float(values.max()), ends)
+    return _reading_of(mark, picture, now, len(values), depth, hottest)
+
+
+def _reading_of(
+    mark: Mark, picture: ValuePicture, now: Figures, samples: int, depth_m: float,
+    hottest: tuple[float, float],
+) -> MarkReading:  # fmt: skip
+    share = mark.emissivity or picture.emissivity_at(hottest)
+    return MarkReading(
+        mark, now.least, now.mean, now.most, samples, depth_m, hottest, now=now, ends=now.ends,
+        emissivity=share,
+    )  # fmt: skip
+
+
+def pixels_inside(mark: Mark, picture: ValuePicture) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) rows and columns of what is known of a circle or a box."""
     rows, columns = _pixels_of(mark, picture)
     known = np.isfinite(picture.values[rows, columns] + picture.depth_m[rows, columns])
     inside = mark.holds(picture.points[rows, columns]) & known
-    if not inside.any():
-        return MarkReading(mark, depth_m=depth)
-    values = picture.values[rows, columns][inside]
-    row, column = np.argwhere(inside)[int(np.argmax(values))] + (rows.start, columns.start)
-    depth = float(np.median(picture.depth_m[rows, columns][inside]))
-    bounds = (float(values.min()), float(values.mean()), float(values.max()))
-    return MarkReading(mark, *bounds, len(values), depth, (column + 0.5, row + 0.5))
+    down, across = np.nonzero(inside)
+    return down + rows.start, across + columns.start
+
+
+def read_pixels(mark: Mark, picture: ValuePicture) -> np.ndarray:
+    """(n, 2) int columns and rows of all that a mark is read from."""
+    if mark.kind in ("circle", "box"):
+        return np.stack(pixels_inside(mark, picture)[::-1], axis=1)
+    height, width = picture.values.shape
+    places = picture.pixel_of(mark.points)[0][picture.sees(mark.points)]
+    around = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+    low = np.floor(places - 0.5).astype(int)
+    return np.clip(low[:, None] + around, 0, (width - 1, height - 1)).reshape(-1, 2)
+
+
+def _why_hidden(mark: Mark, picture: ValuePicture) -> str:
+    """One of HIDDEN; "": its surface is there, with nothing known of it."""
+    corners = mark.points
+    if mark.kind == "circle":
+        corners = box_around("", corners[0], np.full(3, mark.radius_m)).points
+    pixels, depths = picture.pixel_of(corners)
+    height, width = picture.values.shape
+    with np.errstate(invalid="ignore"):
+        within = np.all((pixels >= 0) & (pixels < (width, height)), axis=1)
+    if mark.kind in ("spot", "line"):
+        shown, near = picture.at(picture.depth_m, pixels)[within], depths[within]
+        far = near
+    else:
+        rows, columns = _pixels_of(mark, picture)
+        shown = picture.depth_m[rows, columns].ravel()
+        near, far = np.nanmin(depths, initial=np.inf), np.nanmax(depths, initial=-np.inf)
+    if not shown.size or not np.isfinite(depths).any():
+        return OUTSIDE
+    with np.errstate(invalid="ignore"):
+        before = shown < near * (1 - HIDDEN_PART) - HIDDEN_M
+        after = ~(shown <= far * (1 + HIDDEN_PART) + HIDDEN_M)
+    if not (before | after).any():
+        return ""
+    return BEHIND if before.sum() >= after.sum() else GONE
 
 
 def _pixels_of(mark: Mark, picture: ValuePicture) -> tuple[slice, slice]:
@@ -186,10 +287,13 @@ def _read_line(mark: Mark, picture: ValuePicture, depth: float) -> MarkReading:
     known = np.isfinite(values)
     if not known.any():
         return MarkReading(mark, depth_m=depth, profile=profile)
-    hot = mark.points[int(np.nanargmax(values))]
+    ends = mark.points[[int(np.nanargmin(values)), int(np.nanargmax(values))]]
     low, mean, high = (float(f(values)) for f in (np.nanmin, np.nanmean, np.nanmax))
-    pixel = tuple(picture.pixel_of(hot[None])[0][0])
-    return MarkReading(mark, low, mean, high, int(known.sum()), depth, pixel, profile)
+    coldest, hottest = (tuple(pixel) for pixel in picture.pixel_of(ends)[0])
+    bounds = (picture.ends_at(coldest)[0], picture.ends_at(hottest)[1])
+    now = Figures(low, mean, high, bounds)
+    found = _reading_of(mark, picture, now, int(known.sum()), depth, hottest)
+    return replace(found, profile=profile)
 
 
 # ---- Marks that are made in a picture: ValueError, one sentence, where nothing is under them.

@@ -1,6 +1,7 @@
 """NAME.marks.json beside a scene: marks, differences and isotherms, strictly read."""
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
@@ -19,6 +20,7 @@ from shapeshift.scene.inspection.emissivity import (
     Emission,
     SurfaceRadiation,
 )
+from shapeshift.scene.inspection.laying import Laying, laying_row, moved_laying, read_laying
 from shapeshift.scene.inspection.length_marks import (
     MOST_LENGTHS,
     LengthMark,
@@ -34,7 +36,10 @@ from shapeshift.scene.inspection.marks import (
     MOST_POINTS,
     Isotherm,
     Mark,
+    pixels_inside,
+    read_pixels,
 )
+from shapeshift.scene.inspection.value_picture import ValuePicture
 
 MARK = "shapeshift_marks"
 VERSION = 1
@@ -43,6 +48,7 @@ MOST_BYTES = 8 << 20
 DECIMALS = 5  # of metres: a hundredth of a millimetre
 ADVICE = "see docs/formats.md"
 MOST_VALUE = 1e6  # of an isotherm
+SHARE_WANTED = f"a number from {LEAST_EMISSIVITY:g} to 1"
 BOUNDS: dict[str, tuple[str, ...]] = {
     "above": ("low",),
     "below": ("high",),
@@ -80,6 +86,11 @@ class MarksFile:
     emission: Emission | None = None  # by which values are corrected; None: as photographed
     lengths: tuple[LengthMark, ...] = ()
     scale_error: float = 0.0  # one standard deviation of the scale, as a part of it
+    objects: tuple[tuple[str, float], ...] = ()  # names of objects with emissivities of their own
+
+    def of_surfaces(self, picture: ValuePicture) -> ValuePicture:
+        """A picture's values with all that is said of emissivity: the one way to what is shown."""
+        return surface_picture(picture, self.emission, self.marks, dict(self.objects))
 
     @property
     def scale(self) -> Scale:
@@ -89,6 +100,47 @@ class MarksFile:
     def named(self, name: str) -> Mark:
         """The mark of that name.  KeyError: there is none."""
         return {mark.name: mark for mark in self.marks}[name]
+
+
+def surface_picture(
+    picture: ValuePicture, emission: Emission | None, marks: Sequence[Mark] = (),
+    objects: Mapping[str, float] = {},
+) -> ValuePicture:  # fmt: skip
+    """What all doors read: values with each surface's own emissivity, which is a mark's where it
+    has one (a later mark lies above), else the object's (objects: by name), else the emission's.
+
+    Where nothing is said of emissivity, or values are no temperatures, they are as photographed.
+    """
+    plain = picture.as_photographed()
+    own = [mark for mark in marks if mark.emissivity is not None]
+    if not plain.is_temperature or (emission is None and not own and not objects):
+        return plain
+    known, share = emission or Emission(), np.full(plain.values.shape, np.nan)  # (H, W)
+    for number, name in enumerate(plain.owner_names):
+        if name in objects and plain.owners is not None:
+            share[plain.owners == number] = objects[name]
+    beneath = plain.corrected(known, share.copy() if np.isfinite(share).any() else None)
+    beneath = replace(beneath, by_object=dict(objects))
+    if not own:
+        return beneath
+    for mark in own:
+        columns, rows = read_pixels(mark, plain).T
+        share[rows, columns] = mark.emissivity
+    corrected = plain.corrected(known, share)
+    return replace(corrected, by_object=beneath.by_object, beneath=beneath)
+
+
+def laid(mark: Mark, picture: ValuePicture) -> Mark:
+    """The mark with what this picture reads as its value."""
+    plain = picture.as_photographed()
+    if mark.kind in ("spot", "line"):
+        pixels, values = plain.pixel_of(mark.points)[0], plain.values_at(mark.points)
+    else:
+        rows, columns = pixels_inside(mark, plain)
+        pixels, values = np.stack([columns, rows], axis=1) + 0.5, plain.values[rows, columns]
+    known = np.isfinite(values)
+    owners = plain.owner_at(pixels[known])
+    return replace(mark, laid=Laying.of(plain, values[known], owners))
 
 
 def marks_path(scene: Path) -> Path:
@@ -132,8 +184,11 @@ def marks_of(data: object, name: str) -> MarksFile:
     held_out = None if error is None else _held_out(error)
     emission = fields.optional_object("emission")
     corrected = None if emission is None else _emission(emission)
+    objects = tuple(_object(row) for row in fields.rows("objects", MOST_MARKS, "object"))
     fields.refuse_unknown_keys()
-    return MarksFile(marks, pairs, isotherms, scale, held_out, corrected, lengths, scale_error)
+    return MarksFile(
+        marks, pairs, isotherms, scale, held_out, corrected, lengths, scale_error, objects
+    )
 
 
 def _mark(row: Fields) -> Mark:
@@ -152,14 +207,22 @@ def _mark(row: Fields) -> Mark:
         raise row.error("points", f"a list of [x, y, z] in metres, at most {MOST_POINTS:,},")
     radius = row.number("radius", 0.0, "metres above 0", 0.0, FARTHEST) if kind == "circle" else 0.0
     note = row.line("note", "")
-    wanted = f"a number from {LEAST_EMISSIVITY:g} to 1"
     photo = read_photo(row)
-    share = row.number("emissivity", None, wanted, LEAST_EMISSIVITY, 1)
+    share = row.number("emissivity", None, SHARE_WANTED, LEAST_EMISSIVITY, 1)
+    when = row.optional_object("laid")
+    laid = None if when is None else read_laying(when)
     row.refuse_unknown_keys()
     try:
-        return Mark(name, kind, np.array(points, np.float64), radius, note, share, photo)
+        return Mark(name, kind, np.array(points, np.float64), radius, note, share, photo, laid)
     except ValueError as error:
         raise BadFile(f"{row.where}: {error}") from None
+
+
+def _object(row: Fields) -> tuple[str, float]:
+    name = row.line("name")
+    share = row.number("emissivity", wanted=SHARE_WANTED, low=LEAST_EMISSIVITY, high=1)
+    row.refuse_unknown_keys()
+    return name, share
 
 
 def _pair(row: Fields, names: list[str]) -> tuple[str, str]:
@@ -225,9 +288,7 @@ def _emission_row(emission: Emission) -> dict:
 
 
 def _surface(row: Fields) -> SurfaceRadiation:
-    share = row.number(
-        "emissivity", 1.0, f"a number from {LEAST_EMISSIVITY:g} to 1", LEAST_EMISSIVITY, 1
-    )
+    share = row.number("emissivity", 1.0, SHARE_WANTED, LEAST_EMISSIVITY, 1)
     mirrored = row.number(
         "reflected", 20.0, f"a value from {LEAST_C:g} to {MOST_C:g}", LEAST_C, MOST_C
     )
@@ -236,7 +297,10 @@ def _surface(row: Fields) -> SurfaceRadiation:
 
 def moved_marks(file: MarksFile, by: np.ndarray) -> MarksFile:
     """The same with every mark moved by (3,) metres: into another world's zero."""
-    marks = tuple(replace(mark, points=mark.points + by) for mark in file.marks)
+    marks = tuple(
+        replace(mark, points=mark.points + by, laid=moved_laying(mark.laid, by))
+        for mark in file.marks
+    )
     lengths = tuple(replace(each, points=each.points + by) for each in file.lengths)
     return replace(file, marks=marks, lengths=lengths)
 
@@ -250,6 +314,7 @@ def marks_rows(file: MarksFile) -> dict:
         row |= {"radius": round(float(mark.radius_m), 7)} if mark.kind == "circle" else {}
         row |= {"note": mark.note} if mark.note else {}
         row |= {"photo": photo_text(mark.photo)} if mark.photo else {}
+        row |= {"laid": laying_row(mark.laid)} if mark.laid is not None else {}
         marks.append(row | ({} if mark.emissivity is None else {"emissivity": mark.emissivity}))
     rows: dict = {MARK: VERSION, "marks": marks}
     rows["differences"] = [{"of": a, "less": b} for a, b in file.differences]
@@ -265,6 +330,8 @@ def marks_rows(file: MarksFile) -> dict:
         rows["held_out"] = vars(file.held_out)
     if file.emission is not None:
         rows["emission"] = _emission_row(file.emission)
+    if file.objects:
+        rows["objects"] = [{"name": name, "emissivity": share} for name, share in file.objects]
     if file.lengths:
         rows["lengths"] = [length_row(each) for each in file.lengths]
     return rows

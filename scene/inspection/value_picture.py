@@ -1,6 +1,7 @@
 """What a stop of values measures in a view: value and depth of each pixel, before any palette."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +36,13 @@ class ValuePicture:
     is_heat: bool = True  # its words: hottest and coldest, of others highest and lowest
     digits: int = 1  # of a value behind the decimal point, for people
     may_exceed: bool = False  # whether values lie beyond the range, which then is the palette's
+    stop: str = ""  # name of what is measured
+    owner_names: tuple[str, ...] = ()  # of objects
+    owners: np.ndarray | None = None  # (H, W) int: which of them is seen, -1 none; None: not known
+    # What `corrected` was given: (H, W) emissivity, NaN where it is that of `emission`; by object.
+    own_emissivity: np.ndarray | None = None
+    by_object: Mapping[str, float] = field(default_factory=dict)
+    beneath: "ValuePicture | None" = None  # without what single marks say; None: they say nothing
 
     @property
     def is_temperature(self) -> bool:
@@ -134,21 +142,55 @@ class ValuePicture:
         ray = ray / np.linalg.norm(ray)
         return across**2 * np.eye(3) + (along**2 - across**2) * np.outer(ray, ray)
 
-    def corrected(self, emission: Emission, emissivity: float | None = None) -> "ValuePicture":
-        """The same with the temperatures of surfaces; `emissivity`: of a surface of its own.
+    def corrected(
+        self, emission: Emission, emissivity: float | np.ndarray | None = None
+    ) -> "ValuePicture":
+        """The same with the temperatures of surfaces; `emissivity`: of a surface of its own, or of
+        each pixel, (H, W), NaN where the emission says it.
 
-        The range is what the photos' range stands for.  ValueError: values are no temperatures.
+        The range is what the photos' range stands for, of pixels by the emission's emissivity.
+        ValueError: values are no temperatures.
         """
         before = self.values if self.photographed is None else self.photographed
-        values = emission.corrected(before, self.unit, emissivity)
+        map_of = emissivity if isinstance(emissivity, np.ndarray) else None
+        share = emissivity
+        if map_of is not None:
+            share = np.where(np.isfinite(map_of), map_of, emission.surface.emissivity)
+        values = emission.corrected(before, self.unit, share)
         known = values[np.isfinite(values)]
         kept = self.photographed_range or self.value_range
-        low, high = emission.corrected(np.array(kept), self.unit, emissivity)
+        of_range = None if isinstance(emissivity, np.ndarray) else emissivity
+        low, high = emission.corrected(np.array(kept), self.unit, of_range)
         low = low if np.isfinite(low) else known.min(initial=high)  # colder than what is mirrored
         return replace(
             self, values=values, value_range=(float(low), float(high)), emission=emission,
-            photographed=before, photographed_range=kept,
+            photographed=before, photographed_range=kept, own_emissivity=map_of,
         )  # fmt: skip
+
+    def emissivity_at(self, pixel: tuple[float, float]) -> float | None:
+        """By which the value at a pixel (column, row) was made; None: it is as photographed."""
+        if self.emission is None:
+            return None
+        own = self.own_emissivity
+        share = np.nan if own is None else float(own[int(pixel[1]), int(pixel[0])])
+        return share if np.isfinite(share) else self.emission.surface.emissivity
+
+    def ends_at(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """What the ends of the photos' range stand for on the surface at a pixel."""
+        share, kept = self.emissivity_at(pixel), self.photographed_range
+        if self.own_emissivity is None or self.emission is None or kept is None:
+            return self.value_range
+        low, high = self.emission.corrected(np.array(kept), self.unit, share)
+        return (float(low) if np.isfinite(low) else -np.inf), float(high)
+
+    def owner_at(self, pixels: np.ndarray) -> np.ndarray:
+        """(N,) places in `owner_names` of what is seen at pixels (N, 2) of the picture; -1: none
+        that is known.
+        """
+        if self.owners is None:
+            return np.full(len(pixels), -1)
+        rows, columns = pixels[:, 1].astype(int), pixels[:, 0].astype(int)
+        return self.owners[rows, columns]
 
     def as_photographed(self) -> "ValuePicture":
         """The same without a correction."""
@@ -157,13 +199,12 @@ class ValuePicture:
         kept = self.photographed_range or self.value_range
         return replace(
             self, values=self.photographed, value_range=kept, emission=None, photographed=None,
-            photographed_range=None,
+            photographed_range=None, own_emissivity=None, by_object={}, beneath=None,
         )  # fmt: skip
 
-    def text(self, value: float, beside_range: bool = True) -> str:
-        """A value of it for people; beside_range: with < or > at an end of what photos showed."""
-        ends = self.value_range if beside_range and not self.may_exceed else None
-        return value_text(value, self.unit, ends, self.digits)
+    def text(self, value: float, ends: tuple[float, float] | None = None) -> str:
+        """A value of it for people; ends: of what photos showed, at which it has < or >."""
+        return value_text(value, self.unit, None if self.may_exceed else ends, self.digits)
 
     def lowest(self) -> tuple[tuple[float, float], float]:
         """The pixel (column, row) with the least value, and that; ValueError: none is known."""
@@ -201,6 +242,6 @@ def value_text(
     sign = ""
     if value_range is not None:
         low, high = value_range
-        near = SATURATED * (high - low)
+        near = SATURATED * (high - low) if np.isfinite(high - low) else 0.0
         sign = ">" if value >= high - near else "<" if value <= low + near else ""
     return f"{sign}{value:.{digits}f} {unit}".rstrip()

@@ -1,7 +1,7 @@
 """What a scene measures: degrees, depths, marks, lengths; from its values, never from colours."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, get_origin, get_type_hints
 
 import numpy as np
@@ -143,7 +143,7 @@ class InspectedScene(OpenedScene):
 
             for reading in scene.read_marks(): print(reading.mark.name, reading.mean)
         """
-        emission: Emission | None = None
+        file: MarksFile | None = None
         if marks is None and self.path is None:
             raise UsageError("this scene lies in no file, so no marks lie beside it; give them.")
         if marks is None or not isinstance(marks, Iterable) or isinstance(marks, str):
@@ -153,10 +153,13 @@ class InspectedScene(OpenedScene):
             else:
                 path = plain(marks)
             file = moved_marks(read_marks_file(path), -self.origin)
-            marks, emission = file.marks, file.emission
+            marks = file.marks
+        marks = tuple(marks)
         picture = self.values(camera, size, **choice)  # type: ignore[arg-type]  # as above
-        if emission is not None and picture.emission is None and picture.is_temperature:
-            picture = picture.corrected(emission)
+        kept = replace(file or MarksFile(), marks=marks)
+        if picture.emission is not None:  # what the call says stands above the file
+            kept = replace(kept, emission=picture.emission)
+        picture = kept.of_surfaces(picture)
         return tuple(read_mark(mark, picture) for mark in marks)
 
     def thermal(

@@ -36,6 +36,7 @@ def segment(
         refuse_outputs,
         straight_capture,
     )
+    from shapeshift.app.decomposition.segment_steps import note_of
     from shapeshift.decomposition.masks.specs import checked, read_specs
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.splats.plain_splats import Reading
@@ -66,4 +67,5 @@ def segment(
         options, specs, model, found, open_device(),
         progress or (lambda what, done, of: None), lambda sentence: None,
     )  # fmt: skip
+    note_of(options.out).unlink(missing_ok=True)
     return read_document(options.out, Reading())

@@ -78,6 +78,22 @@ def test_a_fault_of_ours_is_one_sentence_and_a_log(monkeypatch, capsys):
     log.unlink()
 
 
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("Unable to allocate 3.00 GiB"),
+        MemoryError(),
+        ImportError("libscipy.so: failed to map segment from shared object"),
+    ],
+)
+def test_no_room_is_no_fault_of_ours(monkeypatch, capsys, error):
+    fail_with(monkeypatch, error)
+    assert cli.main(["info", "x"]) == 2
+    text = capsys.readouterr().err
+    assert text.startswith("shapeshift info: this process got no more memory")
+    assert str(error) in text and "ulimit -v" in text and text.count("\n") == 1
+
+
 def test_a_display_that_gives_no_window_means_headless(monkeypatch, capsys):
     from shapeshift.renderer.gl.context import NoContext
 

@@ -57,7 +57,7 @@ def table_and_things(degrees: float, flat: bool = True, shelf: bool = False) -> 
 def cut(found: Segmented, *ups: Up):
     file = scene_of_parts(found, "room.ply", Path())
     file = replace(file, view=FirstView((0.0, 0.5, 2.0), (0.0, 0.0, 0.0)))
-    return upright_scene(file, found, ups, planes_under(found)), file
+    return upright_scene(file, found, ups, planes_under(found.model, found.parts)), file
 
 
 def places_of(file, found: Segmented, name: str) -> np.ndarray:

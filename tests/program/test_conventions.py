@@ -225,6 +225,27 @@ NOT_PRIVATE = {
 }
 
 
+def test_sentences_name_the_program_as_it_was_started():
+    """Installed by pip it is `shapeshift` and there is no launch.py: program.py alone knows."""
+    knows = {"runtime_models/program.py", "shapeshift/which_python.py"}  # the latter is launch.py's
+    said = []
+    for path in (path for folder in PRODUCT for path in sorted((ROOT / folder).rglob("*.py"))):
+        kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+        docs = {
+            id(node.body[0].value)
+            for node in nodes_of(path)
+            if isinstance(node, kinds) and node.body and isinstance(node.body[0], ast.Expr)
+        }
+        said += [
+            f"{file}:{node.lineno}"
+            for node in nodes_of(path)
+            if isinstance(node, ast.Constant) and isinstance(node.value, str)
+            and "launch.py" in node.value and id(node) not in docs
+            and (file := str(path.relative_to(ROOT))) not in knows
+        ]  # fmt: skip
+    assert not said, "f'{program()} ...' in place of 'launch.py ...'"
+
+
 def private_reaches() -> list[str]:
     """Places of tests that name a private attribute of something that the file did not make."""
     found = []

@@ -53,6 +53,26 @@ except NoDevice as error:
     assert "pip install pocl-binary-distribution" in message
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of address space are Linux's here")
+def test_little_address_space_is_a_sentence_before_the_driver_ends_the_process():
+    """With 40 MB left PoCL aborts in its first thread (exit -6, its own words)."""
+    code = """
+import resource
+from shapeshift.rasterizer.device import NoDevice, NoMemory, open_device
+taken = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (taken + (40 << 20), resource.RLIM_INFINITY))
+try:
+    open_device()
+except NoMemory as error:
+    print(error)
+resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+"""
+    run = python(code)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.count("\n") == 1 and run.stderr == ""
+    assert "OpenCL wants 450 MB of address space" in run.stdout and "ulimit -v" in run.stdout
+
+
 def test_a_kind_that_is_not_there_is_named():
     kind = "gpu" if device().kind == "cpu" else "cpu"
     try:

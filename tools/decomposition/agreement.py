@@ -4,9 +4,10 @@
 
 Each FOLDER is a capture with objects.json (boxes) and labels (true maps), and NAME.shift trained of
 it, in it or beside it; tools/synthetic/desk.py makes one.  The demo comes by itself, with boxes in
-the views that show most.  Objects are cut twice: as `segment` does, and wrong on purpose, each mask
-made alone and all that it encloses filled.  iou is that of the cut object in the true maps,
-agreement and doubt are what the table of `segment` shows.
+the views that show most.  Objects are cut three times: as `segment` does; wrong on purpose, each
+mask made alone and all that it encloses filled; and with the nearest other object, which is not
+listed, in its box.  iou is that of the cut object in the true maps, agreement and doubt are what
+the table of `segment` shows.
 """
 
 import argparse
@@ -57,7 +58,7 @@ from shapeshift.training.synthetic.workshop import dome  # noqa: E402
 from tools.synthetic.labels import LABELS, label_map  # noqa: E402
 
 COLUMNS = ("capture", "masks", "object", "iou", "agreement", "doubt")
-TOGETHER, ALONE = "together", "alone, filled"
+TOGETHER, ALONE, PAIR = "together", "alone, filled", "with an unlisted neighbour"
 SIZE, VIEWS, MARGIN = (384, 288), 16, 3  # of the demo's photos; pixels of a box around an object
 
 
@@ -107,6 +108,56 @@ def cut_wrong(
     return replace(right, model=with_labels(shown.model, labels, objects), parts=parts)
 
 
+Box = tuple[float, float, float, float]
+
+
+def boxes_of(specs: ObjectSpecs, photo: str, labels: np.ndarray | None) -> dict[int, Box]:
+    """Of each object in a photo, by label: its prompt's, else that of the true map (H, W)."""
+    boxes: dict[int, Box] = {}
+    for spec in specs.objects:
+        said = spec.prompts[0]
+        if said.photo == photo and said.box is not None:
+            boxes[spec.label] = said.box
+        elif labels is not None and (labels == spec.label).any():
+            rows, columns = np.nonzero(labels == spec.label)
+            boxes[spec.label] = (float(columns.min()), float(rows.min()),
+                                 float(columns.max() + 1), float(rows.max() + 1))  # fmt: skip
+    return boxes
+
+
+def gap(one: Box, other: Box) -> tuple[float, float]:
+    """Pixels between two boxes, 0 where they overlap, and between their middles."""
+    a, b = np.reshape(one, (2, 2)), np.reshape(other, (2, 2))
+    apart = np.maximum(np.maximum(a[0] - b[1], b[0] - a[1]), 0)
+    return float(np.linalg.norm(apart)), float(np.linalg.norm((a - b).mean(0)))
+
+
+def pairs_of(specs: ObjectSpecs, maps: dict[str, np.ndarray]) -> Iterator[ObjectSpecs]:
+    """Each two nearest in a prompted photo as one: the larger one's, with a box around both.
+
+    maps: the true label map (H, W) of photos, by file name without its ending.
+    """
+    done: set[frozenset[int]] = set()
+    for spec in specs.objects:
+        photo = spec.prompts[0].photo
+        boxes = boxes_of(specs, photo, maps.get(Path(photo).stem))
+        if len(boxes) < 2 or spec.label not in boxes:
+            continue
+        near = min(boxes.keys() - {spec.label}, key=lambda k: gap(boxes[k], boxes[spec.label]))
+        if frozenset((spec.label, near)) in done:
+            continue
+        done.add(frozenset((spec.label, near)))
+        corners = np.array([boxes[spec.label], boxes[near]])
+        sides = corners[:, 2:] - corners[:, :2]
+        box = tuple(map(float, (*corners[:, :2].min(0), *corners[:, 2:].max(0))))
+        larger = (spec.label, near)[int(np.argmax(sides.prod(1)))]
+        whose = next(o for o in specs.objects if o.label == larger)
+        other = next(o for o in specs.objects if o.label in (spec.label, near) and o is not whose)
+        prompt = PhotoPrompt(photo, (box[0], box[1], box[2], box[3]))
+        one = replace(whose, name=f"{whose.name} + {other.name}", prompts=(prompt,))
+        yield replace(specs, objects=(one,))
+
+
 def rows_of(
     device: Device, name: str, model: AnchorModel, capture: Capture, specs: ObjectSpecs, true: Path
 ) -> Iterator[tuple[str, str, str, float, float, str]]:
@@ -114,11 +165,14 @@ def rows_of(
     right = segment_by_walk(shown, photos, specs)
     pictures = read_pictures(true, capture, model, None)
     used = {picture.photo for picture in right.pictures if picture.photo is not None}
-    for how, found in ((TOGETHER, right), (ALONE, cut_wrong(shown, photos, specs, right))):
+    cuts = [(TOGETHER, right), (ALONE, cut_wrong(shown, photos, specs, right))]
+    maps = {picture.photo.stem: picture.labels for picture in pictures if picture.photo}
+    cuts += [(PAIR, segment_by_walk(shown, photos, pair)) for pair in pairs_of(specs, maps)]
+    for how, found in cuts:
         scores = scores_of(device, found, pictures)
         judged = judge(device, found.model, found.parts, photos, used)
         for score, one in zip(scores, judged, strict=True):
-            yield name, how, one.name, score.iou, one.agreement, one.doubt
+            yield name, how, one.name, round(score.iou, 3), round(one.agreement, 3), one.doubt
 
 
 def rank(rows: Sequence[tuple], how: str) -> str:
@@ -147,7 +201,7 @@ def main() -> None:
         specs = read_specs(folder / "objects.json")
         rows += rows_of(device, folder.name, model, capture, specs, folder / "labels")
     names = " ".join(folder.name for folder in options.captures)
-    ranks = "; ".join(rank(rows, how) for how in (TOGETHER, ALONE, "all"))
+    ranks = "; ".join(rank(rows, how) for how in (TOGETHER, ALONE, PAIR, "all"))
     with options.out.open("w", newline="") as file:
         file.write(f"# python tools/decomposition/agreement.py {names} --work WORK --out ")
         file.write(f"{options.out}\n# {device.platform}\n# Spearman: {ranks}\n")

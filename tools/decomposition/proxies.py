@@ -45,11 +45,11 @@ from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.colliders.collider import Making, collider_of_model  # noqa: E402
 from shapeshift.scene.pose import Pose  # noqa: E402
 from shapeshift.scene.world.physics import Physics  # noqa: E402
-from shapeshift.training.synthetic.tracer import Place, trace  # noqa: E402
 from shapeshift.training.synthetic.workshop import dome, things  # noqa: E402
 from tools.decomposition.surface_scores import (  # noqa: E402
     score_surfaces,
     surface_of,
+    surface_of_solids,
 )
 from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402
 
@@ -57,7 +57,6 @@ THINGS = ("mug", "can", "spanner", "screwdriver", "motor", "cabinet")
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 SECONDS, HZ = 2, 90
 MASS_KG = 0.3
-RAYS = 40_000
 FIELDS = (
     "thing", "proxy", "chosen", "pieces", "corners", "iou", "recall", "chamfer_mm", "f1",
     "hausdorff_mm", "moves_mm", "turns_deg", "again", "cpu_s",
@@ -67,18 +66,7 @@ FIELDS = (
 def true_surface(name: str) -> np.ndarray:
     """(N, 3) metres: where rays from all around first meet the thing alone."""
     solids = [solid for thing, group in things(False) for solid in group if thing == name]
-    here = Place.of(solids)
-    low = np.min([solid.centre - solid.shape.reach for solid in solids], axis=0)
-    high = np.max([solid.centre + solid.shape.reach for solid in solids], axis=0)
-    random = np.random.default_rng(0)
-    middle, radius = (low + high) / 2, np.linalg.norm(high - low)
-    towards = random.standard_normal((RAYS, 3))
-    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    aim = low + random.random((RAYS, 3)) * (high - low)
-    start = middle - radius * 1.5 * towards + (aim - middle)
-    distance, index = trace(here, start, towards)
-    hit = index >= 0
-    return start[hit] + distance[hit, None] * towards[hit]
+    return surface_of_solids(solids)
 
 
 def at_rest(parts, at: np.ndarray, floor_y: float) -> tuple[float, float, str]:

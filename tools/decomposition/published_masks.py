@@ -9,8 +9,10 @@ The photos are trained with their masks unused, so that the table and its cloth 
 
 import argparse
 import json
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +34,36 @@ def write_maps(masks: Path, work: Path) -> tuple[int, int]:
         for folder in ("true", "given") if i in given else ("true",):
             Image.fromarray(labels).save(work / folder / path.name)
     return len(given), len(paths)
+
+
+def prepare(data: Path, work: Path) -> None:
+    """WORK/tankard and WORK/plush: links to photos and poses, boxes, label maps, a training."""
+    from tools.decomposition.from_photos import CASES as REAL
+    from tools.decomposition.from_photos import objects_file
+
+    drawn = ROOT / "tests/fixtures/drawn_labels/plush"
+    for name, source, small in (("tankard", "maryrose_tankard", 4), ("plush", "plush_snowmiku", 3)):
+        folder = work / name
+        (folder / "truth").mkdir(parents=True, exist_ok=True)
+        for file in ("images", "masks", "cameras.json", "points3d.npz"):
+            if (data / source / file).exists() and not (folder / file).exists():
+                (folder / file).symlink_to(data / source / file)
+        first = dict(list(REAL[name].objects.items())[:1])  # the one that has label maps
+        objects_file(replace(REAL[name], objects=first), folder / "objects.json")
+        if name == "tankard":
+            write_maps(data / source / "masks", work / "maps")
+            shutil.copytree(work / "maps/true", folder / "truth/labels", dirs_exist_ok=True)
+            shutil.copytree(work / "maps/given", folder / "labels", dirs_exist_ok=True)
+        else:
+            shutil.copytree(drawn, folder / "truth/labels", dirs_exist_ok=True)
+            (folder / "labels").mkdir(exist_ok=True)
+            for path in sorted(drawn.glob("*.png"))[::2]:
+                shutil.copy(path, folder / "labels")
+        if not (folder / f"{name}.shift").exists():
+            words = ["train", str(folder), "--out", str(folder / f"{name}.shift"),
+                     "--masks", "ignore", "--seconds", "90", "--downscale", str(small)]  # fmt: skip
+            program = [sys.executable, "-P", str(ROOT / "shapeshift/__main__.py")]
+            subprocess.run([*program, *words], check=True)
 
 
 def main() -> None:

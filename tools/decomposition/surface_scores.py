@@ -1,5 +1,6 @@
 """Chamfer distance, F1 and Hausdorff distance between surfaces (OWD, Table 4.4)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,9 +8,11 @@ import numpy as np
 from shapeshift.scene.colliders.collider import Collider
 from shapeshift.scene.colliders.collider_pieces import hull_faces
 from shapeshift.scene.colliders.triangle_mesh import sample_faces
+from shapeshift.training.synthetic.tracer import Place, Solid, trace
 
 SAMPLES = 8000  # of a proxy's surface
 NEAR_M = 0.004  # metres: a point so near to the other surface is found, in F1
+RAYS = 40_000  # at a thing of which the rule is known
 WITHIN = 1e-4  # metres inside another piece, from which a sample is no surface
 
 
@@ -46,3 +49,17 @@ def score_surfaces(found: np.ndarray, true: np.ndarray, near_m: float = NEAR_M) 
     f1 = 2 * precision * recall / max(precision + recall, 1e-12)
     chamfer = (to_true.mean() + to_found.mean()) / 2
     return SurfaceScore(float(chamfer), f1, float(max(to_true.max(), to_found.max())))
+
+
+def surface_of_solids(solids: Sequence[Solid]) -> np.ndarray:
+    """(N, 3) metres: where rays from all around first meet a thing that stands alone."""
+    here = Place.of(solids)
+    low = np.min([solid.centre - solid.shape.reach for solid in solids], axis=0)
+    high = np.max([solid.centre + solid.shape.reach for solid in solids], axis=0)
+    random = np.random.default_rng(0)
+    radius = np.linalg.norm(high - low)
+    towards = random.standard_normal((RAYS, 3))
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    start = low + random.random((RAYS, 3)) * (high - low) - 1.5 * radius * towards
+    distance, index = trace(here, start, towards)
+    return (start + distance[:, None] * towards)[index >= 0]

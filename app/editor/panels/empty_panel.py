@@ -1,4 +1,4 @@
-"""What the window says while nothing is open: what can be dropped, and what else there is."""
+"""What the window says while it shows no scene: what can be dropped, or what it is doing first."""
 
 from imgui_bundle import imgui
 
@@ -49,3 +49,18 @@ def draw_empty(free: Box, ui_scale: float) -> tuple[Box, str]:
     box = theme.window_box()
     imgui.end()
     return box, clicked
+
+
+def draw_opening(size: tuple[float, float], lines: tuple[str, ...], ui_scale: float) -> None:
+    """A card in the middle of a window of `size`, logical pixels; the first line is its title."""
+    width = min(WIDTH * ui_scale, 0.94 * size[0])
+    imgui.set_next_window_pos(Vec(size[0] / 2, size[1] / 2), 0, Vec(0.5, 0.5))
+    imgui.set_next_window_size(Vec(width, 0))
+    flags = imgui.WindowFlags_
+    imgui.begin("##opening", None, flags.no_decoration | flags.no_move | flags.no_saved_settings)
+    imgui.push_text_wrap_pos(0)
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), lines[0])
+    for line in lines[1:]:
+        imgui.text_unformatted(line)
+    imgui.pop_text_wrap_pos()
+    imgui.end()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from shapeshift.app.editor.panels.panel import Section
 from shapeshift.app.editor.state.layout import Box
-from shapeshift.app.editor.window.shown import Beside, FrameRequest
+from shapeshift.app.editor.window.shown import FrameRequest, RightSide
 from shapeshift.app.editor.window.window import Event
 from shapeshift.scene.scene import Scene
 
@@ -30,7 +30,7 @@ class Hooks:
     # over: called once the splats are on the screen, before the overlay, in every frame
     over: list[Callable[[FrameRequest], None]] = field(default_factory=list)
     # beside: asked with the scene and the window's width for what is right of a line instead
-    beside: Callable[[Scene, int], Beside | None] = lambda scene, width: None
+    beside: Callable[[Scene, int], RightSide | None] = lambda scene, width: None
     # marks: called with ui_scale; over the picture, under the panel, not in saved pictures
     marks: list[Callable[[float], None]] = field(default_factory=list)
     # closing: asked when the window is to be closed; False = not yet

@@ -38,20 +38,68 @@ def place_of(handle: Any) -> Place | None:
     return (*glfw.get_window_pos(handle), *glfw.get_window_size(handle))
 
 
-def put_window(handle: Any, place: Place) -> None:
-    """Back to where it was; only its size where no monitor shows enough of that place any more."""
+def stand_window(handle: Any, place: Place | None, times: float) -> bool:
+    """Where it was before; without that as many times larger as its text is, in the middle.
+
+    Returns whether the desktop has less room than that takes, so that it is smaller.
+    """
+    if place is None:
+        grow_window(handle, times)
+        place = place_of(handle) or (0, 0, *glfw.get_window_size(handle))
+    return put_window(handle, place)
+
+
+def put_window(handle: Any, place: Place) -> bool:
+    """Back to where it was, as large as there is room now; True where that is smaller.
+
+    One that the monitors show whole, together, is left alone.  Else it goes onto the monitor that
+    shows most of it, or, where none shows enough for a hand to take it, onto the first.
+    """
     left, top, width, height = place
-    glfw.set_window_size(handle, width, height)
-    if tells_places() and any(_shows(monitor, place) for monitor in glfw.get_monitors()):
+    areas = {tuple(glfw.get_monitor_workarea(monitor)) for monitor in glfw.get_monitors()}
+    known = tells_places() and any(_shows(area, place) for area in areas)
+    if known and sum(_shared(area, place) for area in areas) >= width * height:
+        glfw.set_window_size(handle, width, height)
         glfw.set_window_pos(handle, left, top)
+        return False
+    first = glfw.get_primary_monitor()
+    if known:
+        area = max(areas, key=lambda area: _shared(area, place))
+    elif first:
+        area = tuple(glfw.get_monitor_workarea(first))
+    else:
+        return False
+    x, y, across, down = area
+    edges = glfw.get_window_frame_size(handle)  # left, top, right, bottom; 0 where nobody tells
+    wide = min(width, across - edges[0] - edges[2])
+    high = min(height, down - edges[1] - edges[3])
+    if not (wide >= LEAST_SEEN and high >= LEAST_SEEN):
+        return False  # no work area that anybody could mean
+    glfw.set_window_size(handle, wide, high)
+    if known:
+        right, low = x + across - edges[2] - wide, y + down - edges[3] - high
+        at = (min(max(left, x + edges[0]), right), min(max(top, y + edges[1]), low))
+        glfw.set_window_pos(handle, *at)
+    elif tells_places():
+        glfw.set_window_pos(handle, x + (across - wide) // 2, y + (down - high + edges[1]) // 2)
+    return wide < width or high < height
 
 
-def _shows(monitor: Any, place: Place) -> bool:
-    """Whether a monitor shows enough of the upper edge of a place for a hand to take it."""
+def _shows(area: Place, place: Place) -> bool:
+    """Whether a work area shows enough of the upper edge of a place for a hand to take it."""
     left, top, width, _ = place
-    x, y, across, down = glfw.get_monitor_workarea(monitor)
+    x, y, across, down = area
     wide = min(left + width, x + across) - max(left, x)
     return wide >= LEAST_SEEN and y <= top <= y + down - LEAST_SEEN
+
+
+def _shared(area: Place, place: Place) -> int:
+    """Square pixels of a place that an area of the desktop shows."""
+    left, top, width, height = place
+    x, y, across, down = area
+    wide = min(left + width, x + across) - max(left, x)
+    high = min(top + height, y + down) - max(top, y)
+    return max(wide, 0) * max(high, 0)
 
 
 def monitor_height(handle: Any) -> tuple[float, float]:
@@ -88,15 +136,10 @@ def _monitor_of(handle: Any) -> Any:
     """The monitor that most of a window lies on; under Wayland, which does not tell, the first."""
     if not tells_places():
         return glfw.get_primary_monitor()
-    left, top = glfw.get_window_pos(handle)
-    width, height = glfw.get_window_size(handle)
+    place = (*glfw.get_window_pos(handle), *glfw.get_window_size(handle))
 
     def shared(monitor: Any) -> int:
-        """Square pixels of the window that the monitor shows."""
-        x, y = glfw.get_monitor_pos(monitor)
         size = glfw.get_video_mode(monitor).size
-        across = min(left + width, x + size.width) - max(left, x)
-        down = min(top + height, y + size.height) - max(top, y)
-        return max(across, 0) * max(down, 0)
+        return _shared((*glfw.get_monitor_pos(monitor), size.width, size.height), place)
 
     return max(glfw.get_monitors(), key=shared, default=None)

@@ -19,7 +19,7 @@ STALE_S = 1.0  # between two measurements of the error of a kept order: each dra
 
 
 @dataclass(frozen=True)
-class Beside:
+class RightSide:
     """What is shown right of a line instead."""
 
     scene: Scene
@@ -36,7 +36,7 @@ class FrameRequest:
     view: View
     settings: RenderSettings
     moving: bool  # camera or control value: more frames will follow at once
-    beside: Beside | None = None  # None: the scene is shown in all of the window
+    beside: RightSide | None = None  # None: the scene is shown in all of the window
 
 
 class Shown:
@@ -74,7 +74,7 @@ class Shown:
         return fresh
 
     def _draw_two(
-        self, request: FrameRequest, beside: Beside, key: tuple, screen: moderngl.Framebuffer,
+        self, request: FrameRequest, beside: RightSide, key: tuple, screen: moderngl.Framebuffer,
         force: bool, again: Callable[[], bool],
     ) -> bool:  # fmt: skip
         """Each side of the line in its part of the screen and no more of it; both from one sort

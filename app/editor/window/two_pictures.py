@@ -17,7 +17,7 @@ from shapeshift.app.editor.state.layout import Box
 from shapeshift.app.editor.state.shown_scene import SplitState, name_of
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
-from shapeshift.app.editor.window.shown import Beside, FrameRequest, Shown
+from shapeshift.app.editor.window.shown import FrameRequest, RightSide, Shown
 from shapeshift.app.editor.window.window import (
     DoubleClick,
     Drag,
@@ -164,11 +164,13 @@ class Split(TwoPictures):
             self._made = (scene, self._state.x, other)
         return other
 
-    def beside(self, scene: Scene, width: int, refuse: Callable[[BadFile], None]) -> Beside | None:
+    def beside(
+        self, scene: Scene, width: int, refuse: Callable[[BadFile], None]
+    ) -> RightSide | None:
         """What is right of the line, where it parts the window at all."""
         if self._state.over or not 0 < self.cut < width:
             return None
-        return Beside(self.other(scene), self.cut, self._renderer, refuse)
+        return RightSide(self.other(scene), self.cut, self._renderer, refuse)
 
     def draw(self, request: FrameRequest) -> None:
         """Lays the other x over the right part of the window, or mixes both.  Raises BadFile for no
@@ -249,7 +251,7 @@ def splitting(
         has_line = split_state.on and bool(made) and not split_state.over
         return has_line and split().handle_line_event(event)
 
-    def beside(scene: Scene, width: int) -> Beside | None:
+    def beside(scene: Scene, width: int) -> RightSide | None:
         wanted = split_state.shows(scene) and not state.settings.debug
         return split().beside(scene, width, refuse) if wanted else None
 

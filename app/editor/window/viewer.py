@@ -124,6 +124,7 @@ class Viewer:
         self.hooks.event_handlers.insert(0, self.shell.handle_event)
         self.hooks.asked += [self.files.asked, lambda: state.timeline.problem]
         self._title = ""  # what the window's title says
+        self.is_drawn = False  # what the next frame shows, before it began
         self._told: tuple = ()  # what is said and asked, as it was drawn last
         self.frames, self._overlay_ms = 0, 0.0  # drawn since the window opened, of the last one
 
@@ -329,7 +330,8 @@ class Viewer:
         if self.state.measure_now or self.shown.due(request, now):
             self.state.measure_now = False
             self.shown.measure(request)
-        force = self.options.screenshot is not None or self.frames < WARM_UP
+        cold = self.frames < WARM_UP and not self.is_drawn
+        force, self.is_drawn = self.options.screenshot is not None or cold, False
         screen, presented = self.window.screen(), self.window.presented
         fresh = self.shown.draw(request, screen, force, presented.show_picture_again)
         if not fresh:

@@ -12,13 +12,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
 from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
 from shapeshift.app.editor.state.user.settings import default_text_size
-from shapeshift.app.editor.window.monitor import (
-    Place,
-    grow_window,
-    monitor_height,
-    open_window,
-    put_window,
-)
+from shapeshift.app.editor.window.monitor import Place, monitor_height, open_window, stand_window
 from shapeshift.app.editor.window.overlay.presented import Presented
 from shapeshift.app.paths import plain
 from shapeshift.runtime_models.files.plain_text import one_line
@@ -179,12 +173,9 @@ class Window:
         """What input and overlay are measured in."""
         return self._window.size
 
-    def stand(self, place: Place | None) -> None:
-        """Where it was before; without that as much larger as its text is, in the middle."""
-        if place is not None:
-            put_window(self.handle, place)
-        else:
-            grow_window(self.handle, self.text_size)
+    def stand(self, place: Place | None) -> bool:
+        """Where it was before, or as large as its text; True: the desktop has less room."""
+        return stand_window(self.handle, place, self.text_size)
 
     @property
     def closing(self) -> bool:
@@ -246,8 +237,11 @@ class Window:
             self.note()
         return self._unsettled > 0
 
-    def begin_frame(self) -> list[Event]:
-        """Starts an overlay frame; returns the input since the last one that is for the scene."""
+    def begin_frame(self, early: bool = False) -> list[Event]:
+        """Starts an overlay frame; returns the input since the last one that is for the scene.
+
+        `early`: there is no scene yet, so the first frame that has one is given it.
+        """
         if self._restyle:
             self._restyle = False
             theme.apply(self.ui_scale)
@@ -265,7 +259,7 @@ class Window:
         imgui.new_frame()
         if self.popup_open and imgui.is_key_pressed(imgui.Key.escape, False):
             imgui.internal.close_popups_except_modals()  # ImGui does so by its own keys alone
-        events, self._raw = self._raw, []
+        events, self._raw = self._raw, self._raw if early else []
         return events
 
     def end_frame(self) -> None:

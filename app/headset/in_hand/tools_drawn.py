@@ -10,6 +10,7 @@ from shapeshift.app.editor.panels.outlines import circles
 from shapeshift.app.headset.in_hand.hand_tools import HandTools
 from shapeshift.app.inspection.pictures import ALARMS
 from shapeshift.app.inspection.window.marks_over import words_of
+from shapeshift.app.inspection.window.ray_marks import Pointed
 from shapeshift.scene.inspection.lengths import length
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.vr.cards import Card
@@ -114,8 +115,7 @@ def words(tools: HandTools, mark: Mark) -> str:
     reading = tool.readings.get(mark.name)
     if reading is None or tool.picture is None:
         return "\u2026"
-    value = reading.mean if mark.kind == "spot" else reading.most
-    return words_of(value, tool.picture, tools.unit)
+    return words_of(reading.value, tool.picture, tools.unit, reading.ends)
 
 
 def outline(mark: Mark) -> np.ndarray:
@@ -155,10 +155,16 @@ def _pointed(tools: HandTools, frame: Frame, carried: Carried) -> Card | None:
     far = f"{metres:.2f} m" if np.isfinite(metres) else "--"
     texts = [far]
     if tools.inspecting.measured is not None:
-        texts.insert(0, words_of(pointed.value, pointed.picture, tools.unit))
+        texts.insert(0, _pointed_words(pointed, tools.unit))
     right = frame.head.matrix()[:3, 0] * (1.0 if carried.pointer == SIDES[1] else -1.0)
     place = hand.aim.position + ASIDE_M * right + np.array([0.0, ABOVE_M, 0.0])
     return Card(tuple(texts), facing(place, frame.head))
+
+
+def _pointed_words(pointed: Pointed, unit: str) -> str:
+    picture = pointed.picture
+    width, height = picture.view.size
+    return words_of(pointed.value, picture, unit, picture.ends_at((width / 2, height / 2)))
 
 
 def capsules(

@@ -9,7 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.panel import Section
-from shapeshift.app.editor.panels.scale_bar import handle_at, has_scale, height_of, share_at
+from shapeshift.app.editor.panels.scale_bar import handle_at, has_scale, share_at
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.parts.parts_tool import PartsTool
@@ -31,10 +31,14 @@ from shapeshift.app.inspection.inspect_view import first_photo, inspect_view
 from shapeshift.app.inspection.window.inspect_panel import InspectActions, draw_inspect
 from shapeshift.app.inspection.window.inspecting import Inspecting
 from shapeshift.app.inspection.window.marks_over import (
+    MarkLabel,
     alarm_layer,
+    draw_labels,
     draw_mark,
     draw_rubber,
     draw_words,
+    label_words,
+    plate_size,
     words_of,
 )
 from shapeshift.app.inspection.window.picture_under import PictureUnder, Seen
@@ -316,37 +320,36 @@ class MouseMarks:
         if tool.is_current and tool.picture is not None and tool.file.isotherms:
             self._draw_alarms()
         view, unit = self._under.logical_view(), self._seen.unit()
+        labels: list[MarkLabel | None] = []
         for mark in tool.file.marks:
-            reading = tool.readings.get(mark.name) if tool.is_current else None
-            words = ""
-            if reading is not None and reading.samples and tool.picture is not None:
-                value = reading.mean if mark.kind == "spot" else reading.most
-                words = words_of(value, tool.picture, unit)
-            draw_mark(mark, reading, view, words, mark.name == tool.chosen, ui_scale)
+            reading = tool.readings.get(mark.name)
+            if not tool.is_current and mark.laid is None:  # it has a value in a still view alone
+                reading = None
+            words = label_words(mark, reading, tool.picture, unit, tool.is_current)
+            chosen = mark.name == tool.chosen
+            labels.append(draw_mark(mark, reading, view, words, chosen, ui_scale))
+        draw_labels([each for each in labels if each is not None], view.size)
         if self._pressed is not None and self._end is not None:
             draw_rubber(self._kind, self._pressed, self._end)
         self._draw_pointed(ui_scale)
 
     def _draw_pointed(self, ui_scale: float) -> None:
-        """Degrees and metres under the mouse, at their height beside the scale, or at the mouse."""
+        """Degrees and metres under the mouse, on a plate at it, inside of the window."""
         tool, box = self._tool, self._seen.layout().legend
         if not tool.is_current or tool.picture is None or not self._window.on_scene:
             return
-        shows = box is not None and has_scale(self._state.scene)
-        if not (shows or tool.on):
+        if not (tool.on or (box is not None and has_scale(self._state.scene))):
             return
-        value, depth = tool.pointed
-        words = words_of(value, tool.picture, self._seen.unit())
+        (x, y), (value, depth) = self._window.cursor, tool.pointed
+        ends = tool.picture.ends_at(self._under.pixel((x, y)))
+        words = words_of(value, tool.picture, self._seen.unit(), ends)
         if np.isfinite(value):
             words += f"  {depth * tool.file.metres_per_unit:.2f} m"
-        if not shows or box is None:
-            x, y = self._window.cursor
-            draw_words(words, (x + 14 * ui_scale, y + 10 * ui_scale), ui_scale)
-            return
-        low, high = tool.value_range
-        share = (value - low) / (high - low) if np.isfinite(value) else 0.5
-        y = height_of(share, box, ui_scale) - imgui.get_text_line_height() / 2
-        draw_words(words, (box[0] - 4 * ui_scale, y), ui_scale, right=True)
+        (width, height), (wide, high) = self._window.logical_size, plate_size(words)
+        beside = 14 * ui_scale
+        left = x + beside if x + beside + wide <= width else x - beside - wide
+        top = y + beside if y + beside + high <= height else y - beside - high
+        draw_words(words, (left, top))
 
     def _draw_alarms(self) -> None:
         picture, isotherms = self._tool.picture, self._tool.file.isotherms

@@ -321,7 +321,7 @@ def draw_length(
         draw.add_circle_filled(corner, DOT * ui_scale, ink)
     if words:
         x, y = label_place(kind, pixels)
-        draw_words(words, (x + 8 * ui_scale, y + 4 * ui_scale), ui_scale, ink)
+        draw_words(words, (x + 8 * ui_scale, y + 4 * ui_scale), ink)
 
 
 def label_place(kind: str, pixels: np.ndarray) -> tuple[float, float]:

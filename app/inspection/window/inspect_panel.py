@@ -74,6 +74,8 @@ def draw_inspect(tool: Inspecting, actions: InspectActions, wanted: str, ui_scal
         _bound(tool, kind, words, wanted, ui_scale)
     if measured.stop.temperature_unit in KELVINS:
         _emissivity(tool, wanted, ui_scale)
+        if tool.chosen_object:
+            draw_own_emissivity(tool, tool.chosen_object, True, ui_scale)
     low, high = in_unit(measured.stop.unit, *tool.ends, wanted)[1:]
     level, span = (low + high) / 2, high - low
     if heat:
@@ -208,6 +210,29 @@ def _emissivity(tool: Inspecting, wanted: str, ui_scale: float) -> None:
     _air(tool, wanted, ui_scale)
 
 
+def draw_own_emissivity(tool: Inspecting, name: str, of_object: bool, ui_scale: float) -> None:
+    """Whether a mark, or an object, has an emissivity of its own, and which."""
+    emission = tool.file.emission
+    usual = USUAL_EMISSIVITY if emission is None else emission.surface.emissivity
+    share = dict(tool.file.objects).get(name) if of_object else tool.mark(name).emissivity
+    label = said("emissivity of {name}", name=name)
+    changed, on = imgui.checkbox(f"{label}##own {of_object}", share is not None)
+    tip("Its own, in every reading, alarm, picture and report.", ui_scale)
+    if changed:
+        share = usual if on else None
+        tool.shine(name, share, of_object)
+    if share is None:
+        return
+    imgui.same_line()
+    imgui.set_next_item_width(-1)
+    done, new = imgui.drag_float(
+        f"##share {of_object} {name}", share, 0.005, LEAST_EMISSIVITY, 1.0, "%.2f"
+    )
+    tip("Of what is seen: 0.95 paint, brick, skin; 0.8 rusty steel; 0.2 bare metal.", ui_scale)
+    if done and LEAST_EMISSIVITY <= new <= 1:
+        tool.shine(name, new, of_object)
+
+
 def _air(tool: Inspecting, wanted: str, ui_scale: float) -> None:
     """What lies between the camera and the surfaces: metres, per cent of humidity, temperature."""
     emission = tool.file.emission
@@ -269,6 +294,18 @@ def _bound(tool: Inspecting, kind: Bound, words: str, wanted: str, ui_scale: flo
 def draw_about_mark(tool: Inspecting, name: str, ui_scale: float) -> None:
     """Below the mark's name."""
     mark = tool.mark(name)
+    if mark.laid is not None:
+        imgui.align_text_to_frame_padding()
+        imgui.text_disabled(mark.laid.words())
+        imgui.same_line()
+        if imgui.button(item_label("Read anew"), Vec(-1, 0)):
+            tool.lay_anew(name)
+            return
+        tip("Its value is that of its laying, then; this takes what this view reads.", ui_scale)
+    measured = tool.measured
+    if measured is not None and measured.stop.temperature_unit in KELVINS:
+        draw_own_emissivity(tool, name, False, ui_scale)
+        mark = tool.mark(name)
     if theme.has_keys():
         imgui.set_next_item_width(-1)
         enter = imgui.InputTextFlags_.enter_returns_true

@@ -32,7 +32,7 @@ from shapeshift.scene.inspection.marks import (
     read_mark,
     spot_at,
 )
-from shapeshift.scene.inspection.marks_file import MarksFile
+from shapeshift.scene.inspection.marks_file import MarksFile, laid
 from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.scene import Scene
 
@@ -53,6 +53,8 @@ class Inspecting:
         self._read: tuple = (None, None)  # the marks and the picture that readings are of
         self._readings: dict[str, MarkReading] = {}
         self._measured: tuple[Scene | None, MeasuredScene | None] = (None, None)
+        self._surfaces: tuple = ()  # a picture, and what was said of emissivity when it was made
+        self._known: set[str] | None = None  # objects that were there, or were handed an emissivity
 
     # ---- the scene
 
@@ -84,7 +86,7 @@ class Inspecting:
     def opened(self) -> None:
         """Another scene, with the marks that lie beside it."""
         self.on, self.chosen = False, ""
-        self.picture, self.is_current = None, False
+        self.picture, self.is_current, self._known = None, False, None
         self._state.settings = replace(self._state.settings, heat_ends=ALL_VALUES)
         open_beside(self._state)
 
@@ -127,7 +129,8 @@ class Inspecting:
             self._state.say(str(error))
             return
         self.chosen = name
-        self.edit(replace(self.file, marks=(*self.file.marks, mark)), what=f"add {name}")
+        marks = (*self.file.marks, laid(mark, picture))
+        self.edit(replace(self.file, marks=marks), what=f"add {name}")
 
     def delete(self, name: str) -> None:
         """The mark, and the differences that name it."""
@@ -158,6 +161,16 @@ class Inspecting:
         """Another mark in the place of the one of that name."""
         marks = tuple(changed if mark.name == name else mark for mark in self.file.marks)
         self.edit(replace(self.file, marks=marks), what=f"edit {name}")
+
+    def lay_anew(self, name: str) -> None:
+        """The value of a mark is what is seen of it now."""
+        if self.picture is None or not self.is_current:
+            return
+        mark = laid(self.mark(name), self.picture)
+        if mark.laid is not None:
+            self.change(name, mark)
+        else:
+            self.note(said("Nothing is seen of {name} from here.", name=name))
 
     def write_note(self, name: str, text: str) -> None:
         """A line about a mark, for tables and reports."""
@@ -217,6 +230,24 @@ class Inspecting:
         file = replace(self.file, emission=emission)
         self.edit(file, what="emissivity", together=f"emissivity {surface is not None}")
 
+    def shine(self, name: str, emissivity: float | None, of_object: bool = False) -> None:
+        """The emissivity of a mark, or an object, of its own; None: of all that is seen."""
+        if of_object:
+            kept = tuple(pair for pair in self.file.objects if pair[0] != name)
+            new = ((name, emissivity),) if emissivity is not None else ()
+            file = replace(self.file, objects=(*kept, *new))
+        else:
+            changed = replace(self.mark(name), emissivity=emissivity)
+            marks = tuple(changed if mark.name == name else mark for mark in self.file.marks)
+            file = replace(self.file, marks=marks)
+        together = f"emissivity {name} {of_object} {emissivity is not None}"
+        self.edit(file, what="emissivity", together=together)
+
+    @property
+    def chosen_object(self) -> str:
+        """Name of the object that is edited, of several; "": there is one alone."""
+        return self._state.chosen if len(self._state.scene.objects) > 1 else ""
+
     def note(self, sentence: str) -> None:
         """Says for a moment what a hand cannot do."""
         self._state.say(sentence)
@@ -229,21 +260,44 @@ class Inspecting:
 
     def saw(self, picture: ValuePicture) -> None:
         """What the view has, measured just now."""
-        self.picture, self.is_current = self.corrected(picture), True
+        self.picture, self.is_current = picture, True
+        self._hand_over(picture)
+
+    def _hand_over(self, picture: ValuePicture) -> None:
+        """An object that was cut out since the scene was opened takes over the emissivity of a mark
+        that lies on it, once: it keeps it wherever it goes.
+        """
+        if self._known is None:
+            self._known = set(picture.owner_names)
+        new = [name for name in picture.owner_names if name not in self._known]
+        own = [mark for mark in self.file.marks if mark.emissivity is not None] if new else []
+        objects = dict(self.file.objects)
+        for mark in own:
+            if not picture.sees(mark.place[None]).any():
+                continue
+            owner = int(picture.owner_at(picture.pixel_of(mark.place[None])[0])[0])
+            name = picture.owner_names[owner] if owner >= 0 else ""
+            if name not in new or name in objects or mark.emissivity is None:
+                continue
+            objects[name] = mark.emissivity
+            self._known.add(name)
+            words = {"name": name, "share": f"{mark.emissivity:g}", "mark": mark.name}
+            self.note(said("{name} has the emissivity {share} of {mark} now.", **words))
+        if len(objects) > len(self.file.objects):
+            self.edit(replace(self.file, objects=tuple(objects.items())), what="emissivity")
 
     def corrected(self, picture: ValuePicture) -> ValuePicture:
         """As the file of marks has the emissivity; values that are no temperatures stay."""
-        emission = self.file.emission
-        if emission is not None and picture.is_temperature:
-            return picture.corrected(emission)
-        return picture.as_photographed()
+        return self.file.of_surfaces(picture)
 
     @property
     def readings(self) -> dict[str, MarkReading]:
         """Of each mark in the picture that is there, by name; the same object until one changes."""
         file, picture = self.file, self.picture
-        if picture is not None and picture.emission != file.emission:
+        own = tuple(mark for mark in file.marks if mark.emissivity is not None)
+        if picture is not None and (picture, file.emission, own, file.objects) != self._surfaces:
             picture = self.picture = self.corrected(picture)
+            self._surfaces = (picture, file.emission, own, file.objects)
         if self._read[0] is not file or self._read[1] is not picture:
             marks: tuple[Mark, ...] = file.marks if picture is not None else ()
             self._readings = {mark.name: read_mark(mark, picture) for mark in marks if picture}

@@ -1,6 +1,5 @@
 """A report of one view with all marks of the tool "Inspect": an HTML file, never over another."""
 
-from dataclasses import replace
 from pathlib import Path
 
 from shapeshift.app.drawing import make_folder
@@ -18,7 +17,6 @@ def write_view_report(
     """title: of the scene.  Values are as the tool shows them: of surfaces, where it has their
     emissivity.  Raises ValueError, OSError.
     """
-    inspected = replace(inspected, values=tool.corrected(inspected.values))
     report = report_of(
         ReportHead(f"{measured.stop.name}: {title}"), tool.source or Path(title), measured.stop,
         [with_readings(inspected, tool.file)], tool.file, tool.scale, tool.document.origin,

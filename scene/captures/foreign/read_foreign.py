@@ -349,7 +349,7 @@ PROGRAMS = (
             "descaniverse (scaniverse_to_json) makes JSON of it, name that", (),
             ("frames.pb", "scan.pb")),
     Program("Stray Scanner's recording, whose photos are a film",
-            "find the poses of its photos: launch.py poses rgb.mp4 --out CAPTURE", (),
+            "find the poses of its photos: the command poses, of rgb.mp4", (),
             ("odometry.csv",)),
     Program("a table of omega, phi and kappa without lenses",
             "export one that has them: Metashape's Agisoft XML, Blocks Exchange, or a COLMAP model",

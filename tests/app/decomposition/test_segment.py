@@ -74,6 +74,22 @@ def refused(capsys, words: str, arguments) -> None:
     assert said.startswith("shapeshift segment: ") and words in said, said
 
 
+@pytest.mark.parametrize("name", ["cut.shift", "cut.scene.json"])
+def test_what_a_killed_run_left_is_replaced_and_nothing_else(given, tmp_path, capsys, name):
+    """Its note stands from before the first file to after the last (tools/program/kills.py)."""
+    words, whole = ("--out", tmp_path / "cut.scene.json"), given / "whole"
+    if not whole.exists():
+        assert segment(given, "--out", whole / "cut.scene.json") == 0
+    shutil.copyfile(whole / name, tmp_path / name)
+    refused = segment(given, *words)
+    assert refused == 2 and "exists; choose another --out" in capsys.readouterr().err
+    (tmp_path / "cut.unfinished").touch()
+    assert segment(given, *words) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.scene.json", "cut.shift"]
+    for path in tmp_path.iterdir():
+        assert path.read_bytes() == (whole / path.name).read_bytes()
+
+
 def test_label_maps_become_objects_that_can_be_opened(given, tmp_path, capsys):
     out = tmp_path / "new" / "cut.scene.json"
     words = ("--out", out, "--score", given / "truth", "--report", tmp_path / "report")

@@ -4,7 +4,6 @@ import base64
 import io
 import json
 import re
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -25,26 +24,11 @@ from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.inspection.marks import Isotherm, Mark, box_at, line_at
 from shapeshift.scene.inspection.marks_file import HeldOutError, MarksFile
 from tests.support.scene.warm_wall import STOPS, celsius_at, traced, write_wall
+from tests.support.web.page_texts import Page
 
 EVIL = '<script>alert("$x$")</script>'
 HEAD = ReportHead("Hall \udcff", "2026-11-23", EVIL, "温度 Müller", "Look at $\\frac{1}{0$ again.")
 SCALE = ColorScale(0.0, 100.0, "ironbow")
-
-
-class Page(HTMLParser):
-    """What a browser would find: tags with their attributes, and texts."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict]] = []
-        self.texts: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data):
-        self.texts.append(data)
 
 
 def inspected(marks: int = 0) -> tuple[MarksFile, list[InspectedView]]:

@@ -183,7 +183,7 @@ def read_of(said: str, name: str) -> float:
     [
         (("0.05",), "the emissivity is 0.05; a number from 0.1 to 1"),
         (("b=x",), "a number from 0.1 to 1 is wanted, or NAME=NUMBER"),
-        (("Q=0.5",), "no mark is called 'Q'; there are none"),
+        (("Q=0.5",), "no mark and no object is called 'Q'; there are scene."),
         (("0.5", "0.6"), "has 0.5 and 0.6 for all; one is wanted"),
         (("0.5", "--unit", "bar"), "'bar'; emissivity is of temperatures in °C, °F or K"),
         (("0.5", "--reflected", "5000"), "the reflected temperature is 5000"),

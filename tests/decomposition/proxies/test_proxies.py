@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.assemble import SNAP, choose_proxy, pressed
+from shapeshift.decomposition.assemble import (
+    LEANS,
+    MOST_PRESSED,
+    SNAP,
+    choose_proxy,
+    middle_of,
+    pressed,
+    stands,
+)
 from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.partition import LabelledView
 from shapeshift.decomposition.proxies.ground import (
@@ -39,8 +47,8 @@ def view_from(eye: tuple) -> View:
 
 def test_what_lies_below_the_plane_or_on_the_lowest_is_moved_onto_it():
     longest = 2.0  # along z
-    points = np.array([[0, -0.02, 0], [0, 0, 0], [0, SNAP * longest * 0.99, 1],
-                       [0, SNAP * longest, 2], [0, 0.1, 0]], np.float32)  # fmt: skip
+    points = np.array([[-1, -0.02, -1], [1, 0, -1], [0, SNAP * longest * 0.99, 1],
+                       [0, SNAP * longest, 0.5], [0, 0.1, 0]], np.float32)  # fmt: skip
     (out,) = pressed([points], FLOOR)
     assert out[:3, 1].tolist() == [0, 0, 0]
     assert np.array_equal(out[3:], points[3:])  # at the threshold itself it stays
@@ -52,6 +60,48 @@ def test_pieces_of_a_thing_above_the_plane_are_drawn_down_to_it():
     first, second = pressed(pieces, FLOOR)
     assert first[:, 1].tolist() == pytest.approx([0, 0.1])
     assert second[:, 1].tolist() == pytest.approx([0, 0.05])
+
+
+def leaning(low: float) -> np.ndarray:
+    """(8, 3): a unit cube on one edge, the other edge of its base so high above the floor."""
+    points = box(0.5, 0.5, 0.5).astype(np.float64) + 0.5
+    points[(points[:, 1] == 0) & (points[:, 0] == 1), 1] = low
+    return points
+
+
+@pytest.mark.parametrize(("low", "lies"), [
+    (0.0, True), (0.02, True), (MOST_PRESSED - 0.01, True), (MOST_PRESSED + 0.01, False),
+])  # fmt: skip
+def test_what_stood_in_photos_has_a_base_that_carries_it(low, lies):
+    """One edge alone carries nothing; above MOST_PRESSED of its height it is its own shape."""
+    (out,) = pressed([leaning(low)], FLOOR)
+    assert ((out[:, 1] == 0).sum() == 4) == lies
+    assert stands([out], FLOOR) == lies
+
+
+def test_a_thing_stands_as_far_as_it_may_lean():
+    """A unit cube's middle is .5 high: moved towards an edge it stands while it is more than
+    .5 tan LEANS from it."""
+    top = box(0.5, 0.5, 0.5).astype(np.float64) + 0.5
+    for short, good in ((1e-3, True), (-1e-3, False)):
+        edge = 0.5 - 0.5 * np.tan(np.radians(LEANS)) - short
+        points = top.copy()
+        foot = np.array([[x, -1e-9, z] for x in (edge, 1) for z in (0, 1)])
+        above = points[points[:, 1] > 0]
+        body = np.concatenate([above, above - [0, 1 - 2e-4, 0]])  # just off the floor
+        assert stands([body, foot], FLOOR) == good
+    assert not stands([np.zeros((3, 3))], FLOOR)  # nothing solid
+
+
+def test_the_middle_is_that_of_the_mass():
+    from trimesh import Trimesh
+    from trimesh.creation import icosphere
+
+    ball = np.asarray(icosphere(1).vertices) * (1, 2, 3) + 4.0
+    cut = ball[ball[:, 1] < 4.5]
+    hull = Trimesh(cut).convex_hull
+    assert middle_of([cut]) == pytest.approx(hull.center_mass, abs=1e-9)
+    assert middle_of([cut, cut + 1]) == pytest.approx(hull.center_mass + 0.5, abs=1e-9)
 
 
 def test_a_silhouette_is_what_the_cube_covers():

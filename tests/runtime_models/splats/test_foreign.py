@@ -38,7 +38,7 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "FBX": ("a.fbx", b"Kaydara FBX Binary  \0", "is a mesh"),
     "LAS": ("a.las", b"LASF" + bytes(400), "a laser scan.*--points"),
     "E57": ("a.e57", b"ASTM-E57" + bytes(40), "a laser scan"),
-    "picture": ("a.png", PNG, "is a picture.*launch.py train"),
+    "picture": ("a.png", PNG, "is a picture.*the command train"),
     "photo": ("a.jpg", b"\xff\xd8\xff\xe0" + bytes(40), "is a picture"),
     "film": ("a.mp4", b"\0\0\0\x20ftypisom", "is a film"),
     "npy": ("a.npy", b"\x93NUMPY\1\0", "single array of numpy"),

@@ -10,8 +10,7 @@ from PIL import Image
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.radiometric.number_photos import radiometric_celsius
 from shapeshift.scene.inspection.air import NO_AIR, Air
-from shapeshift.scene.inspection.camera_settings import camera_settings
-from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
+from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation, camera_settings
 from shapeshift.scene.inspection.marks_file import MarksFile, read_marks_file, write_marks_file
 from tests.support.scene import flir_files
 

@@ -55,6 +55,7 @@ TABLES_BESIDE = {
         "COLUMNS": ALL, "BOUND_TIPS": ALL, "VALUE_TIPS": ALL, "AUTO_TIPS": ALL, "MEASURES": ALL,
         "EMISSIVITY": ALL,
     },
+    "inspection.window.marks_over": {"WHY_HIDDEN": ALL},
     "inspection.window.ruler_panel": {"KIND_LABELS": VALUES, "KIND_TIPS": ALL, "ACTIONS": ALL},
 }  # fmt: skip
 HEADSET_TABLES = {

@@ -4,9 +4,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.messages import number
@@ -156,6 +153,8 @@ OFF = 1.5  # times the usual distance to the last neighbour: as far off a haze h
 def floaters(numbers: AnchorNumbers) -> np.ndarray:
     """(A,) bool: anchors that look like floaters.  About 10 s of a core for a million."""
     count = len(numbers.places)
+    from scipy.spatial import cKDTree  # loaded when first wanted: half a second
+
     usable = np.isfinite(numbers.places).all(axis=1) & np.isfinite(numbers.size)
     out = np.zeros(count, bool)
     if np.count_nonzero(usable) <= NEIGHBOURS:
@@ -187,6 +186,9 @@ def groups(
 
     away, near: (n, NEIGHBOURS) metres to the nearest others, and which these are.
     """
+    from scipy.sparse import coo_matrix  # loaded when first wanted: half a second
+    from scipy.sparse.csgraph import connected_components
+
     reach = 2 * REACH * np.minimum(size[:, None], size[near])  # both must be large
     touches = (away <= np.maximum(link, reach)) & counts[:, None] & counts[near]
     start, which = np.nonzero(touches)

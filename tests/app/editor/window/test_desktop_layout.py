@@ -6,12 +6,15 @@ from collections.abc import Callable
 import glfw
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
+from shapeshift.app.editor import desktop
 from shapeshift.app.editor.state.camera.framed import SETTLED_S
 from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window import monitor
 from shapeshift.app.editor.window.two_pictures import splitting
 from shapeshift.app.editor.window.window import Drag
+from shapeshift.rasterizer.program import announce
 from shapeshift.renderer.renderer import Renderer
 from tests.support.desktop.desktop_stand import run_frames
 from tests.support.desktop.real_hands import RealHands
@@ -308,3 +311,74 @@ def test_a_window_grows_with_its_text_as_far_as_the_monitor_goes(any_size, times
 
         assert until(in_the_middle)
     glfw.set_window_pos(viewer.window.handle, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("place", "wanted", "smaller"),
+    [
+        ((10, 20, 900, 640), (10, 20, 900, 640), False),
+        ((0, 0, 1280, 720), (0, 0, 1280, 720), False),  # the screen of the X server, exactly
+        ((0, 0, 1281, 720), (0, 0, 1280, 720), True),
+        ((0, 0, 1278, 721), (0, 0, 1278, 720), True),
+        ((700, 300, 1000, 600), (280, 120, 1000, 600), False),  # half outside: moved, not shrunk
+        ((100, 50, 3000, 2000), (0, 0, 1280, 720), True),
+        # Of a monitor that went away: in the middle of the one that is left.
+        ((5000, 300, 700, 500), (290, 110, 700, 500), False),
+        ((-4000, -900, 2560, 1440), (0, 0, 1280, 720), True),
+    ],
+)
+def test_a_window_is_no_larger_than_its_monitor(any_size, place, wanted, smaller):
+    handle = any_size.window.handle
+    assert monitor.put_window(handle, place) == smaller
+
+    def there() -> bool:
+        return (*glfw.get_window_pos(handle), *glfw.get_window_size(handle)) == wanted
+
+    assert until(there)
+    glfw.set_window_pos(handle, 0, 0)
+
+
+def test_a_first_start_says_what_it_compiles(viewer, monkeypatch):
+    """A card at once, another at a compiler that takes long, none after the first picture; input
+    of meanwhile is the scene's.
+    """
+    window, shown = viewer.window, []
+    monkeypatch.setattr(window, "swap", lambda: shown.append(window.picture().copy()))
+    said = []
+    draw = desktop.draw_opening
+
+    def noted(size, lines, scale) -> None:
+        said.append(lines)
+        draw(size, lines, scale)
+
+    monkeypatch.setattr(desktop, "draw_opening", noted)
+    clock = [0.0]
+    monkeypatch.setattr(desktop.time, "perf_counter", lambda: clock[0])
+    early = Drag("left", 1.0, 0.0)
+    with desktop.OpeningCard(window, "ball") as first:
+        window._raw.append(early)
+        announce("one.cl")  # at once: a start that is nearly over
+        clock[0] = desktop.SAY_AGAIN_S
+        announce("two.cl")
+        first.end()
+        announce("three.cl")
+    announce("four.cl")
+    assert [lines[0] for lines in said[::2]] == [
+        "Opening ball",
+        "Preparing this graphics device, once",
+    ]
+    assert said[-1][1] == "Compiling two.cl (2 so far, 0 s)"
+    opening, preparing = (picture.astype(int) for picture in shown)
+    assert (opening != opening[0, 0]).any() and (opening != preparing).any()
+    lit = np.argwhere((preparing != preparing[0, 0]).any(axis=2))
+    assert (
+        np.abs(
+            (lit.min(axis=0) + lit.max(axis=0) + 1) / 2 - np.array(preparing.shape[:2]) / 2
+        ).max()
+        <= 1
+    )
+    assert early in window.begin_frame()
+    imgui.end_frame()
+    with desktop.OpeningCard(window, None):  # pictures for a file: nobody watches
+        announce("five.cl")
+    assert len(shown) == 2

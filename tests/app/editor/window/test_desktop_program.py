@@ -1,6 +1,8 @@
 """The viewer as a person starts it, under Xvfb or without a display: pictures and sentences."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -193,3 +195,14 @@ def test_what_a_scene_file_cannot_is_one_sentence(display, tmp_path, arguments, 
         (tmp_path / f"{name}.scene.json").write_text(text)
     arguments = [tmp_path / a if a.endswith(".json") else a for a in arguments]
     assert_one_sentence(start(display, "view", *arguments), 2, *words)
+
+
+def test_a_window_opens_without_heavy_libraries():
+    """scipy alone was a third of the processor time of a start, for tools that few frames want."""
+    code = (
+        "import sys; import shapeshift.app.editor.desktop;"
+        "print([name for name in ('scipy', 'trimesh', 'onnxruntime', 'pycolmap', 'pyopencl')"
+        " if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"

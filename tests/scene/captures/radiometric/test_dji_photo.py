@@ -18,7 +18,7 @@ from shapeshift.scene.captures.radiometric import dji_photo
 from shapeshift.scene.captures.radiometric.dji_photo import is_dji
 from shapeshift.scene.captures.radiometric.number_photos import is_radiometric, radiometric_celsius
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.scene.inspection.camera_settings import camera_settings
+from shapeshift.scene.inspection.emissivity import camera_settings
 from tests.support.scene.captures import simple, write_transforms
 
 STAND_IN = """#!{python}
