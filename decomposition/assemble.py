@@ -160,25 +160,18 @@ def assemble(
     planes = {label: plane for label, plane in found.items() if isinstance(plane, Plane)}
     planes = seen_planes(planes, seen, looks.spacing_m)
     proxies, failed = {}, {}
-    for done, (label, given) in enumerate(objects.items()):
+
+    def make(label: int, only: str | None = None) -> Proxy:
+        plane, given = planes.get(label), objects[label]
+        return proxy_of(model, label, plane, evidence.own, views, given, making, only)
+
+    for done, label in enumerate(objects):
         making.report("making what is touched of objects", done / max(len(objects), 1))
         try:
-            proxies[label] = proxy_of(
-                model, label, planes.get(label), evidence.own, views, given, making
-            )
+            proxies[label] = make(label)
         except BadFile as why:
             failed[label] = str(why)
-    places = {label: np.array(part_of(model, label)[1]) for label in proxies}
-    cut, inside = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
-    again = {label for pair in inside for label in pair if proxies[label].name in SHAPES}
-    for label in sorted(again):
-        # One hull reaches over the hollow in which its neighbour lies; pieces follow the thing.
-        proxies[label] = proxy_of(
-            model, label, planes.get(label), evidence.own, views, objects[label], making, PIECES
-        )
-    if again:
-        cut, _ = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
-    proxies = {label: replace(proxy, collider=cut[label]) for label, proxy in proxies.items()}
+    proxies = proxies_apart(proxies, model, make)
     told: list[Completion] = []
     whole = model
     if completed:
@@ -199,6 +192,23 @@ def assemble(
         seen,
     )  # fmt: skip
     return Assembled(whole, proxies, ground, tuple(told), failed, planes)
+
+
+def proxies_apart(
+    proxies: dict[int, Proxy], model: AnchorModel, make: Callable[[int, str], Proxy]
+) -> dict[int, Proxy]:
+    """The proxies of things of a model, by label, cut so that none is inside another.
+
+    make(label, name) makes another candidate of a thing.
+    """
+    places = {label: np.array(part_of(model, label)[1]) for label in proxies}
+    cut, inside = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
+    again = {label for pair in inside for label in pair if proxies[label].name in SHAPES}
+    if again:
+        # One hull reaches over the hollow in which its neighbour lies; pieces follow the thing.
+        proxies = proxies | {label: make(label, PIECES) for label in sorted(again)}
+        cut, _ = apart({label: proxy.collider for label, proxy in proxies.items()}, places)
+    return {label: replace(proxy, collider=cut[label]) for label, proxy in proxies.items()}
 
 
 def proxy_of(

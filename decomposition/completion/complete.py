@@ -19,7 +19,13 @@ from shapeshift.decomposition.completion.plane import (
     looks_of,
     support_plane,
 )
-from shapeshift.decomposition.completion.verify import Cells, PhotoView, Verdict, verify
+from shapeshift.decomposition.completion.verify import (
+    Cells,
+    ModelPictures,
+    PhotoView,
+    Verdict,
+    verify,
+)
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.model import AnchorModel
 
@@ -36,6 +42,7 @@ LEAST_LEFT = 0.03  # of the hole's cells; so few are left open
 LEAST_PATCH = 4  # cells
 FEWEST_CELLS = 2  # of a hole
 WORTH = 1.5  # shares of the hole that a patch may be smaller for one display unit of seam
+EVEN = 16  # anchors whose mean a copy without a texture of its own has
 FARTHER = 2e-3  # display units of seam that a place one cell farther away must be better by
 
 
@@ -49,6 +56,7 @@ class Stamp:
     filled: int  # of those
     cell_m: float
     footprint: np.ndarray  # (filled, 3) metres: the middles of filled cells, on the plane
+    around: np.ndarray  # (n, 3) metres: the same of those around the hole
 
 
 def find_stamp(
@@ -85,10 +93,13 @@ def find_stamp(
     slab = (grid.height > -BELOW * looks.spacing_m) & (grid.height < ABOVE * looks.spacing_m)
     slab = np.where(grid.rows_in(foot.shade), grid.on, slab)  # there photos show what is beside it
     dropped = (labels == 0) & grid.rows_in(filled) & slab
-    middles = (np.argwhere(filled) + 0.5) * grid.cell_m + grid.low
+    middles = [
+        ((np.argwhere(chosen) + 0.5) * grid.cell_m + grid.low) @ axes + plane.offset * plane.normal
+        for chosen in (filled, foot.ring)
+    ]
     return Stamp(
         np.concatenate(rows), np.concatenate(shifts), dropped, len(patches), cells,
-        int(filled.sum()), grid.cell_m, middles @ axes + plane.offset * plane.normal,
+        int(filled.sum()), grid.cell_m, *middles,
     )  # fmt: skip
 
 
@@ -231,74 +242,129 @@ def complete(
         raise ValueError("the model has no labels of objects; partition it first.")
     if things is None:
         things = [int(each) for each in np.unique(model.labels) if each != BACKGROUND]
-    told = []
+    told: list[Completion] = []
+    scene = Scenery(model, looks_of(model), ModelPictures(device, only_background(model)))
     for done, label in enumerate(things):
         progress("completing the background", done, len(things))
         ghosts = 0
         if evidence is not None:
-            model, evidence, ghosts = without_ghosts(model, label, evidence)
-        model, one = complete_one(device, model, views, label, evidence, shadows, background)
+            scene, evidence, ghosts = without_ghosts(device, scene, label, evidence)
+        scene, one = complete_one(device, scene, views, label, evidence, shadows, background)
         one = replace(one, ghosts=ghosts)
         if one.stamp is not None and evidence is not None:  # copies look as seen
             kept = evidence[~one.stamp.dropped]
             evidence = np.concatenate([kept, evidence[one.stamp.rows]])
         told.append(one)
+    model = scene.model
     progress("completing the background", len(things), len(things))
     return model, told
 
 
+@dataclass(frozen=True)
+class Scenery:
+    """A labelled model, how its anchors look, and its background drawn: from thing to thing."""
+
+    model: AnchorModel
+    looks: AnchorLooks
+    pictures: ModelPictures
+
+    @property
+    def labels(self) -> np.ndarray:
+        """(A,) of the anchors."""
+        assert self.model.labels is not None, "complete() asks for them"
+        return self.model.labels
+
+
 def without_ghosts(
-    model: AnchorModel, label: int, evidence: np.ndarray
-) -> tuple[AnchorModel, np.ndarray, int]:
-    """The model and evidence (A,) without what hidden_inside() finds, and how many that were.
+    device: Device, scene: Scenery, label: int, evidence: np.ndarray
+) -> tuple[Scenery, np.ndarray, int]:
+    """The scene and evidence (A,) without what hidden_inside() finds, and how many that were.
 
     No photo can confirm it, or is changed by it: none shows these anchors.
     """
-    labels = model.labels
-    assert labels is not None, "complete() asks for them"
-    looks = looks_of(model)
+    looks, labels = scene.looks, scene.labels
     plane = support_plane(looks, labels, label)
     ghosts = hidden_inside(
         looks, labels, label, evidence, plane if isinstance(plane, Plane) else None
     )
     count = int(ghosts.sum())
-    return (model.with_anchors(~ghosts), evidence[~ghosts], count) if count else (
-        model, evidence, 0
+    if not count:
+        return scene, evidence, 0
+    kept = ~ghosts
+    looks = replace(
+        looks, places=looks.places[kept], there=looks.there[kept], colors=looks.colors[kept]
+    )
+    model = scene.model.with_anchors(kept)
+    return (
+        Scenery(model, looks, ModelPictures(device, only_background(model))), evidence[kept], count
     )  # fmt: skip
 
 
 def complete_one(
     device: Device,
-    model: AnchorModel,
+    scene: Scenery,
     views: Sequence[PhotoView],
     label: int,
     evidence: np.ndarray | None,
     shadows: bool,
     background: tuple[float, float, float],
-) -> tuple[AnchorModel, Completion]:
-    """The same for one thing: all of its footprint, else the part that no photo shows."""
-    assert model.labels is not None, "complete() asks for them"
-    if not (model.labels == label).any():
-        return model, Completion(label, None, None, None, "no anchor is its")
-    looks = looks_of(model)
-    plane = support_plane(looks, model.labels, label)
+) -> tuple[Scenery, Completion]:
+    """The same for one thing: all of its footprint, else the part that no photo shows, else all of
+    it with a look as even as that of its surroundings is in the mean.
+    """
+    looks, labels = scene.looks, scene.labels
+    if not (labels == label).any():
+        return scene, Completion(label, None, None, None, "no anchor is its")
+    plane = support_plane(looks, labels, label)
     if isinstance(plane, str):
-        return model, Completion(label, None, None, None, plane)
+        return scene, Completion(label, None, None, None, plane)
     first: Completion | None = None
-    for core in (True, False) if evidence is not None and not shadows else (True,):
-        stamp = find_stamp(looks, model.labels, label, plane, evidence, shadows, core)
+    seen = evidence is not None and not shadows
+    for core, even in ((True, True), (True, False), (False, False))[: 3 if seen else 1]:
+        stamp = find_stamp(looks, labels, label, plane, evidence, shadows, core)
         if isinstance(stamp, str):
             first = first or Completion(label, plane, None, None, stamp)
             continue
-        after = with_background_copies(apply_stamp(model, stamp), len(stamp.rows))
-        pair = only_background(model), only_background(after)
-        cells = Cells(stamp.footprint, stamp.cell_m, plane.normal)
+        after = with_background_copies(apply_stamp(scene.model, stamp), len(stamp.rows))
+        if even:
+            after = with_even_copies(after, looks, labels, stamp)
+        pictures = ModelPictures(device, only_background(after))
+        cells = Cells(stamp.footprint, stamp.cell_m, plane.normal, stamp.around)
+        pair = scene.pictures, pictures
         verdict = verify(device, *pair, label, views, background, cells, shadows)
         if verdict.is_accepted:
-            return after, Completion(label, plane, stamp, verdict)
+            looks = stamped_looks(looks, stamp)
+            return Scenery(after, looks, pictures), Completion(label, plane, stamp, verdict)
         first = first or Completion(label, plane, None, verdict, verdict.sentence())
     assert first is not None, "one step at least was tried"
-    return model, first
+    return scene, first
+
+
+def stamped_looks(looks: AnchorLooks, stamp: Stamp) -> AnchorLooks:
+    """How anchors look after apply_stamp()."""
+    rows = np.concatenate([np.flatnonzero(~stamp.dropped), stamp.rows])
+    places = looks.places[rows].copy()
+    places[len(rows) - len(stamp.rows) :] += stamp.shifts
+    return replace(looks, places=places, there=looks.there[rows], colors=looks.colors[rows])
+
+
+def with_even_copies(
+    model: AnchorModel, looks: AnchorLooks, labels: np.ndarray, stamp: Stamp
+) -> AnchorModel:
+    """The stamped model whose copies have the mean features of EVEN anchors around each source.
+
+    A texture of its own is farther from what was there than the mean of what is around.
+    """
+    from scipy.spatial import cKDTree
+
+    ground = np.flatnonzero(looks.there & (labels == BACKGROUND) & ~stamp.dropped)
+    near = cKDTree(looks.places[ground]).query(looks.places[stamp.rows], min(EVEN, len(ground)))[1]
+    features = model.features.copy()
+    source = np.concatenate([np.flatnonzero(~stamp.dropped), stamp.rows])
+    original = np.zeros((len(labels), features.shape[1]), features.dtype)
+    original[source] = features
+    features[len(features) - len(stamp.rows) :] = original[ground[near]].mean(axis=1)
+    return replace(model, features=features)
 
 
 def with_background_copies(model: AnchorModel, copies: int) -> AnchorModel:

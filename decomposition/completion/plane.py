@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.scene.pose import View
 
 # Where anchors are and how they look at every stop: what completion compares.
 
@@ -287,3 +288,48 @@ def with_shadow(
     may = hole | ((dark | (away <= 2)) & near)
     cast = ndimage.binary_propagation(hole, mask=may)
     return ndimage.binary_dilation(cast) & inside
+
+
+FARTHEST = 4.0  # sides of a cell
+
+
+class Cells(NamedTuple):
+    """Squares on a plane."""
+
+    middles: np.ndarray  # (n, 3) metres
+    side_m: float
+    normal: np.ndarray  # (3,) unit, of the plane
+    around: np.ndarray = np.zeros((0, 3))  # (m, 3) metres: free ones around them
+
+
+def away_of(view: View, metres: np.ndarray, cells: Cells) -> np.ndarray:
+    """(H, W) sides of a cell from the cells' plane to what is seen at depths (H, W), Inf: nothing.
+
+    FARTHEST at most, 0 where nothing is seen.
+    """
+    eye_from_world, fx, fy, cx, cy = view.pinhole()
+    way = eye_from_world[:3, :3] @ cells.normal  # in the camera's axes
+    height, width = metres.shape
+    along = (
+        way[0] * ((np.arange(width) + 0.5 - cx) / fx)
+        + way[1] * ((np.arange(height) + 0.5 - cy) / fy)[:, None]
+        + way[2]
+    )
+    offset = float((cells.middles @ cells.normal).mean()) + float(way @ eye_from_world[:3, 3])
+    seen = np.isfinite(metres)
+    away = np.abs(np.where(seen, metres, 0) * along - offset) / cells.side_m
+    return np.where(seen, np.minimum(away, FARTHEST), 0.0)
+
+
+def shown_cells(view: View, middles: np.ndarray, reach_m: float) -> np.ndarray:
+    """(H, W) bool: pixels nearer than that to one of the cells' middles (n, 3) metres."""
+    from PIL import Image, ImageDraw
+
+    eye_from_world, fx, fy, cx, cy = view.pinhole()
+    at = np.c_[middles, np.ones(len(middles))] @ eye_from_world.T
+    picture = Image.new("1", view.size)
+    pen = ImageDraw.Draw(picture)
+    for x, y, z in at[at[:, 2] > view.near, :3]:
+        u, v, far = fx * x / z + cx, fy * y / z + cy, reach_m * max(fx, fy) / z
+        pen.ellipse((u - far, v - far, u + far, v + far), fill=1)
+    return np.array(picture)

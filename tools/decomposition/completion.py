@@ -147,7 +147,7 @@ def wrong_stamps(device, model, evidence, views: list, label: int) -> list:
     told = []
     for step, each in wrong.items():
         after = only_background(with_background_copies(apply_stamp(model, each), len(each.rows)))
-        cells = Cells(each.footprint, each.cell_m, plane.normal)
+        cells = Cells(each.footprint, each.cell_m, plane.normal, each.around)
         told.append((step, each, verify(device, before, after, label, views, STUDIO, cells)))
     return told
 

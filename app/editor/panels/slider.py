@@ -9,9 +9,11 @@ from shapeshift.app.editor.panels.sections.stops_panel import pace_button, stop_
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import tip
 from shapeshift.app.editor.panels.widgets.theme import Box
-from shapeshift.app.editor.state.arrange import go_to_stop, steer_by_hand
+from shapeshift.app.editor.state.arrange import go_to_stop, rejoin, steer_by_hand, unchain
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.shown_scene import leader_of, may_follow
 from shapeshift.app.editor.state.track import Grip, Track, half_ways, read_x
+from shapeshift.app.editor.texts.table import said
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_dates import calendar_ticks
 from shapeshift.scene.control import SNAP
@@ -58,10 +60,12 @@ def draw_slider(state: EditorState, index: int, ui_scale: float) -> None:
         imgui.same_line(0, 8 * ui_scale)
         _pace(state, index, height, ui_scale)
     imgui.same_line(0, 14 * ui_scale)
-    named = len(state.sliders) == 1 < len(state.movable)  # one of several: say which
+    named = len(state.sliders) == 1 < len(state.tracks)  # one of several: say which
     name_width = min(imgui.calc_text_size(obj.name).x, WIDEST_NAME * ui_scale) if named else 0.0
     value_width = max(VALUE * ui_scale, name_width)
     after = SPLIT * ui_scale if state.split.possible else 0.0
+    linked = _chained(state, index)
+    after += SPLIT * ui_scale if linked is not None else 0.0
     beside = value_width + after + 12 * ui_scale if theme.has_keys() else 0.0
     room = imgui.get_content_region_avail().x - beside
     stops = state.stops(index)
@@ -90,6 +94,48 @@ def draw_slider(state: EditorState, index: int, ui_scale: float) -> None:
     if state.split.possible:
         imgui.set_cursor_screen_pos(Vec(left + VALUE * ui_scale + 6 * ui_scale, line_y))
         _split_button(state, index, second, ui_scale)
+    if linked is not None:
+        along = after - SPLIT * ui_scale
+        imgui.set_cursor_screen_pos(Vec(left + (VALUE + 6) * ui_scale + along, line_y))
+        _chain_button(state, linked, ui_scale)
+
+
+def _chained(state: EditorState, index: int) -> int | None:
+    """Whose chain stands on the slider of an object: of the chosen one that follows it, or its own,
+    that could follow its scene; None: no chain.
+    """
+    chosen = state.chosen_index
+    if chosen is not None and chosen in state.chain.of(state.scene, index)[1:]:
+        return chosen
+    leader = leader_of(state.scene)
+    objects = state.scene.objects
+    if leader is None or index == leader or not may_follow(objects[index], objects[leader]):
+        return None
+    return index
+
+
+def _chain_button(state: EditorState, index: int, ui_scale: float) -> None:
+    """Two links of a chain, apart where the object has a slider of its own."""
+    side, name = imgui.get_frame_height(), state.scene.objects[index].name
+    follows = index in state.chain.followers(state.scene)
+    corner = imgui.get_cursor_screen_pos()
+    if imgui.button("##chain", Vec(side, side)):
+        (unchain if follows else rejoin)(state, index)
+    if follows:
+        tip(said("{name} follows the scene; a click gives it its own slider.", name=name), ui_scale)
+    else:
+        tip(said("A click lets {name} follow the scene again.", name=name), ui_scale)
+    draw, half = imgui.get_window_draw_list(), 0.13 * side
+    ink = theme.color(theme.ACCENT if follows else theme.TEXT)
+    middle = Vec(corner.x + side / 2, corner.y + side / 2)
+    gap = 0.05 * side if follows else 0.18 * side
+    for sign in (-1, 1):
+        near, far = middle.x + sign * (gap - 0.1 * side), middle.x + sign * (gap + 0.24 * side)
+        low, high = min(near, far), max(near, far)
+        draw.add_rect(
+            Vec(low, middle.y - half), Vec(high, middle.y + half), ink, half,
+            max(1.0, side / 14),
+        )  # fmt: skip
 
 
 def _split_button(state: EditorState, index: int, on: bool, ui_scale: float) -> None:

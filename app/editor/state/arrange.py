@@ -9,6 +9,7 @@ import numpy as np
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.scene_objects import with_background
+from shapeshift.app.editor.state.shown_scene import leader_of
 from shapeshift.app.editor.state.track import next_stop, stepped
 from shapeshift.app.film.window.timeline import FilmKeys
 from shapeshift.runtime_models.model import BadFile
@@ -176,9 +177,32 @@ def steer(state: EditorState, index: int, x: Control) -> None:
 
 def steer_by_hand(state: EditorState, index: int, x: float) -> None:
     """The same by a slider, a key or a number: what played stops, and keys go on with this one."""
-    state.sweeps[index].playing = False
-    state.steered = state.scene.objects[index].name
-    steer(state, index, x)
+    chain = state.chain.of(state.scene, index)
+    state.steered = state.scene.objects[chain[0]].name
+    for each in chain:
+        state.sweeps[each].playing = False
+        steer(state, each, x)
+
+
+def steer_chain(state: EditorState, index: int, x: Control) -> None:
+    """The same of an object and all that goes along with it."""
+    for each in state.chain.of(state.scene, index):
+        steer(state, each, x)
+
+
+def unchain(state: EditorState, index: int) -> None:
+    """From now on an object has a slider of its own."""
+    state.chain.loose.add(state.scene.objects[index].name)
+
+
+def rejoin(state: EditorState, index: int) -> None:
+    """An object goes along with its scene again, from where that is."""
+    leader = leader_of(state.scene)
+    if leader is not None:
+        state.chain.loose.discard(state.scene.objects[index].name)
+        state.sweeps[index].playing = False
+        state.shifts.pop(index, None)
+        steer(state, index, state.scene.objects[leader].x)
 
 
 def steered_index(state: EditorState) -> int | None:
@@ -215,20 +239,25 @@ def go_to_stop(state: EditorState, index: int, number: int) -> None:
 
 def all_go_to_stop(state: EditorState, number: int) -> None:
     """Every object that has a stop of that number, counted from 0, goes there."""
+    followers = state.chain.followers(state.scene)
     for index in range(len(state.scene.objects)):
-        leave_for_stop(state, index, number)
+        if index not in followers:
+            leave_for_stop(state, index, number)
 
 
 def leave_for_stop(state: EditorState, index: int, number: int) -> None:
-    """Straight there, to rest; where the object starts is there at once."""
-    obj, stops = state.scene.objects[index], state.stops(index)
+    """Straight there, to rest, with all that goes along; where they start is there at once."""
+    chain = state.chain.of(state.scene, index)
+    obj, stops = state.scene.objects[chain[0]], state.stops(index)
     if number >= len(stops):
         return
-    state.sweeps[index].playing = False
+    for each in chain:
+        state.sweeps[each].playing = False
     if (end := stops[number].x) != obj.x:
-        steer(state, index, end)
-        state.set_x(index, obj.x)
-        state.shifts[index] = Shift(obj.x, end, obj.model.blend)
+        for each in chain:
+            steer(state, each, end)
+            state.set_x(each, obj.x)
+        state.shifts[chain[0]] = Shift(obj.x, end, obj.model.blend)
 
 
 def place(state: EditorState, index: int, pose: Pose) -> None:

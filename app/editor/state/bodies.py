@@ -42,6 +42,7 @@ class Bodies:
         self._future: Future | None = None
         self._stale = True  # the world does not know of the last edits yet
         self._told: set[str] = set()  # notes of this scene
+        self.why_none = ""  # the problem that left nothing to be touched; "": none did
         self._given_up = False  # there can be no world: the scene is there to be seen and edited
         self._unwanted = threading.Event()  # ends the thread at its next word
         self._thread: threading.Thread | None = None
@@ -85,6 +86,11 @@ class Bodies:
         return self._future is not None
 
     @property
+    def pending(self) -> bool:
+        """Whether there may be a world soon that is not there yet."""
+        return self.world is None and (self.busy or (self._stale and not self._given_up))
+
+    @property
     def status(self) -> str:
         what, part = self._making
         return f"{what} {part:.0%}" if self.busy else ""
@@ -104,11 +110,12 @@ class Bodies:
             key, made, problem, rough = future.result()
             self._exchange(key, made, rough)
             self.problem = problem or self.problem
+            self.why_none = problem or self.why_none
         try:
             self._catch_up(edited)
         except BadFile as error:
             self.problem, self._stale = str(error), False
-            self._given_up = self.world is None
+            self.why_none, self._given_up = self.problem, self.world is None
         return self.busy
 
     def _exchange(self, key: tuple, made: "Collider | None", rough: "Collider | None") -> None:
@@ -125,6 +132,7 @@ class Bodies:
         touched = [item for item in file.all_items if item.collider is not None]
         if self._stale:
             missing = [item for item in touched if not self._is_made(item)]
+            missing.sort(key=lambda item: item.name == BACKGROUND)  # small things first
             if missing:
                 self._start(edited, missing[0], None)
                 return

@@ -22,7 +22,7 @@ from shapeshift.app.editor.state.scene_objects import (
     with_background,
     with_palette,
 )
-from shapeshift.app.editor.state.shown_scene import ShownScene, SplitState
+from shapeshift.app.editor.state.shown_scene import Chain, ShownScene, SplitState
 from shapeshift.app.editor.state.track import Grip
 from shapeshift.app.film.window.timeline import Timeline
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
@@ -80,6 +80,7 @@ class EditorState:
         self._picker = Picker()
         self.shown_scene = ShownScene()
         self._movable: tuple[Scene | None, list[int]] = (None, [])
+        self.chain = Chain()
         self._legend: tuple[Scene | None, bool] = (None, False)
 
     def open(self, paths: Sequence[Path], x: float | None = None) -> None:
@@ -101,6 +102,7 @@ class EditorState:
     def show(self, scene: Scene, edited: EditedFile | None = None) -> None:
         """Takes a scene over and frames it."""
         self.scene, self.chosen, self.shifts = scene, "", {}
+        self.chain.loose.clear()
         self.timeline.forget()
         self.split.on, self.split.name = False, ""
         self.edited = edited or edited_from_scene(scene, self.sources)
@@ -153,8 +155,7 @@ class EditorState:
     @property
     def first_target(self) -> np.ndarray:
         """(3,) metres: what the first view looks at and turns about."""
-        view = self.edited.file.view
-        return self.centre if view is None else np.array(view.target)
+        return self.centre if (view := self.edited.file.view) is None else np.array(view.target)
 
     @property
     def origin(self) -> np.ndarray:
@@ -204,15 +205,8 @@ class EditorState:
 
     def paint(self, view: View, cursor: tuple[float, float], radius: float, erase: bool) -> None:
         """Paints anchors of the chosen painted region, of a new one where none is chosen."""
-        regions = self.regions
-        if regions.current is None or regions.current.kind != "painted":
-            numbers = [n for n, region in enumerate(regions.items) if region.kind == "painted"]
-            if numbers:
-                regions.choose(numbers[-1])
-            else:
-                regions.add("painted", 0, self.scene.objects[0], np.zeros(3))
-        obj = self.scene.objects[regions.items[regions.chosen].index]
-        regions.paint(view, cursor, radius, obj, erase)
+        obj = self.regions.choose_painted(self.scene.objects)
+        self.regions.paint(view, cursor, radius, obj, erase)
 
     @property
     def world(self) -> "World | None":
@@ -266,6 +260,11 @@ class EditorState:
         if self.world is not None and obj.name in self.world.objects:
             self.world.control(obj.name, x)
 
+    def set_chain_x(self, index: int, x: Control) -> None:
+        """The same of all that go along with this one."""
+        for each in self.chain.of(self.scene, index):
+            self.set_x(each, x)
+
     def _replace_object(self, index: int, obj: SceneObject) -> None:
         objects = list(self.scene.objects)
         objects[index] = obj
@@ -287,23 +286,24 @@ class EditorState:
             taken = self.scene.objects[index].x != shift.control
             shift.seconds += seconds
             if not taken:
-                self.set_x(index, shift.control)
+                self.set_chain_x(index, shift.control)
             if taken or shift.over:
                 del self.shifts[index]
 
     def toggle_play(self, index: int | None = None) -> None:
-        """Starts or stops one object's sweep, or all together: all stop if any was playing."""
-        chosen = range(len(self.sweeps)) if index is None else [index]
+        """Starts or stops one sweep, or all together: all stop if any was playing."""
+        indices = range(len(self.sweeps)) if index is None else [index]
+        chosen = {self.chain.of(self.scene, i)[0] for i in indices}
         start = not any(self.sweeps[i].playing for i in chosen)
         for i in chosen:
             self.shifts.pop(i, None)
             if start:
-                self.set_x(i, self.sweeps[i].play(self.scene.objects[i].x))
+                self.set_chain_x(i, self.sweeps[i].play(self.scene.objects[i].x))
             else:
                 self.sweeps[i].playing = False
 
     def visit(self, index: int, x: float, on: bool) -> None:
-        """Adds a stop to those that an object's sweep visits or takes it away; two are left."""
+        """Adds a stop to those that a sweep visits or takes it away; two are left."""
         sweep = self.sweeps[index]
         xs = {*sweep.xs, x} if on else {*sweep.xs} - {x}
         if len(xs) >= 2:
@@ -320,9 +320,15 @@ class EditorState:
         return self._movable[1]
 
     @property
+    def tracks(self) -> list[int]:
+        """Of those, the ones that do not follow their scene."""
+        return [i for i in self.movable if i not in self.chain.followers(self.scene)]
+
+    @property
     def sliders(self) -> list[int]:
-        """Of those, the ones that there is room for: all of a few, else the chosen one."""
-        movable, chosen = self.movable, self.chosen_index
+        """Of tracks, those that there is room for: all of a few, else the chosen one's."""
+        movable, index = self.tracks, self.chosen_index
+        chosen = None if index is None else self.chain.of(self.scene, index)[0]
         if len(movable) <= self.most_sliders:
             return movable
         seen = [index for index in movable if self.scene.objects[index].visible]
@@ -357,18 +363,16 @@ class EditorState:
         return bool(self.shifts) or sweeping or self.timeline.playing
 
     def advance(self, seconds: float) -> None:
-        """Lets playing sweeps and shifts go on; a slider moved by hand meanwhile is where a sweep
-        continues.
-        """
+        """Lets sweeps and shifts go on, each from where a hand has left its slider meanwhile."""
         self.seconds = seconds
         self._advance_shifts(seconds)
         for index, sweep in enumerate(self.sweeps):
             if sweep.playing:
                 sweep.resume_at(self.scene.objects[index].x)
-                self.set_x(index, sweep.advance(seconds))
+                self.set_chain_x(index, sweep.advance(seconds))
 
     def choose_palette(self, name: str) -> None:
-        """Shows every value stop in that palette; AS_FILED gives back the scene's own."""
+        """Shows every value stop in that palette; AS_FILED: in the scene's own."""
         self.palette = name
         objects = [
             replace(obj, model=self.in_palette(model))

@@ -1,5 +1,6 @@
 """Regions of a scene that have a control value of their own, as a person edits them; no window."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -191,6 +192,16 @@ class Regions:
                 return not region.enabled
         self.add("lens", 0, obj, np.zeros(3))
         return True
+
+    def choose_painted(self, objects: Sequence[SceneObject]) -> SceneObject:
+        """The object of the chosen painted region, of the last one or a new one where none is."""
+        if self.current is None or self.current.kind != "painted":
+            numbers = [n for n, region in enumerate(self.items) if region.kind == "painted"]
+            if numbers:
+                self.choose(numbers[-1])
+            else:
+                self.add("painted", 0, objects[0], np.zeros(3))
+        return objects[self.items[self.chosen].index]
 
     def paint(
         self, view: View, cursor: tuple[float, float], radius: float, obj: SceneObject,

@@ -1,6 +1,6 @@
 """The scene as it is looked at: with its regions, in one of four views, what is chosen lit up."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from shapeshift.runtime_models.model import Model, Stop
 from shapeshift.runtime_models.parts import BACKGROUND
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.control import Shift
+from shapeshift.scene.document.scene_file import BACKGROUND as ITS_NAME
 from shapeshift.scene.film.style_path import AutoSlide
 from shapeshift.scene.four_views import FOUR_VIEWS, FULL, parts_of, shown_as, with_rows
 from shapeshift.scene.pose import View
@@ -85,6 +86,53 @@ def isolated_name(scene: Scene, chosen: str) -> str:
     return chosen if alone else ""
 
 
+# Which objects go along with the scene that they were cut out of.
+
+
+@dataclass
+class Chain:
+    """An object with its scene's stops that stands at its scene's x follows it, until somebody says
+    otherwise.
+    """
+
+    loose: set[str] = field(default_factory=set)  # names of objects that have a slider of their own
+    _found: tuple = (None, frozenset(), ())
+
+    def of(self, scene: Scene, index: int) -> tuple[int, ...]:
+        """All that go with an object, itself among them, the one with the slider first."""
+        followers = self.followers(scene)
+        leader = leader_of(scene)
+        if leader is None or (index != leader and index not in followers):
+            return (index,)
+        return (leader, *followers)
+
+    def followers(self, scene: Scene) -> tuple[int, ...]:
+        """Indices of the objects that go along with their scene."""
+        if self._found[0] is not scene or self._found[1] != self.loose:
+            leader, found = leader_of(scene), []
+            for index, obj in enumerate(scene.objects):
+                if leader is not None and index != leader and obj.name not in self.loose:
+                    its = scene.objects[leader]
+                    if obj.x == its.x and may_follow(obj, its):
+                        found.append(index)
+            self._found = (scene, frozenset(self.loose), tuple(found))
+        return self._found[2]
+
+
+def leader_of(scene: Scene) -> int | None:
+    """The background that things were cut out of; None: there is none that can go anywhere."""
+    for index, obj in enumerate(scene.objects):
+        if obj.name == ITS_NAME and len({stop.x for stop in obj.model.stops}) > 1:
+            return index
+    return None
+
+
+def may_follow(obj: SceneObject, leader: SceneObject) -> bool:
+    """Whether an object has the stops of its scene, where its scene has them."""
+    own, its = (sorted((s.x, s.name) for s in each.model.stops) for each in (obj, leader))
+    return obj is not leader and own == its
+
+
 # Which object is shown at two values of x at once, and what stands left and right of the line.
 
 ON_STOP = 1e-3
@@ -129,12 +177,18 @@ class SplitState:
                 return heat_at(obj, self.x) >= heat_at(obj, obj.x)
         return True
 
-    def right(self, scene: Scene) -> Scene:
-        """The scene right of the line; the same one where the object is gone."""
-        if not any(obj.name == self.name for obj in scene.objects):
+    def right(self, scene: Scene, chain: "Chain | None" = None) -> Scene:
+        """The scene right of the line, with all that goes along; the same one where the object is
+        gone.
+        """
+        names = [obj.name for obj in scene.objects]
+        if self.name not in names:
             return scene
+        index = names.index(self.name)
+        moved = [index] if chain is None else chain.of(scene, index)
         objects = [
-            replace(obj, x=self.x) if obj.name == self.name else obj for obj in scene.objects
+            replace(obj, x=self.x) if number in moved else obj
+            for number, obj in enumerate(scene.objects)
         ]
         return Scene(tuple(objects))
 

@@ -20,6 +20,8 @@ from shapeshift.scene.world.world import World
 HAND = "mouse"
 HOW, HOW_S = "Drag an object. X shoots. T stops.", 9.0  # said once, for so many seconds
 STILL, MOVING = "objects hold still: T lets them move", "drag an object, X shoots, T stops"
+KEPT = "objects move as soon as they have bodies"
+NO_BODIES = "Nothing here can be touched: cut an object out first, with O."
 REMEMBERED = 6  # reactions that the panel lists
 WORDS = {"collision": "struck", "grab": "taken", "ray": "hit by a ray", "enter": "arrived"}
 LABEL_S, FLASH_S = 1.8, 0.4  # how long they are seen
@@ -58,6 +60,7 @@ class TouchState:
         self.flashes: list[Flash] = []
         self._known: World | None = None
         self._unfold = False
+        self.wanted = False  # that objects move, as soon as they have bodies
 
     @property
     def world(self) -> World | None:
@@ -80,7 +83,7 @@ class TouchState:
 
     def forget(self) -> None:
         """Another scene: nothing of the old one is held or listed."""
-        self.hand = self._known = None
+        self.hand, self._known, self.wanted = None, None, False
         self.pads.clear()
         self.reactions.clear()
         self.labels.clear()
@@ -94,11 +97,11 @@ class TouchState:
     def meet(self, world: World) -> None:
         """The bodies of what was opened are there, or there anew on another floor."""
         if self._known is None:
-            plays = self.opens_playing and self._begin(world)
+            plays = (self.opens_playing or self.wanted) and self._begin(world)
             self._unfold, world.paused = True, not plays
             if plays:
                 self._say(said(HOW), HOW_S)
-        self._known = world
+        self._known, self.wanted = world, False
 
     @property
     def opens_playing(self) -> bool:
@@ -111,7 +114,7 @@ class TouchState:
         if self.held:
             return said("carrying {name}", name=self.held)
         if self.world is None:
-            return ""
+            return said(KEPT) if self.wanted else ""
         return said(STILL if self.world.paused else MOVING)
 
     def release(self) -> None:
@@ -121,15 +124,29 @@ class TouchState:
         self.hand = None
 
     def toggle(self) -> None:
-        """Lets objects move, or holds them still."""
+        """Lets objects move, or holds them still; before they have bodies that is kept for then."""
         self.release()
         world = self.world
         if world is None:
+            self._ask_for_bodies()
             return
         if world.paused and not self._begin(world):
             return
         world.paused = not world.paused
         self._say(said("Objects hold still. T lets them move.") if world.paused else said(HOW))
+
+    def _ask_for_bodies(self) -> None:
+        """T too early: it is kept and said, a second one takes it back; or why it never can be."""
+        bodies = self._state.bodies
+        if not bodies.pending:
+            self._say(said(bodies.why_none or NO_BODIES))
+            return
+        self.wanted = not self.wanted
+        if self.wanted:
+            self._say(said("Objects get their bodies: {status}. They move then.",
+                           status=bodies.status), HOW_S)  # fmt: skip
+        else:
+            self._say(said("Objects hold still. T lets them move."))
 
     def _begin(self, world: World) -> bool:
         """Nothing starts inside another thing; False, and a sentence, where it would."""
@@ -170,6 +187,9 @@ class TouchState:
         world = self.world
         if world is None:
             self.hand = None
+            if self.wanted and not self._state.bodies.pending:
+                self.wanted = False
+                self._say(said(self._state.bodies.why_none or NO_BODIES))
             if self._state.bodies.busy and self.opens_playing:
                 self._state.say(said("Getting objects ready to be touched \u2026"))
             return False

@@ -101,7 +101,10 @@ class MouseTouch:
         """True for what concerns the hand, its ray and the physics."""
         world, hand = self._touch.world, self._touch.hand
         if world is None:
-            return False
+            asked = isinstance(event, KeyDown) and event.key == glfw.KEY_T and not event.ctrl
+            if asked:
+                self._touch.toggle()
+            return asked
         if isinstance(event, KeyDown):
             return self.press_key(event, world)
         if hand is None:

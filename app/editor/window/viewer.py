@@ -351,7 +351,7 @@ class Viewer:
         if not state.save_picture:
             self._draw_marks(scale)
         if state.overlay and layout.status is not None:
-            right = state.split.right(state.scene) if state.split.on else state.scene
+            right = state.split.right(state.scene, state.chain) if state.split.on else state.scene
             for scene, box in ((state.scene, layout.left_legend), (right, layout.legend)):
                 if box is not None:
                     unit, ends = self.settings.temperature, state.settings.heat_ends

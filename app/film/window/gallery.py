@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shapeshift.app.editor.state.arrange import steer
+from shapeshift.app.editor.state.arrange import steer_chain
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
@@ -61,7 +61,7 @@ class Gallery:
             return
         self.stop_sliding()
         self.part = float(len(self.picked) - 1)
-        steer(self._state, self.index, self._control(self.picked[-1]))
+        steer_chain(self._state, self.index, self._control(self.picked[-1]))
 
     def slide(self, part: float) -> None:
         """A hand goes to a part of the way between the two, at its even pace."""
@@ -71,7 +71,7 @@ class Gallery:
         self.part = part
         blend = self._state.scene.objects[self.index].model.blend
         start, end = map(self._control, self.picked)
-        steer(self._state, self.index, blend.between(start, end, part))
+        steer_chain(self._state, self.index, blend.between(start, end, part))
 
     @property
     def sliding(self) -> bool:
@@ -89,7 +89,7 @@ class Gallery:
         elif self.index is not None and len(self.picked) == 2:
             blend = self._state.scene.objects[self.index].model.blend
             start, end = map(self._control, self.picked)
-            steer(self._state, self.index, start)
+            steer_chain(self._state, self.index, start)
             self._state.sweeps[self.index].playing = False
             self._state.shifts[self.index] = AutoSlide.between(start, end, blend, self.leg_s)
 

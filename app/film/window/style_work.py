@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from shapeshift.app.drawing import make_folder
-from shapeshift.app.editor.state.arrange import edit
+from shapeshift.app.editor.state.arrange import edit, go_to_stop
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import key_of
 from shapeshift.app.editor.state.files.opened import Source
@@ -41,6 +41,7 @@ class StyleWork(ChildWork):
         self.shape = SHAPES[0]
         self.strength = 1.0
         self._path = Path()
+        self._going_to = ""  # a stop of what is being opened
 
     def status(self) -> str:
         """Words for the status line; "" when nothing is under way."""
@@ -57,7 +58,8 @@ class StyleWork(ChildWork):
     def add(self, source: str, index: int = 0) -> None:
         """Begins a stop of the chosen shape, from the stop `source` of an object."""
         name = self.name(index)
-        words = ["--shape", self.shape, "--name", name, "--from", source, "--after", source]
+        # Behind all others: the ways between those that were there stay what they were.
+        words = ["--shape", self.shape, "--name", name, "--from", source]
         self._begin([*words, "--strength", f"{self.strength:g}"], self.shape, index, name)
 
     def remove(self, stop: str, index: int = 0) -> None:
@@ -84,11 +86,25 @@ class StyleWork(ChildWork):
     def say_failed(self, why: object) -> None:
         self._state.problem = said("There is no new style: {error}", error=why)
 
+    def poll(self) -> bool:
+        """Once a frame; what was made of what is open alone is gone to as soon as it is open."""
+        busy = super().poll()
+        opened, wanted = self._state.sources, self._going_to
+        if not wanted or len(opened) != 1 or opened[0].path != self._path:
+            return busy
+        self._going_to = ""
+        names = [stop.name for stop in self._state.stops(0)]
+        if wanted in names:
+            go_to_stop(self._state, 0, names.index(wanted))
+            self._state.say(said("{stop} is the last stop now.", stop=wanted))
+        return True
+
     def show(self, child: ProgramChild) -> None:
         """What was made, in place of what it was made of."""
         state = self._state
         alone = state.edited.path is None and len(state.scene.objects) == 1
         if self._open_file is not None and alone and not unsaved(state):
+            self._going_to = self._stop
             self._open_file(self._path)
             return
         try:

@@ -8,12 +8,15 @@ import pytest
 from shapeshift.decomposition.completion.verify import (
     LEAST_ALIKE_DB,
     LEAST_FEWER,
+    LEAST_PIXELS,
     MOST_AWAY,
     MOST_LOST_DB,
     MOST_STRANGE,
     Cells,
+    ModelPictures,
     PhotoView,
     Tally,
+    expected_colors,
     judge,
     strangeness,
     verify,
@@ -28,6 +31,11 @@ GOOD = Tally(
     error_before=1.0, error_after=1.0, beside=1000, strange=0.0, filled=100,
     away=0.0, placed=100,
 )  # fmt: skip
+
+
+def unlike(before: float, after: float) -> np.ndarray:
+    """Of one thing's pixels, as Tally has it."""
+    return np.array([[0.0, before], [0.0, after]])
 
 
 def test_a_good_step_is_accepted():
@@ -50,6 +58,8 @@ def test_a_good_step_is_accepted():
         ({"strange": float("nan")}, "its colours are not those around"),
         ({"away": 100 * MOST_AWAY + 1e-6}, "sides of a cell off the plane"),
         ({"away": float("nan")}, "sides of a cell off the plane"),
+        ({"unlike": unlike(1.0, 1.0 + 1e-9)}, "more like the plane around"),
+        ({"unlike": unlike(1.0, float("nan"))}, "more like the plane around"),
     ],
 )
 def test_each_reason_to_refuse(change, word):
@@ -66,6 +76,9 @@ def test_each_reason_to_refuse(change, word):
         {"alike_db": LEAST_ALIKE_DB},
         {"strange": 100 * MOST_STRANGE},
         {"away": 100 * MOST_AWAY},
+        {"unlike": unlike(1.0, 1.0)},
+        # Half of the plane around looks like a hole, too: of a copy no more can be asked.
+        {"met": int(50 * LEAST_FEWER) + 1, "usual": 100, "usual_bad": 50},
     ],
 )
 def test_the_thresholds_themselves_pass(change):
@@ -98,6 +111,15 @@ def flat_model(lift: float) -> tuple[AnchorModel, PhotoView, Cells]:
         np.tile(np.array([1, 1e-4, 1], np.float32), (count, 1)),
         np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)),
     )
+    # No splat is turned: each lies in the plane, and so does what one sees of it.
+    turn = model.networks["rotation"]
+    upright = np.tile(np.array([1, 0, 0, 0], np.float32), model.splats_per_anchor)
+    flat = replace(
+        turn,
+        weights=(*turn.weights[:-1], 0 * turn.weights[-1]),
+        biases=(*turn.biases[:-1], upright),
+    )
+    model = replace(model, networks={**model.networks, "rotation": flat})
     places = np.random.default_rng(0).uniform(-0.1, 0.1, (count, 3)) * (1, 0, 1)
     places[:, 1] = 0.5 + lift * side
     after = replace(model, anchors=places.astype(np.float32), frames=frames)
@@ -108,6 +130,39 @@ def flat_model(lift: float) -> tuple[AnchorModel, PhotoView, Cells]:
     x, z = (g.ravel() for g in np.mgrid[-5:6, -5:6] * side)
     cells = Cells(np.stack([x, 0 * x + 0.5, z], 1), side, np.array([0.0, 1.0, 0.0]))
     return after, PhotoView(LabelledView(view, 0.0, labels)), cells
+
+
+def test_colours_around_tell_what_is_expected_and_shadow_does_not():
+    """Of a plane that is grey on its left and lighter on its right, with a black shadow."""
+    photo = np.full((40, 60, 3), 0.4)
+    photo[:, 30:] = 0.6
+    place = np.zeros((40, 60), bool)
+    place[15:25, 5:55] = True
+    plane = ~place
+    photo[25:28, 5:55] = 0.0
+    wanted = np.full(photo.shape, np.nan)
+    wanted[place] = expected_colors(photo, plane, place)
+    assert wanted[20, 5:55].min() >= 0.4 - 1e-6 and wanted[20, 5:55].max() <= 0.6 + 1e-6
+    assert (np.diff(wanted[20, 5:55, 0]) > 0).all()
+    # A Gaussian of SPREAD: 24 pixels off the edge its other side weighs erfc(sqrt(2)) / 2 = 2.3 %.
+    assert wanted[20, 6, 0] == pytest.approx(0.4, abs=0.2 * 0.03)
+    assert expected_colors(photo, ~plane, plane) is not None
+    few = np.zeros_like(plane)
+    few.ravel()[: LEAST_PIXELS - 1] = True
+    assert expected_colors(photo, few, place) is None
+
+
+def test_pictures_that_are_kept_are_those_that_are_drawn(device):
+    model, view, _ = flat_model(0.0)
+    pictures, camera = ModelPictures(device, model), view.labelled.view
+    picture, metres = pictures.seen(camera, 0.0)
+    assert pictures.seen(camera, 0.0)[0] is picture
+    # Where less than 1e-4 of the light is left, one of the two may stop (3DGS).
+    assert np.abs(picture - pictures.draw(camera, 0.0)).max() < 2e-4
+    solid = picture[..., 3] > 0.5
+    assert np.isfinite(metres[solid]).all() and solid.any()
+    pictures._room, pictures._kept = 0, {}  # none is kept where there is no room
+    assert pictures.seen(camera, 0.0)[0] is not picture and not pictures._kept
 
 
 def test_a_ghost_that_hides_the_plane_is_no_less_a_hole(device):

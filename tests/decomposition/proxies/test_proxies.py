@@ -6,10 +6,13 @@ import pytest
 from shapeshift.decomposition.assemble import (
     LEANS,
     MOST_PRESSED,
+    PIECES,
     SNAP,
+    Proxy,
     choose_proxy,
     middle_of,
     pressed,
+    proxies_apart,
     stands,
 )
 from shapeshift.decomposition.completion.plane import Plane
@@ -22,7 +25,11 @@ from shapeshift.decomposition.proxies.ground import (
     without_diagonals,
     without_pinches,
 )
-from shapeshift.decomposition.proxies.silhouettes import score_silhouettes, silhouette
+from shapeshift.decomposition.proxies.silhouettes import (
+    SilhouetteScore,
+    score_silhouettes,
+    silhouette,
+)
 from shapeshift.scene.colliders.carve import SeenDepth
 from shapeshift.scene.colliders.collider import Collider, box_around
 from shapeshift.scene.colliders.collider_wrap import is_watertight, join_meshes, volume
@@ -102,6 +109,30 @@ def test_the_middle_is_that_of_the_mass():
     hull = Trimesh(cut).convex_hull
     assert middle_of([cut]) == pytest.approx(hull.center_mass, abs=1e-9)
     assert middle_of([cut, cut + 1]) == pytest.approx(hull.center_mass + 0.5, abs=1e-9)
+
+
+def test_a_hull_that_swallows_a_neighbour_is_made_of_pieces(monkeypatch):
+    """An L whose one hull holds the ball in its corner: its two pieces leave it alone."""
+    x, z = np.eye(3)[[0, 2]]
+    legs = [box(0.5, 0.1, 0.1) + 0.4 * x, box(0.1, 0.1, 0.5) + 0.4 * z]
+    ball = box(0.1, 0.1, 0.1) + 0.25 * (x + z)
+    monkeypatch.setattr("shapeshift.decomposition.assemble.part_of", lambda *_: (None, np.zeros(3)))
+    asked = []
+
+    def proxy(name: str, parts: list) -> Proxy:
+        return Proxy(name, Collider(tuple(parts), box_around(legs[0])), SilhouetteScore(0, 0, 0))
+
+    def make(label: int, only: str) -> Proxy:
+        asked.append((label, only))
+        return proxy(only, legs if label == 1 else [ball])
+
+    proxies = {1: proxy("hull", [np.concatenate(legs)]), 2: proxy("given.glb", [ball])}
+    made = proxies_apart(proxies, None, make)
+    assert asked == [(1, PIECES)]  # the user's own mesh is not made anew
+    assert all(map(np.array_equal, made[1].collider.parts, legs))
+    assert np.array_equal(made[2].collider.parts[0], ball)
+    asked.clear()
+    assert proxies_apart({1: proxies[1]}, None, make) == {1: proxies[1]} and not asked
 
 
 def test_a_silhouette_is_what_the_cube_covers():

@@ -78,7 +78,7 @@ KEY_TABLES = (
 )  # fmt: skip
 STATES = {
     "files.saving": ("LOSE",), "parts.parts_tool": ("HOW",),
-    "touch_state": ("HOW", "STILL", "MOVING"),
+    "touch_state": ("HOW", "STILL", "MOVING", "KEPT", "NO_BODIES"),
 }  # fmt: skip
 # Texts on their way through variables, as tests/.../look/test_desktop_languages.py has found them.
 BY_VARIABLES = {

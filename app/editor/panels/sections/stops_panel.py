@@ -24,7 +24,7 @@ def draw_stops(state: EditorState, ui_scale: float) -> None:
     """Of every object that has some: the stops to go to, play and pause, the pace."""
     for index in state.sliders:
         imgui.push_id(index)
-        if len(state.movable) > 1:
+        if len(state.tracks) > 1:
             imgui.text_disabled(state.scene.objects[index].name)
         _stop_buttons(state, index, ui_scale)
         playing = state.sweeps[index].playing

@@ -86,7 +86,7 @@ def test_a_background_s_is_another_than_an_object_s(made):
     file = replace(of.file, background=replace(background, static=True))
     of.history = History.of(file)
     until_there(bodies, of)
-    assert made == [("background", 0.0), ("a", 0.0)]
+    assert made == [("a", 0.0), ("background", 0.0)]  # the small thing first
 
 
 def test_a_slider_does_not_make_it_anew(made):

@@ -60,7 +60,7 @@ def test_the_command_is_the_program_s_own(work, child, tmp_path):
     out = tmp_path / "scenes" / "three-melt-001.shift"
     assert child[0].words == [
         "style", str(tmp_path / "three.shift"), "--out", str(out), "--shape", "melt",
-        "--name", "Melt", "--from", "Opened", "--after", "Opened", "--strength", "0.5",
+        "--name", "Melt", "--from", "Opened", "--strength", "0.5",
     ]  # fmt: skip
     assert styles.running and styles.poll() and styles.status() == "style 40%"
     styles.cancel()
@@ -146,3 +146,23 @@ def wait_for(styles: StyleWork) -> None:
     while styles.poll() and styles.running:
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def test_the_new_stop_is_gone_to_as_soon_as_it_is_open(work, child, tmp_path):
+    """It is the last one: from RGB on the ways are those that were there."""
+    state, styles, shown = work
+    styles.shape = "melt"
+    styles.add("RGB")
+    four_stop_package(styles._path)
+    child[-1].code = 0
+    styles._stop = read_package(styles._path).stops[-1].name  # as the command would have called it
+    assert styles.poll() and shown == [styles._path]
+    styles.poll()
+    assert state.scene.objects[0].x == 0.0  # it is not open yet
+    state.open(shown)
+    styles.poll()
+    state.finish_shifts()
+    assert state.scene.objects[0].slider_x == 1.0 and "last stop" in state.messages.note
+    state.set_x(0, 0.0)
+    styles.poll()
+    assert not state.shifts  # once
