@@ -13,6 +13,7 @@ from shapeshift.runtime_models.shapes import four, three
 from shapeshift.scene.cameras.upright import (
     ASSUMED,
     LEVEL,
+    PLANES,
     UNIT_M,
     Up,
     Upright,
@@ -36,9 +37,7 @@ def planes_under(
     looks, labels = (
         (looks_of(model), model.labels) if isinstance(model, AnchorModel) else splat_places(model)
     )
-    planes = {
-        p.spec.label: support_plane(looks, labels, p.spec.label) for p in parts if p.rows
-    }
+    planes = {p.spec.label: support_plane(looks, labels, p.spec.label) for p in parts if p.rows}
     return {label: plane for label, plane in planes.items() if isinstance(plane, Plane)}
 
 
@@ -67,11 +66,11 @@ def upright_scene(
     names = {part.spec.label: part.spec.name for part in found.parts}
     normals = {names[label]: plane.normal for label, plane in planes.items() if label in names}
     level, others = up_of_planes(normals, ways)
-    if level is not None:
-        ways.append(level)
+    if level is not None:  # nearer to the things than the plane of the capture's points
+        ways = [*(way for way in ways if way.source != PLANES), level]
     used = believed(ways)
     told = [said] if (said := ways_sentence(ways, used)) else []
-    if level is None:
+    if used.source != PLANES and level is None:
         told.append("Nothing flat is under the objects, so no plane says what is up.")
     if others:
         told.append(f"Not on those planes, but on others, stand: {', '.join(others)}.")

@@ -169,11 +169,13 @@ def draw_run(steps_done, simulation, file, size: tuple[int, int], options: Optio
     from dataclasses import replace
 
     from shapeshift.app.drawing import open_renderer, save_png
+    from shapeshift.scene.appearance import behind_of
     from shapeshift.scene.document.scene_file import first_view
 
     view = first_view(file, simulation.world.drawn(), size)
     with open_renderer(options.context, options.drawing) as (renderer, _):
-        renderer.settings = replace(renderer.settings, background=(0.0, 0.0, 0.0))
+        behind = behind_of(file.sky) or (0.0, 0.0, 0.0)
+        renderer.settings = replace(renderer.settings, background=behind)
         for number in steps_done:
             if number % options.pictures == 0:
                 renderer.update(simulation.world.drawn())

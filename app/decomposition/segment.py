@@ -143,6 +143,7 @@ def cut(
         raise UsageError("no object got any part of the scene; look at the label maps.")
     progress("asking other photos", 0, 1)
     found = judged(device, found, capture)
+    device.pool.free_held()  # what large photos were drawn in
     path = model_path(options, model)
     file = scene_of_parts(found, path.name, options.out.parent)
     planes: dict[int, Plane] = {}

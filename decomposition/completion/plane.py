@@ -7,6 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.scene.cameras.upright import plane_of_most
 from shapeshift.scene.pose import View
 
 # Where anchors are and how they look at every stop: what completion compares.
@@ -50,7 +51,6 @@ def looks_of(model: AnchorModel) -> AnchorLooks:
 
 # The plane that a thing stood on, found among the anchors around it (RANSAC).
 
-TRIES = 300
 WITHIN = 0.7  # spacings of anchors: as near to the plane is on it while it is looked for
 REACH = 2.5  # sizes of the thing around it in which the plane is looked for
 LEAST_ANCHORS, LEAST_SHARE = 40, 0.2  # of the anchors around, that lie on it
@@ -78,29 +78,10 @@ class Plane:
 
 def fit_plane(points: np.ndarray, within: float, seed: int = 0) -> tuple[Plane, np.ndarray] | None:
     """The plane of most points (N, 3) metres, and which of them lie on it (N,); None of a few."""
-    if len(points) < 3:
+    found = plane_of_most(points, within, seed)
+    if found is None:
         return None
-    random = np.random.default_rng(seed)
-    first, second, third = points[random.integers(0, len(points), (3, TRIES))]
-    normals = np.cross(second - first, third - first)
-    length = np.linalg.norm(normals, axis=1)
-    good = length > 1e-12
-    if not good.any():
-        return None
-    normals = normals[good] / length[good, None]
-    offsets = np.einsum("ti,ti->t", normals, first[good])
-    counts = [
-        (np.abs(points @ n - o) < within).sum() for n, o in zip(normals, offsets, strict=True)
-    ]
-    best = int(np.argmax(counts))
-    plane = Plane(normals[best], float(offsets[best]))
-    for _ in range(3):  # by least squares through what lies on it
-        near = np.abs(plane.height(points)) < within
-        if near.sum() < 3:
-            return None
-        middle = points[near].mean(0)
-        normal = np.linalg.svd(points[near] - middle, full_matrices=False)[2][2]
-        plane = Plane(normal, float(normal @ middle))
+    plane = Plane(*found)
     return plane, np.abs(plane.height(points)) < within
 
 

@@ -120,26 +120,27 @@ def seen_depths(
 def seen_planes(
     planes: Mapping[int, Plane], seen: Sequence[SeenDepth], spacing_m: float
 ) -> dict[int, Plane]:
-    """Each at the height of what photos see of it."""
-    near_m = SAME_HEIGHT * spacing_m
-    return {label: seen_plane(plane, seen, near_m) for label, plane in planes.items()}
-
-
-def seen_plane(plane: Plane, seen: Sequence[SeenDepth], near_m: float) -> Plane:
-    """The plane at the height of what photos see of it, at most near_m away.
+    """Each at the height of what photos see of it, at most SAME_HEIGHT spacings away.
 
     Anchors lie in the middle of a layer of splats, half its thickness under what one looks at.
     """
-    heights = [np.zeros(0)]
-    for one in seen:
+    near_m = SAME_HEIGHT * spacing_m
+    heights: dict[int, list[np.ndarray]] = {label: [np.zeros(0)] for label in planes}
+    for one in seen if planes else ():
         normals, cosines, _ = one.planes
-        height = plane.height(one.points)
-        flat = one.solid & (cosines > GRAZING) & (normals @ plane.normal > SAME_WAY)
-        heights.append(height[flat & (np.abs(height) < near_m)])
-    found = np.concatenate(heights)
-    if len(found) < FEWEST_PIXELS:
-        return plane
-    return Plane(plane.normal, plane.offset + float(np.median(found)))
+        rows = one.solid & (cosines > GRAZING)
+        normal, points = normals[rows], one.points[rows]
+        for label, plane in planes.items():
+            height = plane.height(points)
+            flat = (normal @ plane.normal > SAME_WAY) & (np.abs(height) < near_m)
+            heights[label].append(height[flat])
+    out = {}
+    for label, plane in planes.items():
+        found = np.concatenate(heights[label])
+        out[label] = plane
+        if len(found) >= FEWEST_PIXELS:
+            out[label] = Plane(plane.normal, plane.offset + float(np.median(found)))
+    return out
 
 
 def free_cells(

@@ -35,16 +35,30 @@ def silhouette(
     from PIL import Image, ImageDraw
 
     eye_from_world, fx, fy, cx, cy = view.pinhole()
-    picture = Image.new("1", (view.size[0] * FINER, view.size[1] * FINER))
-    pen = ImageDraw.Draw(picture)
-    for part, rows in zip(parts, faces or map(hull_faces, parts), strict=True):
+    outlines = []
+    for part in parts:
         x, y, z = (np.c_[part, np.ones(len(part))] @ eye_from_world.T).T[:3]
         if not (z > view.near).all():
             return None
-        pixels = np.stack([fx * x / z + cx, fy * y / z + cy], 1) * FINER - 0.5
-        for face in rows:
-            pen.polygon([tuple(corner) for corner in pixels[face]], fill=1)
-    return np.array(picture)[FINER // 2 :: FINER, FINER // 2 :: FINER]
+        outlines.append(np.stack([fx * x / z + cx, fy * y / z + cy], 1))
+    width, height = view.size
+    covered = np.zeros((height, width), bool)
+    if not sum(map(len, outlines)):
+        return covered
+    # No more of the picture is drawn than what the corners reach.
+    every = np.concatenate(outlines)
+    left, top = np.clip(np.floor(every.min(0)), 0, view.size).astype(int)
+    right, bottom = np.clip(np.floor(every.max(0)) + 1, 0, view.size).astype(int)
+    if not (left < right and top < bottom):
+        return covered
+    picture = Image.new("1", (int(right - left) * FINER, int(bottom - top) * FINER))
+    pen = ImageDraw.Draw(picture)
+    for at, rows in zip(outlines, faces or map(hull_faces, parts), strict=True):
+        pixels = (at - (left, top)) * FINER - 0.5
+        for face in pixels[np.asarray(rows)].reshape(len(rows), -1).tolist():
+            pen.polygon(face, fill=1)
+    covered[top:bottom, left:right] = np.array(picture)[FINER // 2 :: FINER, FINER // 2 :: FINER]
+    return covered
 
 
 def score_silhouettes(

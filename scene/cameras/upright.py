@@ -25,6 +25,10 @@ CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they say not
 CLEAR_PLANE = 0.5  # of the second singular value that the third may have: rows lie in a plane
 LEAST_TURN = 0.1  # of the first singular value in the second: photos look in different directions
 LOOKS_DOWN = 0.1  # mean part of the lines of sight along the normal that tells its upper side
+TRIES = 300  # planes through three points each
+MOST_POINTS, LEAST_POINTS = 4000, 300  # that a plane is looked for among
+FLAT = 0.04  # of the points' usual way from their middle: as near to the plane is on it
+MOST_ON = 0.3  # of the points, that lie on a plane that says what is up: a plush on a bed has .27
 SIDEWAYS = 1.5  # times as clear as their up vectors: photos were held upright and stored lying
 # Up in a photo's own axes (x right, y down) by the EXIF orientation of its file
 UP_BY_ORIENTATION = {1: (0, -1), 2: (0, -1), 3: (0, 1), 4: (0, 1),
@@ -145,6 +149,62 @@ def up_of_planes(
     return Up(PLANES, three(_middle(normals, best)), things=tuple(best)), other
 
 
+def plane_of_most(
+    points: np.ndarray, within: float, seed: int = 0
+) -> tuple[np.ndarray, float] | None:
+    """Unit normal (3,) and offset of the plane that most points (N, 3) are near to; None of a few.
+
+    The best of TRIES through three of them (RANSAC, Fischler and Bolles 1981), then least squares.
+    """
+    if len(points) < 3:
+        return None
+    random = np.random.default_rng(seed)
+    first, second, third = points[random.integers(0, len(points), (3, TRIES))]
+    normals = np.cross(second - first, third - first)
+    length = np.linalg.norm(normals, axis=1)
+    good = length > 1e-12
+    if not good.any():
+        return None
+    normals = normals[good] / length[good, None]
+    offsets = np.einsum("ti,ti->t", normals, first[good])
+    counts = [
+        (np.abs(points @ n - o) < within).sum() for n, o in zip(normals, offsets, strict=True)
+    ]
+    best = int(np.argmax(counts))
+    normal, offset = normals[best], float(offsets[best])
+    for _ in range(3):
+        near = np.abs(points @ normal - offset) < within
+        if near.sum() < 3:
+            return None
+        middle = points[near].mean(0)
+        normal = np.linalg.svd(points[near] - middle, full_matrices=False)[2][2]
+        offset = float(normal @ middle)
+    return normal, offset
+
+
+def up_of_points(points: np.ndarray, eyes: np.ndarray, others: Sequence[Up]) -> Up | None:
+    """What most points (P, 3) of a capture lie on, its upper side towards the eyes (E, 3); None
+    where they lie on no plane, or on one that is a wall by what the photos say, else by what was
+    taken, `others`.
+    """
+    points = np.asarray(points, np.float64)
+    points = points[np.isfinite(points).all(axis=1)]
+    points = points[:: len(points) // MOST_POINTS + 1]
+    if len(points) < LEAST_POINTS or not len(eyes):
+        return None
+    usual = float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
+    found = plane_of_most(points, FLAT * usual)
+    if found is None:
+        return None
+    normal, offset = found
+    if not (np.abs(points @ normal - offset) < FLAT * usual).mean() >= MOST_ON:
+        return None
+    normal = normal * (1 if np.median(eyes @ normal) > offset else -1)
+    way = Up(PLANES, three(normal))
+    known = next((other for other in others if other.source == PHOTOS), others[0])
+    return way if way.off(known) <= LEANS else None
+
+
 def _middle(normals: dict[str, np.ndarray], names: Sequence[str]) -> np.ndarray:
     total = np.sum([np.asarray(normals[name], np.float64) for name in names], axis=0)
     return total / np.linalg.norm(total)
@@ -221,15 +281,20 @@ def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarra
 
 
 def doubts_of_up(ups: Sequence[Up], ours_from_file: np.ndarray) -> tuple[str, ...]:
-    """A sentence where a capture's photos disagree with what was taken, the first of `ups`."""
-    if len(ups) < 2 or not disagree(*ups):
+    """A sentence with all ways where two of them disagree; what was taken is the first of `ups`."""
+    if not any(disagree(a, b) for i, a in enumerate(ups) for b in ups[i + 1 :]):
         return ()
-    taken, photos = ups
-    x, y, z = np.array(photos.direction) @ ours_from_file[:3, :3]
+    words = []
+    for other in ups[1:]:
+        x, y, z = np.array(other.direction) @ ours_from_file[:3, :3]
+        words.append(
+            f"{ups[0].off(other):.1f} degrees from up by {name_of(other)}, "
+            f"[{x:.3f}, {y:.3f}, {z:.3f}]"
+        )
     return (
-        f"Up by {name_of(taken)} is {photos.off(taken):.1f} degrees from up by {name_of(photos)}, "
-        f"[{x:.3f}, {y:.3f}, {z:.3f}] in its own axes; the first is kept. `segment` looks for "
-        "what things stand on and turns a scene upright; 'up' in its file settles it for training.",
+        f"Up by {name_of(ups[0])} is {' and '.join(words)} in its own axes; the first is kept. "
+        "`segment` looks for what things stand on and turns a scene upright; 'up' in its file "
+        "settles it for training.",
     )
 
 
@@ -257,14 +322,16 @@ def ways_sentence(ways: Sequence[Up], used: Up) -> str:
 def believed_words(used: Up, taken: Up) -> str:
     if used == taken:
         return f"{name_of(used)} is believed"
-    return f"{name_of(used)} are believed, and the scene is turned upright"
+    is_one = used.source == PLANES and not used.things
+    verb = "is" if is_one else "are"
+    return f"{name_of(used)} {verb} believed, and the scene is turned upright"
 
 
 def name_of(way: Up) -> str:
     """In a sentence."""
     if way.source == PLANES:
         few = ", ".join(way.things[:3]) + (" and others" if len(way.things) > 3 else "")
-        return f"the planes under {few}" if way.things else "the planes under things"
+        return f"the planes under {few}" if way.things else "the plane of most points"
     if way.source == PHOTOS:
         lean = "" if way.sure else ", which all look one way and lean with it"
         return f"the photos as they were held{lean}"

@@ -78,7 +78,7 @@ class Capture:
     formulas: tuple[Stop, ...] = ()  # stops of values by formula of its stops', without photos
     files: tuple[FoundFiles, ...] = ()  # found, used, left out and why
     metres: str = ""  # who says how long a metre is in it; "": nobody
-    ups: tuple[Up, ...] = ()  # what was taken to point up, first, and what the photos say of it
+    ups: tuple[Up, ...] = ()  # what was taken to point up, then what photos and points say
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]

@@ -24,6 +24,7 @@ from shapeshift.scene.cameras.upright import (
     unit_from,
     up_of_cameras,
     up_of_photos,
+    up_of_points,
 )
 from shapeshift.scene.captures.capture import LEFT_HANDED, ORIGIN, Capture, Photo
 from shapeshift.scene.captures.dated_stops import (
@@ -124,16 +125,20 @@ class CaptureWorld:
                 "Its poses mirror the world, as those of left-handed axes do; its x axis is turned "
                 "round, so that left and right are as in the photos.",
             )
-        more += doubts_of_up(self.ups, self.ours_from_file)
         if background is None:
             background = plain_background(photos)
             notes["background"] = "found in the photos" if background else "none stated, none found"
         for stop in stops:
             if not any(p.modality == stop.name and p.split == "train" for p in photos):
                 raise BadFile(f"{folder}: modality {shown(stop.name)} has no photos to train on")
+        ups = self.ups
         if points is not None:
             points = points @ self.ours_from_file[:3, :3].T * self.unit_m - np.array(self.origin)
             points = points.astype(np.float32)
+            eyes = np.array([photo.view.world_from_eye.position for photo in photos])
+            plane = up_of_points(points, eyes, self.ups) if self.ups else None
+            ups += () if plane is None else (plane,)
+        more += doubts_of_up(ups, self.ours_from_file)
         notes.pop(UNIT_M, None)  # of a capture that this one was made of
         notes |= {UNIT_M: self.unit_m} if self.unit_m != 1 else {}
         if any(self.origin):
@@ -151,7 +156,7 @@ class CaptureWorld:
             doubts + more,
             formulas,
             metres=self.metres or "its depth photos" * any(p.depth is not None for p in photos),
-            ups=self.ups,
+            ups=ups,
         )
 
 

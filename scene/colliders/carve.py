@@ -80,9 +80,11 @@ class SeenDepth:
         """(H, W) float32 depths, NaN where there is none."""
         return np.where(np.isfinite(self.depth_m), self.depth_m, np.float32(np.nan))
 
-    @cached_property
+    @property
     def points(self) -> np.ndarray:
-        """(H, W, 3) float64 metres, world; NaN where nothing is seen."""
+        """(H, W, 3) float64 metres, world; NaN where nothing is seen.  Kept, they would be half of
+        what eighty pictures take.
+        """
         camera_from_world, fx, fy, cx, cy = self.view.pinhole()
         height, width = self.depth_m.shape
         rows, columns = np.mgrid[:height, :width] + 0.5

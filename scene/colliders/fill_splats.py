@@ -59,9 +59,10 @@ def fill_splats(
         return Filling(means[rows].astype(np.float64), 0.0, len(rows))
     axes = rotation_matrices(normalize(wxyz[rows].astype(np.float64))) * scales[rows, None, :]
     centres = means[rows].astype(np.float64)
-    points = scatter(centres, axes, scales[rows], cell_m)
-    dense = keep_dense(points, opacity[rows], solid, centres, cell_m)
-    return Filling(dense, cell_m, len(rows))
+    points, of = keep_dense(
+        scatter(centres, axes, scales[rows], cell_m), opacity[rows], solid, cell_m
+    )
+    return Filling(without_needles(points, of, centres, cell_m), cell_m, len(rows))
 
 
 def hull_points(
@@ -164,27 +165,34 @@ def keep_dense(
     points: list[tuple[np.ndarray, np.ndarray]],
     opacity: np.ndarray,
     solid: np.ndarray,
-    means: np.ndarray,
     cell_m: float,
-) -> np.ndarray:
-    """(M, 3) the points of solid splats, and of faint ones in cells where they add up."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """(M, 3) the points of solid splats, and of faint ones in cells where they add up; and (M,)
+    int32 the splat of each.
+    """
+    points = [(rows.astype(np.int32), at) for rows, at in points]
     found = [at[solid[rows]].reshape(-1, 3) for rows, at in points]
     of = [np.repeat(rows[solid[rows]], at.shape[1]) for rows, at in points]
     faint = [(rows[~solid[rows]], at[~solid[rows]]) for rows, at in points]
+    del points
     splat = np.concatenate([np.repeat(rows, at.shape[1]) for rows, at in faint])
     if len(splat):
         places = np.concatenate([at.reshape(-1, 3) for _, at in faint])
-        cells = ((places - places.min(0)) / cell_m).astype(np.int64)
-        size = cells.max(0) + 1
-        cell = (cells[:, 0] * size[1] + cells[:, 1]) * size[2] + cells[:, 2]
-        _, cell = np.unique(cell, return_inverse=True)
+        _, cell = np.unique(cells_of(places, cell_m)[0], return_inverse=True)
         once = np.unique(cell * (len(opacity) + 1) + splat)  # a splat counts once in a cell
         stopped = -np.log1p(-np.clip(opacity[once % (len(opacity) + 1)], 0, 0.99))
         total = np.bincount(once // (len(opacity) + 1), stopped, cell.max() + 1)
         enough = total[cell] >= -np.log1p(-OPAQUE)
         found.append(places[enough])
         of.append(splat[enough])
-    return without_needles(np.concatenate(found), np.concatenate(of), means, cell_m)
+    return np.concatenate(found), np.concatenate(of)
+
+
+def cells_of(points: np.ndarray, cell_m: float) -> tuple[np.ndarray, tuple[int, ...]]:
+    """(M,) int64: the cell of each point (M, 3) in a grid around all, and the grid's shape."""
+    axes = [((x - x.min()) / cell_m).astype(np.int32) for x in points.T]
+    shape = tuple(int(axis.max()) + 1 for axis in axes)
+    return np.asarray(np.ravel_multi_index(tuple(axes), shape)), shape
 
 
 def without_needles(
@@ -198,15 +206,14 @@ def without_needles(
 
     if not len(points):
         return points
-    cells = ((points - points.min(0)) / cell_m).astype(np.int64)
-    shape = cells.max(0) + 1
-    cell = np.ravel_multi_index(cells.T, shape)
+    cell, shape = cells_of(points, cell_m)
     lowest, highest = np.full(shape, len(means), np.int32), np.full(shape, -1, np.int32)
     np.minimum.at(lowest.reshape(-1), cell, splat)
     np.maximum.at(highest.reshape(-1), cell, splat)
     alone = ndimage.minimum_filter(lowest, 3) == ndimage.maximum_filter(highest, 3)
-    far = np.linalg.norm(points - means[splat], axis=1) > NEEDLE * cell_m
-    return points[~(far & alone.reshape(-1)[cell])]
+    lone = np.flatnonzero(alone.reshape(-1)[cell])  # few: who stands alone is also looked at
+    far = np.linalg.norm(points[lone] - means[splat[lone]], axis=1) > NEEDLE * cell_m
+    return np.delete(points, lone[far], axis=0)
 
 
 def nothing_to_touch(splats: int) -> str:

@@ -128,3 +128,13 @@ def test_of_unknown_metres_the_size_of_things_is_said():
     said = scale_sentence(found, "")
     assert "cup 0.08 m, mug 0.08 m long" in said and "'unit_m'" in said
     assert scale_sentence(found, "its own word") == "Scale: metres are those of its own word."
+
+
+def test_the_plane_of_a_captures_points_counts_where_nothing_flat_is_under_things():
+    of_points = Up(PLANES, (0.0, float(np.cos(0.3)), float(np.sin(0.3))))
+    (file, told), _ = cut(table_and_things(0, flat=False), ZERO, of_points)
+    assert file.upright is not None and file.upright.used == of_points
+    assert not any("Nothing flat" in line for line in told)
+    (file, told), _ = cut(table_and_things(0), ZERO, of_points)  # nearer: what the things stand on
+    assert file.upright is not None and file.upright.used == ZERO
+    assert [way.source for way in file.upright.ways] == [ASSUMED, PLANES]

@@ -8,7 +8,8 @@ instant of that time, each in a share of its own, and the same command is starte
 it did what was left, or all; resumed: it asked for --resume and did it with that; whole: all had
 been written before the kill.  refused, other_bytes and left_over (files that the undisturbed run
 does not leave, beside the result, among temporary files, in caches; claims) are faults.
-Checkpoints hold what a clock said: that they are there is compared, their bytes are not.
+Checkpoints and the work of blocks hold what a clock said: that they are there is compared, their
+bytes are not.
 """
 
 import argparse
@@ -33,7 +34,7 @@ sys.path[:0] = [str(ROOT)]
 COLUMNS = ("job", "undisturbed_s", "kills", "went_on", "resumed", "whole", "refused",
            "other_bytes", "left_over")  # fmt: skip
 PROGRAM = (sys.executable, "-P", str(ROOT / "shapeshift/__main__.py"))
-CLOCKED = (".checkpoint.npz",)
+CLOCKED = (".checkpoint.npz", ".work/")  # the end of a file's name, a part of its path
 CACHED = ("pocl", "starts", "matplotlib")  # below our caches: how a cache fills differs
 
 
@@ -179,11 +180,12 @@ class Bench:
     def result(self) -> dict[str, str]:
         """Each file's bytes as a hash, by its path below the folder of results."""
         out = self.place / "out"
+        found = {path.relative_to(out).as_posix(): path for path in sorted(out.rglob("*"))}
         return {
-            path.relative_to(out).as_posix(): "there"
-            if path.name.endswith(CLOCKED) or path.is_dir()
+            name: "there"
+            if path.is_dir() or any(end in name for end in CLOCKED)
             else hashlib.sha256(path.read_bytes()).hexdigest()
-            for path in sorted(out.rglob("*"))
+            for name, path in found.items()
         }
 
     def litter(self) -> list[str]:

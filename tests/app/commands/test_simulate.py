@@ -16,6 +16,7 @@ from shapeshift.app.commands.simulate import HZ, Options, make_simulation, run
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.appearance import Sky
 from shapeshift.scene.document.read_scene_file import read_scene_file
 
 absent = [name for name in ("rapier3d", "coacd") if find_spec(name) is None]
@@ -87,7 +88,11 @@ def test_the_same_run_gives_the_same_bytes(example, tmp_path):
     assert (tmp_path / "again" / "run.jsonl").read_bytes() == (example / "run.jsonl").read_bytes()
 
 
-def test_pictures_show_what_moves(tmp_path):
+def test_pictures_show_what_moves(tmp_path, monkeypatch):
+    """Before the sky of the scene file, here one of one colour."""
+    file = replace(read_scene_file(SCENE), sky=Sky(*3 * [(0.0, 1.0, 0.0)]))
+    where = "shapeshift.scene.document.read_scene_file.read_scene_file"
+    monkeypatch.setattr(where, lambda path: file)
     options = Options(
         SCENE, tmp_path, SCRIPT, seconds=1.2, pictures=54, size="160x90", drawing="tiles",
         context="none",
@@ -96,7 +101,7 @@ def test_pictures_show_what_moves(tmp_path):
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == ["00000.png", "00054.png", "00108.png", "run.jsonl"]
     first, second, third = (np.asarray(Image.open(tmp_path / n)).astype(int) for n in names[:3])
-    assert first.shape == (90, 160, 3)
+    assert first.shape == (90, 160, 3) and (first[0, 0] == [0, 255, 0]).all()
     settled, lifted = ((np.abs(a - second).max(axis=2) > 60).sum() for a in (first, third))
     assert settled < 60 < 100 < lifted  # pixels: things fall a millimetre, then the ring is lifted
 

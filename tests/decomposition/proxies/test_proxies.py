@@ -20,7 +20,7 @@ from shapeshift.decomposition.partition import LabelledView
 from shapeshift.decomposition.proxies.ground import (
     distinct,
     is_within,
-    seen_plane,
+    seen_planes,
     slab,
     without_diagonals,
     without_pinches,
@@ -177,10 +177,33 @@ def test_photos_raise_a_plane_to_what_they_see_of_it():
     def seen(ends: np.ndarray) -> list[SeenDepth]:
         return [SeenDepth(view, np.full((9, 12), 1.0, np.float32), ends)]
 
-    assert seen_plane(below, seen(ends), 0.03).offset == pytest.approx(0, abs=1e-6)
-    assert seen_plane(below, seen(ends), 0.015) is below
-    assert seen_plane(below, seen(ends & (np.arange(12) != 0)), 0.03) is below  # 99
-    assert seen_plane(below, [], 0.03) is below
+    def found(spacing_m: float, *pictures: SeenDepth) -> Plane:
+        planes = {1: below, 2: Plane(FLOOR.normal, 5.0)}
+        out = seen_planes(planes, pictures, spacing_m)
+        assert out[2] is planes[2]
+        return out[1]
+
+    assert found(0.015, *seen(ends)).offset == pytest.approx(0, abs=1e-6)
+    assert found(0.0075, *seen(ends)) is below
+    assert found(0.015, *seen(ends & (np.arange(12) != 0))) is below  # 99
+    assert found(0.015) is below
+
+
+def test_a_silhouette_at_or_beyond_the_pictures_border_is_cut_there():
+    """As the whole of a larger picture shows it, whose middle the view is."""
+    wide, narrow = (
+        ((2 * SIZE[0], 2 * SIZE[1]), (-0.4, 0.4, -0.3, 0.3)),
+        (SIZE, (-0.2, 0.2, -0.15, 0.15)),
+    )
+    pose = look_at((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    for x in (0.0, 0.15, 0.2, 0.35, 2.0):
+        parts = [cube().parts[0] + np.array([x, x / 2, 0.0], np.float32)]
+        large, small = (silhouette(View(pose, tangents, 0.05, 10.0, size), parts)
+                        for size, tangents in (wide, narrow))  # fmt: skip
+        assert large is not None and small is not None
+        inner = large[SIZE[1] // 2 : -SIZE[1] // 2, SIZE[0] // 2 : -SIZE[0] // 2]
+        assert (inner != small).mean() < 1e-3  # of pixels: an outline through a pixel's middle
+    assert not silhouette(View(pose, narrow[1], 0.05, 10.0, SIZE), []).any()
 
 
 def test_other_objects_say_nothing():

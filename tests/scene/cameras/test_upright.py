@@ -5,16 +5,20 @@ import pytest
 
 from shapeshift.scene.cameras.upright import (
     ASSUMED,
+    LEAST_POINTS,
     PHOTOS,
     PLANES,
     STATED,
     Up,
     angle,
     believed,
+    believed_words,
     disagree,
+    doubts_of_up,
     turn_upright,
     up_of_photos,
     up_of_planes,
+    up_of_points,
     ways_sentence,
 )
 from shapeshift.scene.pose import OPENCV_FROM_EYE, look_at
@@ -156,3 +160,58 @@ def test_the_turn_is_a_rotation_that_brings_up_to_y(tilt):
         assert np.linalg.det(turn) > 0
         # the shortest: its own angle is the tilt
         assert np.degrees(np.arccos((np.trace(turn) - 1) / 2)) == pytest.approx(tilt, abs=1e-3)
+
+
+# The plane that most points of a capture lie on.
+
+EYES = np.array([[0.0, 1.0, 2.0], [1.0, 1.2, 2.0], [-1.0, 0.9, -2.0]])
+
+
+def room_of_points(on: int, beside: int, degrees: float = 0.0) -> np.ndarray:
+    """(on + beside, 3): so many on a floor that leans about z, others all over above it."""
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(-1, 1, (on, 3)) * (1, 0, 1)
+    others = rng.uniform((-1, 0.3, -1), (1, 2, 1), (beside, 3))
+    return np.concatenate([flat, others]) @ tilted(degrees, "z").T
+
+
+@pytest.mark.parametrize("degrees", [0.0, 4.0, 30.0, 44.0])
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e4])
+def test_most_points_of_a_floor_say_up_in_any_unit(degrees, unit):
+    points = unit * room_of_points(400, 300, degrees)
+    found = up_of_points(points, unit * EYES, [ZERO])
+    assert found is not None and found.source == PLANES and not found.things
+    assert found.off() == pytest.approx(degrees, abs=0.1)
+    under = up_of_points(points * (1, -1, 1), unit * EYES * (1, -1, 1), [Up(ASSUMED, (0, -1, 0))])
+    assert under is not None and under.direction[1] == pytest.approx(-found.direction[1])
+
+
+@pytest.mark.parametrize(
+    ("points", "eyes"),
+    [(room_of_points(150, 600), EYES),  # a fifth on the floor
+     (room_of_points(LEAST_POINTS - 1, 0), EYES), (room_of_points(0, 2000), EYES),
+     (room_of_points(400, 300, 60.0), EYES),  # a roof, or a wall
+     (room_of_points(400, 300), np.zeros((0, 3))), (np.zeros((0, 3)), EYES),
+     (np.zeros((400, 3)), EYES), (np.full((400, 3), np.nan), EYES)],
+)  # fmt: skip
+def test_other_points_say_nothing_of_up(points, eyes):
+    assert up_of_points(points, eyes, [ZERO]) is None
+
+
+def test_a_floor_far_from_what_was_taken_counts_by_the_photos():
+    points, photos = room_of_points(400, 300, 60.0), Up(PHOTOS, tuple(plane(60.0, "z").tolist()))
+    found = up_of_points(points, EYES, [ZERO, photos])
+    assert found is not None and found.off(photos) < 0.1
+    points[::7] = np.nan
+    assert up_of_points(points, EYES, [ZERO, photos]) is not None
+    assert up_of_points(room_of_points(LEAST_POINTS, 0), EYES, [ZERO]) is not None
+
+
+def test_a_capture_says_all_ways_in_one_sentence_where_two_disagree():
+    leaning = Up(PLANES, (np.sin(np.radians(4)), np.cos(np.radians(4)), 0.0))
+    photos = Up(PHOTOS, (-leaning.direction[0], leaning.direction[1], 0.0))  # 8 degrees from it
+    (said,) = doubts_of_up([ZERO, photos, leaning], np.eye(4))
+    assert "4.0 degrees from up by the photos as they were held, [-0.070, 0.998, 0.000] and" in said
+    assert "4.0 degrees from up by the plane of most points, [0.070, 0.998, 0.000] in its" in said
+    assert doubts_of_up([ZERO, leaning], np.eye(4)) == ()
+    assert believed_words(leaning, ZERO).startswith("the plane of most points is believed")
