@@ -189,7 +189,12 @@ def film_beside(scene: Path) -> Path:
 
 def read_film_file(path: Path, cameras: int = 1) -> FilmPath:
     """cameras: how many it has at least.  Raises BadFile, one sentence."""
-    fields = Fields(read_json(path, most_bytes=MOST_BYTES), path.name, "see docs/film.md")
+    return film_of(read_json(path, most_bytes=MOST_BYTES), path.name, cameras)
+
+
+def film_of(data: object, name: str, cameras: int = 1) -> FilmPath:
+    """What such a file holds, of what JSON gives; name: for messages.  Raises BadFile."""
+    fields = Fields(data, name, "see docs/film.md")
     fields.count(MARK, VERSION, VERSION)
     seconds = fields.number("seconds", 10.0, "seconds from 0.01 to 36000", *SECONDS_RANGE)
     fps = fields.number("fps", 30.0, "1 to 240", *FPS_RANGE)
@@ -205,7 +210,7 @@ def read_film_file(path: Path, cameras: int = 1) -> FilmPath:
     views: tuple[View, ...] = ()
     if rows or cameras:
         own = [dict(row.data) for row in rows]
-        views = read_own_cameras(own, CameraReading(), path.name).views
+        views = read_own_cameras(own, CameraReading(), name).views
     fields.refuse_unknown_keys()
     keys = tuple(
         FilmKey(
@@ -222,7 +227,7 @@ def read_film_file(path: Path, cameras: int = 1) -> FilmPath:
         if style:
             read_style_path(style, seconds)
     except ValueError as error:
-        raise BadFile(f"{path.name}: {error}") from None
+        raise BadFile(f"{name}: {error}") from None
     return FilmPath(keys, style, seconds, fps, size, ease)
 
 

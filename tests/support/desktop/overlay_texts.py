@@ -48,6 +48,7 @@ TABLES = {
 }  # fmt: skip
 TABLES_BESIDE = {
     "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "UNSAVED": ALL},
+    "editor.window.recovering": {"ANSWERS": ALL},
     "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},
     "film.window.films": {"AROUND": ALL, "PAST": ALL},
     "inspection.window.inspect_panel": {
