@@ -7,7 +7,7 @@
         fade: Annotated[float, EXPERT] = 0.0
         \"\"\"Part of each limit over which splats fade.\"\"\"
 
-`parse` makes one of the words that were typed; app/command_help.py says what may be typed.  Types
+`parse` makes one of the words that were typed; app/cli.py says what may be typed.  Types
 are str, int, float, bool, Path and Literal, each also in `| None` and in tuples.
 """
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from shapeshift.app.document import Document
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.renderer.streaming.stream import has_leaves
@@ -20,9 +20,8 @@ from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.cameras.framing import distances_from, orbit_path
 from shapeshift.scene.metrics import psnr
-from shapeshift.scene.pose import View
+from shapeshift.scene.pose import View, eyes_apart, stereo_pair
 from shapeshift.scene.scene import Scene
-from shapeshift.scene.stereo import eyes_apart, stereo_pair
 
 WARM_UP = 3  # frames that do not count: first use compiles and allocates
 QUALITY_VIEWS = 3

@@ -14,6 +14,7 @@ SCHEME = "file:"
 ASSETS = Path(__file__).resolve().parents[1] / "assets"  # what the program brought along
 DEMO, TOUCH = ASSETS / "workshop.shift", ASSETS / "touch.scene.json"
 LONGEST_NAME = 100  # letters, of a file that is named after an object
+MAC_DATA = "~/Library/Application Support"
 STANDARD_STREAM = "-"  # stands for one where a file is wanted
 # Settings of libraries that people give as paths.
 PATHS_IN_ENVIRONMENT = ("XR_RUNTIME_JSON", "OCL_ICD_VENDORS", "POCL_CACHE_DIR", "TMPDIR")
@@ -121,6 +122,17 @@ class WorkFolders:
         return WorkFolders(pictures, pictures.parent / "scenes", pictures.parent / "exports")
 
 
+def data_folder(environment: dict[str, str] | None = None, platform: str = sys.platform) -> Path:
+    """Where this platform keeps a program's own data; the folder need not be there.
+
+    XDG_DATA_HOME or ~/.local/share on Linux, %APPDATA% on Windows, ~/Library on macOS.
+    """
+    names = {"win32": ("APPDATA", "~/AppData/Roaming"), "darwin": ("", MAC_DATA)}
+    name, usual = names.get(platform, ("XDG_DATA_HOME", "~/.local/share"))
+    base = (dict(os.environ) if environment is None else environment).get(name, "")
+    return Path(base if os.path.isabs(base) else os.path.expanduser(usual)) / "shapeshift"
+
+
 def config_folder(environment: dict[str, str] | None = None, platform: str = sys.platform) -> Path:
     """Where this platform keeps settings of a program; the folder need not be there.
 
@@ -130,7 +142,7 @@ def config_folder(environment: dict[str, str] | None = None, platform: str = sys
     if platform == "win32":
         base = environment.get("APPDATA") or os.path.expanduser("~/AppData/Roaming")
     elif platform == "darwin":
-        base = os.path.expanduser("~/Library/Application Support")
+        base = os.path.expanduser(MAC_DATA)
     else:
         base = environment.get("XDG_CONFIG_HOME", "")
         if not os.path.isabs(base):  # the XDG rule: a relative one counts as unset

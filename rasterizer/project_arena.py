@@ -7,15 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shapeshift.rasterizer.clusters.clusters import (
-    CLUSTER,
-    Chosen,
-    Clusters,
-    clusters_of,
-    find_unseen,
-)
+from shapeshift.rasterizer.clusters import CLUSTER, Chosen, Clusters, clusters_of, find_unseen
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
+from shapeshift.rasterizer.pages import PageMap, defines_of_pages
 from shapeshift.rasterizer.project import (
     CULL_REASONS,
     LEAST_ALPHA,

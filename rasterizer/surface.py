@@ -12,7 +12,7 @@ import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.paging.pages import PageMap, defines_of_pages
+from shapeshift.rasterizer.pages import PageMap, defines_of_pages
 from shapeshift.rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
 from shapeshift.rasterizer.raster import FORMS, RasterFrame, defines_of, room_for_blocks
 

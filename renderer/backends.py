@@ -50,6 +50,6 @@ def open_drawing(drawing: str, gpu: Gpu | None, mlps: str, sort: str) -> Drawing
         from shapeshift.renderer.tiles.paged_tiles import PagedTiles
 
         return PagedTiles(mlps=mlps)
-    from shapeshift.renderer.gl.paging.paged_quads import PagedQuads
+    from shapeshift.renderer.gl.paged_quads import PagedQuads
 
     return PagedQuads(gpu, mlps, sort)

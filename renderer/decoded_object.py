@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.renderer.colors.color_cache import ColorCache, forget_colors
-from shapeshift.renderer.colors.eye_colors import EyeColors
+from shapeshift.renderer.colors.color_cache import ColorCache, EyeColors, forget_colors
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.runtime_models.model import Model, SplatLayers

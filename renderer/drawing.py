@@ -49,7 +49,7 @@ class Drawing(ABC):
     def allocate_pages(
         self, models: list[Model], pages: int, coefficients: int, stored: int | None = None
     ) -> None:
-        """The same, with pages of rasterizer/paging/pages.py for what a budget draws of models with
+        """The same, with pages of rasterizer/pages.py for what a budget draws of models with
         leaves (streaming/); coefficients: harmonics of each of their splats; stored: pages that
         they lie in at first, where copies share them.
         """

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from shapeshift.rasterizer.fovea.foveate import Fovea
+from shapeshift.rasterizer.foveate import Fovea
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import HiddenMesh, View
 from shapeshift.scene.scene import IDENTITY

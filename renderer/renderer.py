@@ -9,7 +9,13 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.backends import choose_backends, open_drawing
-from shapeshift.renderer.colors.color_cache import ColorCache, forget_colors
+from shapeshift.renderer.colors.color_cache import (
+    ColorCache,
+    by_eye,
+    drawn_together,
+    eyes_among,
+    forget_colors,
+)
 from shapeshift.renderer.colors.decode_colors import (
     Look,
     decode_colors,
@@ -20,7 +26,6 @@ from shapeshift.renderer.colors.decode_colors import (
     take_looks,
     two_false_colors,
 )
-from shapeshift.renderer.colors.eye_colors import by_eye, drawn_together, eyes_among
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
     PICTURE,
@@ -44,10 +49,9 @@ from shapeshift.renderer.decoded_object import (
 )
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve, WindowTaker
-from shapeshift.renderer.levels import LevelChoice, decoded_objects, exchange_levels
-from shapeshift.renderer.resample import bilinear, scaled
+from shapeshift.renderer.levels import LevelChoice, Streaming, decoded_objects, exchange_levels
+from shapeshift.renderer.resolution import bilinear, scaled
 from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
-from shapeshift.renderer.streaming.follow import Streaming
 from shapeshift.renderer.streaming.stream import has_leaves
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer

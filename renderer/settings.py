@@ -59,7 +59,7 @@ class RenderSettings:
 
     # Colour
     # Of two eyes: each its own; shared, for the middle between them; auto: shared where nobody can
-    # tell (renderer/colors/eye_colors.py), else each.
+    # tell (renderer/colors/color_cache.py), else each.
     stereo_colors: str = "auto"
     recolor_degrees: float = 0.0  # colours again after the eye has moved so far around an object
     skip_unseen: bool = False  # no colours (Scaffold-GS: nothing) for anchors that no view can see

@@ -4,8 +4,7 @@ import numpy as np
 
 from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.blocks.evaluate_blocks import BlockEvaluator
-from shapeshift.runtime_models.colors.light_harmonics import light_along
-from shapeshift.runtime_models.colors.spherical_harmonics import shade
+from shapeshift.runtime_models.colors.spherical_harmonics import light_along, shade
 from shapeshift.runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,

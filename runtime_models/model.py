@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import WIDTHS, channels_of
+from shapeshift.runtime_models.colors.spherical_harmonics import WIDTHS, channels_of
 from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.shapes import check

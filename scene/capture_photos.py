@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
@@ -16,7 +17,6 @@ from shapeshift.scene.captures.lenses.panorama import (
     faces_of,
     is_panorama,
 )
-from shapeshift.scene.captures.lenses.turned import quarter_of, turned_lens
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.radiometric.no_value import may_lack_values
 from shapeshift.scene.captures.undistort import is_straight, lost, pinhole_of
@@ -24,6 +24,47 @@ from shapeshift.scene.pose import View
 
 SHOWN = 0.02  # of a face of a panorama: those with less are left out
 LOOKED_AT_PX = 32  # a side of a face, to tell
+
+
+# Photos that EXIF turns by a quarter, in captures that mean them upright.
+#
+# Pixels are read as they lie in the file, so the camera is turned instead, and its lens with it.
+
+ORIENTATION = 0x0112  # of EXIF
+# Orientation: upright from file, x right, y down.  6: a clockwise turn makes it upright, 8: one the
+# other way.  The others are mirrored, or have the same sides upright and cannot be told.
+TURNS = {6: ((0, -1), (1, 0)), 8: ((0, 1), (-1, 0))}
+# Lenses that bend alike all around; OpenCV's two have p1 and p2 besides.
+ROUND = {
+    "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV_FISHEYE", "FOV", "EUCM",
+    "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_DIVISION", "DIVISION", "SIMPLE_FISHEYE",
+    "FISHEYE",
+}  # fmt: skip
+TANGENTIAL = ("OPENCV", "FULL_OPENCV")
+
+
+def quarter_of(image: Image.Image, lens: ColmapCamera) -> np.ndarray | None:
+    """(3, 3) upright from file, axes x right, y down, z forward; None where EXIF says no such turn,
+    or where the lens bends in a way that is not turned here.
+    """
+    turn = TURNS.get(image.getexif().get(ORIENTATION, 1))
+    if turn is None or lens.model not in (*ROUND, *TANGENTIAL):
+        return None
+    matrix = np.eye(3)
+    matrix[:2, :2] = turn
+    return matrix
+
+
+def turned_lens(lens: ColmapCamera, upright_from_file: np.ndarray) -> ColmapCamera:
+    """The lens of the upright photo as it is for the pixels in the file."""
+    (width, height), (x, y) = lens.size, lens.centre
+    (_, across), (down, _) = upright_from_file[:2, :2]  # one of them is 1, the other -1
+    centre = (y if down > 0 else height - y, x if across > 0 else width - x)
+    rest = list(lens.params[len(lens.focals) + 2 :])
+    if lens.model in TANGENTIAL:  # x'' = ... + 2 p1 x y + p2 (r^2 + 2 x^2), and so for y with p1
+        p1, p2 = rest[2:4]
+        rest[2:4] = (across * p2, down * p1)
+    return replace(lens, size=(height, width), params=(*lens.focals[::-1], *centre, *rest))
 
 
 def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:

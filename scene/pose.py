@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shapeshift.runtime_models.shapes import four
+
 # OpenCV axes (x right, y down, z forward) from eye axes (x right, y up, -z forward).
 MOST_SIDE = 65536  # pixels
 UNIT_SLACK = 1e-3  # of a quaternion's length: turns added up in float32 drift less
@@ -230,3 +232,61 @@ def perspective(fov_y: float, size: tuple[int, int]) -> tuple[float, float, floa
     up = float(np.tan(fov_y / 2))
     right = up * size[0] / size[1]
     return (-right, right, -up, up)
+
+
+PUPILS_M = 0.064  # metres between the eyes of a person
+LOOKED_FROM_M = 1.8  # metres: from where a person looks at an object
+
+
+def eyes_apart(distances: np.ndarray) -> float:
+    """How far apart the eyes of a person are in a scene whose scale nobody knows: the middle one of
+    the distances (n,) to its splats is taken for LOOKED_FROM_M; in the scene's own unit.
+    """
+    middle = float(np.median(distances)) if len(distances) else LOOKED_FROM_M
+    return PUPILS_M / LOOKED_FROM_M * middle
+
+
+def stereo_pair(view: View, distance: float) -> list[View]:
+    """Left and right eye, `distance` metres apart, parallel, about the place of `view`."""
+    right = view.world_from_eye.matrix()[:3, 0]
+    return [
+        replace(
+            view,
+            world_from_eye=Pose(
+                np.asarray(view.world_from_eye.position) + side * distance / 2 * right,
+                view.world_from_eye.wxyz,
+            ),
+        )
+        for side in (-1, 1)
+    ]
+
+
+# Orthographic views are pinhole views through a very long lens: every drawing has them at once.
+# The eye goes back along the line of sight and the lens becomes as much longer, so that the plane
+# in which the eye turned about something keeps its size.  What lies d metres off this plane and r
+# pixels off the axis is then displaced by r d / distance pixels; from 1 / PARALLAX_PX times the
+# farthest r and d on that is less than PARALLAX_PX anywhere, which nobody tells from a parallel
+# projection.  Colours that depend on the direction of sight come out as those of parallel rays.
+
+PARALLAX_PX = 0.25  # at most, of the projection of any point within the radius
+
+
+def orthographic(view: View, distance: float, radius: float, near_m: float = 0.0) -> View:
+    """The parallel projection along a view's line of sight, to the scale of `distance` metres.
+
+    radius: metres from that plane within which the scene lies.  near_m: metres from the view's own
+    eye before which nothing is drawn; 0: all of the scene is.
+    """
+    (left, right, low, high), (width, height) = view.tangents, view.size
+    across = max(abs(left), abs(right)) * width / (right - left)  # pixels off the axis
+    along = max(abs(low), abs(high)) * height / (high - low)
+    reach = max(radius, 1e-6) * math.hypot(across, along) / PARALLAX_PX  # metres
+    reach = max(reach, distance)
+    back = reach - distance
+    eye = view.world_from_eye
+    position = eye.position + back * eye.matrix()[:3, 2]
+    tangents = four(np.array(view.tangents) * distance / reach)
+    near = back + near_m if near_m > 0 else max(reach - 50 * radius, view.near)
+    far = reach + 50 * radius
+    pose = Pose(position, eye.wxyz)
+    return replace(view, world_from_eye=pose, tangents=tangents, near=near, far=max(far, 2 * near))

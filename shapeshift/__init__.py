@@ -48,9 +48,8 @@ _NAMES_OF = {
     "scene.inspection.marks": ("Isotherm", "Mark", "MarkReading"),
     "scene.inspection.value_picture": ("ValuePicture",),
     "scene.metrics": ("psnr", "ssim"),
-    "scene.pose": ("Pose", "View", "look_at", "perspective"),
+    "scene.pose": ("Pose", "View", "look_at", "perspective", "stereo_pair"),
     "scene.scene": ("SceneObject",),
-    "scene.stereo": ("stereo_pair",),
     "scene.sections.section": ("BoxShape", "PlaneShape", "SceneSection"),
     "scene.selectors.selector": ("Box", "HalfSpace", "Lens", "Sphere"),
 }

@@ -57,6 +57,7 @@ from shapeshift.scene.pose import Pose as Pose
 from shapeshift.scene.pose import View as View
 from shapeshift.scene.pose import look_at as look_at
 from shapeshift.scene.pose import perspective as perspective
+from shapeshift.scene.pose import stereo_pair as stereo_pair
 from shapeshift.scene.scene import SceneObject as SceneObject
 from shapeshift.scene.sections.section import BoxShape as BoxShape
 from shapeshift.scene.sections.section import PlaneShape as PlaneShape
@@ -65,6 +66,5 @@ from shapeshift.scene.selectors.selector import Box as Box
 from shapeshift.scene.selectors.selector import HalfSpace as HalfSpace
 from shapeshift.scene.selectors.selector import Lens as Lens
 from shapeshift.scene.selectors.selector import Sphere as Sphere
-from shapeshift.scene.stereo import stereo_pair as stereo_pair
 
 __version__: str

@@ -93,7 +93,7 @@ def own_settings(tmp_path_factory):
     folder = tmp_path_factory.mktemp("settings")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("POCL_CACHE_DIR", os.environ.get("POCL_CACHE_DIR", str(cache_folder("pocl"))))
-        for name in ("XDG_CONFIG_HOME", "APPDATA"):
+        for name in ("XDG_CONFIG_HOME", "APPDATA", "XDG_DATA_HOME"):
             patch.setenv(name, str(folder))
         yield folder
 

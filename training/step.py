@@ -9,15 +9,16 @@ import numpy as np
 from shapeshift.rasterizer.project import LEAST_ALPHA, LOW_PASS, Camera
 from shapeshift.scene.pose import View
 from shapeshift.training.calibration.pose_refinement import PoseGradient
-from shapeshift.training.density.densify import DensificationStats
+from shapeshift.training.densify import DensificationStats
 from shapeshift.training.drawing import Color, DrawnView, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import KERNELS, HeadLayout, Heads
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.losses import ImageLoss, Target
-from shapeshift.training.losses.splat_losses import (
+from shapeshift.training.losses.losses import (
     MIN_OPACITY_SHARE,
+    ImageLoss,
     MinScale,
+    Target,
     add_min_opacity_gradient,
 )
 from shapeshift.training.losses.surface_losses import ShapeTerm

@@ -11,7 +11,7 @@ from shapeshift.scene.cameras.photo_view import photo_view
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.calibration.pose_refinement import PoseGradient, PoseRefinement
 from shapeshift.training.checkpoint import CONTENTS, refuse_other_capture
-from shapeshift.training.density.densify import (
+from shapeshift.training.densify import (
     DensificationStats,
     NewAnchors,
     absent_as_nan,
@@ -25,7 +25,7 @@ from shapeshift.training.first_anchors.first_anchors import base_colors, first_a
 from shapeshift.training.first_anchors.initial import Report, initial_points
 from shapeshift.training.heads.networks import initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.splat_losses import MinScale, min_opacity_share
+from shapeshift.training.losses.losses import MinScale, min_opacity_share
 from shapeshift.training.photo_store.open_photos import PhotoRoom, TrainingPhotos, open_photos
 from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, validate_views
 from shapeshift.training.run import SETTLE, Run

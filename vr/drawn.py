@@ -14,8 +14,8 @@ from shapeshift.scene.pose import Pose
 from shapeshift.vr.cards import Card
 from shapeshift.vr.frame import SIDES, Hand
 from shapeshift.vr.glove import Capsule, glove
-from shapeshift.vr.locomotion.locomotion import Comfort
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.locomotion import Comfort
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.touching import Beam, Touched
 
 FINE, WRONG, PALE = (0.96, 0.66, 0.30), (0.90, 0.32, 0.26), (0.92, 0.93, 0.96)  # display sRGB

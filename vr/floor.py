@@ -16,7 +16,7 @@ from shapeshift.renderer.gl.shader import compile_program
 from shapeshift.scene.pose import View
 from shapeshift.vr.frame import Area, Frame
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from shapeshift.vr.shown import SHADERS
 
 REST = 0.35  # of the clearness while one moves

@@ -1,7 +1,7 @@
 """What one frame of a headset is, in our own words: eyes, head, hands, time.  No OpenXR here.
 
 Everything is in play space: metres of the room, +Y up, the floor at y = 0 where the runtime knows
-it, as the runtime's reference space says.  `PlaySpace` (vr/locomotion/play_space.py) says where
+it, as the runtime's reference space says.  `PlaySpace` (vr/play_space.py) says where
 that room is in the world.
 """
 

@@ -7,7 +7,7 @@ turned up; the same hand points at it.  The stick walks ahead and back, and turn
 from dataclasses import replace
 
 from shapeshift.vr.frame import LOST, SIDES, Frame, Hand
-from shapeshift.vr.panel.carried import Palm, turned
+from shapeshift.vr.panel import Palm, turned
 
 
 def other_side(side: str) -> str:

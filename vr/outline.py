@@ -11,7 +11,7 @@ import numpy as np
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import FLOOR_NAME, World
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 
 AWAY_M = 0.004  # of the room, from the hull: lines beside what they are around
 THICK_M = 0.0028  # radius

@@ -12,8 +12,8 @@ import numpy as np
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import SIDES, Frame, Hand, Pulse, aim_of
-from shapeshift.vr.locomotion.locomotion import GRIPS_AT, LETS_GO_AT
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.locomotion import GRIPS_AT, LETS_GO_AT
+from shapeshift.vr.play_space import PlaySpace
 
 REACH_M = 0.10  # of the room, from the palm to what it takes
 SKIN_M = 0.02  # so near a palm touches

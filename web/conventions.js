@@ -1,12 +1,12 @@
 // conventions: shared with Python, written by tools/web/write_conventions.py from
 // the constants there; change it there.
-export const WIDTH = 2048;  // runtime_models/web/limits.py
-export const BATCH_ROWS = 64;  // runtime_models/web/limits.py
-export const BLOCK_VEC4S = 1024;  // runtime_models/web/limits.py
-export const MOST_ANCHORS = 4000000;  // runtime_models/web/limits.py
-export const MOST_SPLATS = 4194304;  // runtime_models/web/limits.py
-export const MOST_BYTES = 1073741824;  // runtime_models/web/limits.py
-export const MOST_WEIGHTS = 32768;  // runtime_models/web/limits.py
+export const WIDTH = 2048;  // runtime_models/web/web_model.py
+export const BATCH_ROWS = 64;  // runtime_models/web/web_model.py
+export const BLOCK_VEC4S = 1024;  // runtime_models/web/web_model.py
+export const MOST_ANCHORS = 4000000;  // runtime_models/web/web_model.py
+export const MOST_SPLATS = 4194304;  // runtime_models/web/web_model.py
+export const MOST_BYTES = 1073741824;  // runtime_models/web/web_model.py
+export const MOST_WEIGHTS = 32768;  // runtime_models/web/web_model.py
 export const MIN_ALPHA = 0.00392156862745098;  // a pixel's alpha below this is not drawn
 export const MAX_ALPHA = 0.99;  // one splat never hides everything behind it
 export const LOW_PASS = 0.3;  // px^2 added to the screen covariance

@@ -94,8 +94,7 @@ def leaf_scene(
     """The same with leaves to choose from; None where nothing has any, or --max-splats reads one
     level of them.
     """
-    from shapeshift.app.charts.chart_scene import make_chart_scene
-    from shapeshift.app.charts.leaf_rows import by_leaves, has_levels
+    from shapeshift.app.charts.chart_scene import by_leaves, has_levels, make_chart_scene
 
     if options.max_splats or not any(map(has_levels, subjects)):
         return None
@@ -125,9 +124,8 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     from shapeshift.app.charts.chart_measure import ChartRow, Pricing, open_pair
     from shapeshift.app.charts.chart_picture import draw_chart
     from shapeshift.app.charts.chart_rows import RowsFile
-    from shapeshift.app.charts.chart_scene import QUICK, Walk, digest, make_chart_scene
+    from shapeshift.app.charts.chart_scene import QUICK, Walk, budgets_of, digest, make_chart_scene
     from shapeshift.app.charts.chart_settings import settings_of
-    from shapeshift.app.charts.leaf_rows import budgets_of
     from shapeshift.app.measure import draws_on_cpu, machine_line
 
     x = None

@@ -15,8 +15,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.scene.appearance import Background
 from shapeshift.scene.metrics import psnr, ssim
-from shapeshift.scene.pose import View
-from shapeshift.scene.stereo import stereo_pair
+from shapeshift.scene.pose import View, stereo_pair
 
 SSIM_PATH, SSIM_SWEEP = 3, 2  # pictures whose SSIM is taken: it costs more than a frame does
 

@@ -77,7 +77,7 @@ def examine(options: Options, progress: Callable[[str, float], None] | None = No
 
 def for_others(model, file: str) -> tuple:
     """What other programs would make of plain splats that are right here."""
-    from shapeshift.runtime_models.lint.lint_readers import other_readers
+    from shapeshift.runtime_models.lint.lint import other_readers
     from shapeshift.runtime_models.model import SplatLayers
 
     return other_readers(model, file) if isinstance(model, SplatLayers) else ()

@@ -67,7 +67,7 @@ def draw_outputs(
 ) -> None:  # fmt: skip
     """A .png and a .npy of each scene from its view, two eyes side by side, and one legend."""
     from shapeshift.app.progress import tracked
-    from shapeshift.scene.stereo import stereo_pair
+    from shapeshift.scene.pose import stereo_pair
 
     summaries: dict[str, dict] = {}
     legend: dict[str, object] = {"output": output, "meaning": MEANINGS[output]}

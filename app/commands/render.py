@@ -381,7 +381,7 @@ def draw_all(
     from shapeshift.app.drawing import save_png
     from shapeshift.app.progress import tracked
     from shapeshift.renderer.debug.debug import debug_legend
-    from shapeshift.scene.stereo import stereo_pair
+    from shapeshift.scene.pose import stereo_pair
 
     work = list(zip(scenes, views, paths, shapes or [None] * len(scenes), strict=True))
     for scene, view, path, shape in tracked(work, "drawing"):

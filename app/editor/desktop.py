@@ -17,6 +17,7 @@ from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.empty_panel import draw_opening
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.journal import Journal
 from shapeshift.app.editor.state.files.open_scene import first_look, named_cameras, opened_scene
 from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.app.editor.state.layout import Box
@@ -31,7 +32,7 @@ from shapeshift.app.editor.window.two_pictures import TwoPictures, splitting
 from shapeshift.app.editor.window.viewer import Viewer
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.app.errors import UsageError
-from shapeshift.app.paths import DEMO, TOUCH, config_folder, plain
+from shapeshift.app.paths import DEMO, TOUCH, config_folder, data_folder, plain
 from shapeshift.app.streaming.refine import Refiner, show_level
 from shapeshift.rasterizer.program import compiling
 from shapeshift.renderer.renderer import Renderer
@@ -79,6 +80,9 @@ def run(options: Options) -> int:
         with card, Renderer(window.ctx, drawing=options.drawing) as renderer:
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, state, options, settings, own_files)
+            if options.screenshot is None:
+                journal = Journal(state, data_folder() / "journals")
+                viewer.objects.recovering.begin(journal, viewer.hooks)
             hooks, upload = viewer.hooks, viewer.shown.upload
             attach_budget(renderer, state, hooks)
             attach_refiner(refiner, state, hooks, upload, viewer.dial.scene_changed)
@@ -99,6 +103,7 @@ def run(options: Options) -> int:
                 card.end()
                 viewer.loop()
             viewer.shell.keep_place()
+            viewer.objects.recovering.close()
     return 0
 
 

@@ -17,8 +17,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.film.film_plan import FilmPlan
 from shapeshift.runtime_models.files.json_fields import control_row, saved_object
 from shapeshift.runtime_models.files.whole_file import sweep, write_whole
-from shapeshift.scene.pose import View
-from shapeshift.scene.stereo import stereo_pair
+from shapeshift.scene.pose import View, stereo_pair
 
 if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer

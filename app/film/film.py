@@ -131,7 +131,7 @@ def named_path(options: Options) -> "tuple[FilmPath | None, CameraList | None]":
     from shapeshift.app.camera_files import named_cameras
     from shapeshift.app.film.film_plan import found_cameras, is_named, path_of_cameras
     from shapeshift.app.paths import plain
-    from shapeshift.scene.film.film_file import is_film_file, read_film_file
+    from shapeshift.scene.film.film_path import is_film_file, read_film_file
 
     if options.cameras == "auto":
         return None, found_cameras(options.scene, options)
@@ -306,7 +306,7 @@ def begin(options: Options, plan: "FilmPlan", form: "FrameForm", folder: "FrameF
     from shapeshift.app.drawing import make_folder
     from shapeshift.app.film.draw_film import film_key, frame_facts
     from shapeshift.scene.document.appearance_rows import background_row
-    from shapeshift.scene.film.film_file import write_film_file
+    from shapeshift.scene.film.film_path import write_film_file
 
     drawing = {
         "size": list(plan.size), "stereo": form.eye_distance, "supersample": form.supersample,

@@ -13,9 +13,9 @@ from shapeshift.scene.pose import View
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
 from shapeshift.vr.frame import SIDES
-from shapeshift.vr.locomotion.play_space import raised
 from shapeshift.vr.openxr.layers import QuadPicture
 from shapeshift.vr.overlay import Overlay
+from shapeshift.vr.play_space import raised
 from shapeshift.vr.scene_depth import EyeDepth, SceneDepth
 from shapeshift.vr.see_through import SeeThrough
 from shapeshift.vr.shown import Inset, part_of_whole

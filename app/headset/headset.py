@@ -189,7 +189,7 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.xr_app import XrApp
     from shapeshift.app.paths import config_folder
     from shapeshift.renderer.renderer import Renderer
-    from shapeshift.vr.locomotion.locomotion import Rules
+    from shapeshift.vr.locomotion import Rules
     from shapeshift.vr.openxr.instance import Lost
 
     worn = worn_settings(options)

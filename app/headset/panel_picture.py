@@ -10,7 +10,7 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.clean_texts import Box, clean_texts, listing_items
 from shapeshift.app.editor.panels.widgets.overlay_renderer import OverlayRenderer, Textures
 from shapeshift.renderer.gl.context import is_software
-from shapeshift.vr.panel.plane import PanelPlane, Pointing
+from shapeshift.vr.panel import PanelPlane, Pointing
 
 # So large that at 0.6 m, an arm's length, a capital is 1.0 degree high (type of 25 dmm), and what
 # can be hit 2.3 degrees: 34 by 38 cm.

@@ -9,8 +9,8 @@ from shapeshift.renderer.settings import FOVEATIONS
 from shapeshift.runtime_models.files.json_fields import is_number, saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.vr.frame import SIDES
-from shapeshift.vr.locomotion.locomotion import TURNINGS, Rules
-from shapeshift.vr.locomotion.play_space import POSTURES
+from shapeshift.vr.locomotion import TURNINGS, Rules
+from shapeshift.vr.play_space import POSTURES
 
 FILE = "headset.json"
 LARGEST = 1 << 16  # bytes

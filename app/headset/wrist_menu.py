@@ -47,15 +47,24 @@ from shapeshift.app.headset.sections.room_section import (
     draw_room,
     draw_scale,
     draw_scenes,
+    tool_sections,
 )
-from shapeshift.app.headset.sections.tool_sections import tool_sections
 from shapeshift.app.headset.session.recorder import Recorder
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
 from shapeshift.vr.frame import Frame
-from shapeshift.vr.locomotion.play_space import resized
-from shapeshift.vr.panel.carried import MIDDLE, Carried, Palm, carry, left_over, scroll, slide
-from shapeshift.vr.panel.plane import NOBODY, Place
+from shapeshift.vr.panel import (
+    MIDDLE,
+    NOBODY,
+    Carried,
+    Palm,
+    Place,
+    carry,
+    left_over,
+    scroll,
+    slide,
+)
+from shapeshift.vr.play_space import resized
 
 TICK = (0.25, 0.012)  # strength and seconds of the buzz when something is pointed at
 CLICK = (0.6, 0.025)  # when it is pressed, and when the knob comes to a stop

@@ -14,12 +14,12 @@ from shapeshift.app.editor.state.parts.parts_tool import PartsTool
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.eyes import DEPTH_SCALE, Eyes, quad_of
 from shapeshift.app.headset.headset_report import DoneFrame, Report
+from shapeshift.app.headset.in_hand.finger_brush import PartsHand
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.over.glass_state import GlassState, stop_now
 from shapeshift.app.headset.over.hand_glass import HandGlass
 from shapeshift.app.headset.over.over_splats import OverSplats, TableShadows
 from shapeshift.app.headset.pacing import Pacing, choose_quality
-from shapeshift.app.headset.parts_hand import PartsHand
 from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.app.headset.sections.performance_section import Figures
@@ -39,9 +39,9 @@ from shapeshift.scene.world.record import Record
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import REST, Floor, Grid, clearness
 from shapeshift.vr.frame import Frame
-from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel
-from shapeshift.vr.locomotion.play_space import underfoot
+from shapeshift.vr.locomotion import RULES, Rules, Travel
 from shapeshift.vr.openxr.session import Session
+from shapeshift.vr.play_space import underfoot
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.see_through import SeeThrough
 from shapeshift.vr.touching import strongest

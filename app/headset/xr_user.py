@@ -18,19 +18,13 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
-from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, ground_of, move
-from shapeshift.vr.locomotion.play_space import (
-    PlaySpace,
-    lift_of,
-    lifted,
-    play_space_before,
-    underfoot,
-)
+from shapeshift.vr.locomotion import RULES, Comfort, Rules, Travel, ground_of, move
 from shapeshift.vr.one_hand import alone
 from shapeshift.vr.openxr.room import EYE_HEIGHT_M
 from shapeshift.vr.openxr.session import Session
 from shapeshift.vr.outline import Sight, look
-from shapeshift.vr.panel.carried import Palm
+from shapeshift.vr.panel import Palm
+from shapeshift.vr.play_space import PlaySpace, lift_of, lifted, play_space_before, underfoot
 from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
 
 # A frame as it is for who wears the headset: how high they are, and which hands they have.

@@ -15,7 +15,7 @@ from shapeshift.app.page.page_scene import PageSettings, coarse_scene, page_scen
 from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.web.limits import LARGEST_FILE
+from shapeshift.runtime_models.web.web_model import LARGEST_FILE
 
 PAGE, ZIP = ".html", ".zip"
 ZIP_DATE = (2020, 1, 1, 0, 0, 0)  # the same scene gives the same bytes

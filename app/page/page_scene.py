@@ -15,9 +15,10 @@ from shapeshift.renderer.gl.target import brightest
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Model
-from shapeshift.runtime_models.web.limits import COLOR_BITS, MOST_SPLATS
 from shapeshift.runtime_models.web.web_model import (
+    COLOR_BITS,
     FORMAT,
+    MOST_SPLATS,
     Container,
     ControlEntry,
     ModelEntry,

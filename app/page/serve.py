@@ -1,11 +1,19 @@
 """launch.py serve: a scene as a page on this computer, shown anew when its file changes."""
 
+import errno
+import http.server
+import os
+import secrets
+import sys
+import threading
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
+from urllib.parse import urlsplit
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL
+from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after
 from shapeshift.app.terminal import say
 
@@ -13,6 +21,132 @@ if TYPE_CHECKING:
     from shapeshift.app.document import Document
 
 LOOK_S = 0.5  # how often the file is looked at
+
+
+# A page for the browsers of this computer alone: 127.0.0.1, and a token in the address.
+#
+# Another page in the same browser does not know the token, and a name of its own that it lets lead
+# to 127.0.0.1 (DNS rebinding) is not answered.
+
+HERE = "127.0.0.1"
+KINDS = {".html": "text/html; charset=utf-8", ".bin": "application/octet-stream"}
+VERSION = "version"  # what a page asks for to know whether it is the latest
+PAGE = "index.html"
+HEADERS = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Content-Security-Policy": "frame-ancestors 'none'",
+}
+
+
+class PageServer:
+    """`with PageServer(8000) as server: server.files = ...` answers until the block ends."""
+
+    def __init__(self, port: int) -> None:
+        """Takes the port; 0: any that is free.  Raises UsageError."""
+        self._token = secrets.token_urlsafe(16)
+        self._version = 0
+        self._files: dict[str, bytes] = {}
+        self._server = bound(port)
+        self._server.page_server = self  # type: ignore[attr-defined]
+        self.port = int(self._server.server_address[1])
+        self.address = f"http://{HERE}:{self.port}/{self._token}/"
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """name -> bytes, of which PAGE is the page."""
+        return self._files
+
+    @files.setter
+    def files(self, files: dict[str, bytes]) -> None:
+        """Pages that are open load themselves anew."""
+        page = files[PAGE].replace(b"<html", b'<html data-served="%d"' % (self._version + 1), 1)
+        whole = files | {PAGE: page, VERSION: str(self._version + 1).encode()}
+        self._files, self._version = whole, self._version + 1
+
+    def found(self, path: str, host: str) -> tuple[str, bytes] | None:
+        """Name and bytes of what is asked for; None: nothing, or nothing for who asks."""
+        if host not in (f"{HERE}:{self.port}", f"localhost:{self.port}"):
+            return None
+        try:
+            asked = urlsplit(path).path
+        except ValueError:  # no address at all
+            return None
+        token, _, name = asked.removeprefix("/").partition("/")
+        if not secrets.compare_digest(token.encode(), self._token.encode()):
+            return None
+        name = name or PAGE
+        return (name, self._files[name]) if name in self._files else None
+
+    def __enter__(self) -> "PageServer":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class Answering(http.server.BaseHTTPRequestHandler):
+    """GET and HEAD of the page's files; everything else is nowhere."""
+
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "Shapeshift", ""
+    timeout = 30  # seconds that a silent connection is kept
+
+    def do_GET(self) -> None:
+        self._answer(body=True)
+
+    def do_HEAD(self) -> None:
+        self._answer(body=False)
+
+    def _answer(self, body: bool) -> None:
+        server: PageServer = self.server.page_server  # type: ignore[attr-defined]
+        found = server.found(self.path, self.headers.get("Host", ""))
+        name, data = found or ("", b"There is nothing here.")
+        self.send_response(200 if found else 404)
+        kind = KINDS.get(os.path.splitext(name)[1], "text/plain; charset=utf-8")
+        for header, value in (HEADERS | {"Content-Type": kind}).items():
+            self.send_header(header, value)
+        self.send_header("Content-Length", str(len(data)))
+        self.end_headers()
+        if body:
+            self.wfile.write(data)
+
+    def log_message(self, format: str, *arguments) -> None:
+        """Nobody needs a line for every request."""
+
+
+class LocalServer(http.server.ThreadingHTTPServer):
+    """One that says nothing of connections that browsers break off."""
+
+    daemon_threads = True
+    request_queue_size = 128  # connections that wait: a browser opens six for each page
+
+    def handle_error(self, request, client_address) -> None:
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
+
+
+def bound(port: int) -> LocalServer:
+    """A server that listens on this computer alone.  Raises UsageError."""
+    if not 0 <= port <= 65535:
+        raise UsageError(f"--port is {port}, expected 0 (any that is free) to 65535.")
+    try:
+        return LocalServer((HERE, port), Answering)
+    except OSError as error:
+        if error.errno in (errno.EADDRINUSE, getattr(errno, "WSAEADDRINUSE", -1)):
+            raise UsageError(
+                f"port {port} is in use by another program; --port 0 takes one that is free."
+            ) from None
+        if error.errno in (errno.EACCES, errno.EPERM):
+            raise UsageError(
+                f"port {port} is not for every program; --port 0 takes one that is free."
+            ) from None
+        raise
 
 
 @dataclass(frozen=True)
@@ -34,7 +168,6 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.page.page_server import PageServer
 
     server = PageServer(options.port)  # a port that is taken is said before the scene is read
     server.files = page_files(options)
@@ -66,7 +199,6 @@ def follow(options: Options, server) -> None:
 
 def show_anew(options: Options, server) -> None:
     """The page of the files as they are; where they cannot be used, says so and keeps the last."""
-    from shapeshift.app.errors import UsageError
     from shapeshift.runtime_models.model import BadFile
 
     try:

@@ -9,11 +9,6 @@ import numpy as np
 
 from shapeshift.app.stability_cases.case_context import (
     CaseContext,
-    difference,
-    turned,
-    turned_about,
-)
-from shapeshift.app.stability_cases.finding import (
     CaseFinding,
     ComparedPicture,
     Panel,
@@ -22,7 +17,10 @@ from shapeshift.app.stability_cases.finding import (
     at_most,
     clean,
     decibels,
+    difference,
     not_here,
+    turned,
+    turned_about,
     worst_of,
 )
 from shapeshift.app.stability_cases.scenes import alone, front, splats

@@ -6,12 +6,6 @@ import numpy as np
 
 from shapeshift.app.stability_cases.case_context import (
     CaseContext,
-    difference,
-    moved,
-    turned,
-    turned_about,
-)
-from shapeshift.app.stability_cases.finding import (
     ComparedPicture,
     Panel,
     Result,
@@ -20,6 +14,10 @@ from shapeshift.app.stability_cases.finding import (
     broken_pixels,
     clean,
     decibels,
+    difference,
+    moved,
+    turned,
+    turned_about,
     worst_of,
 )
 from shapeshift.app.stability_cases.scenes import alone, around, front, shell, splats, turns

@@ -13,9 +13,10 @@ import numpy as np
 
 from shapeshift.app.drawing import save_png
 from shapeshift.app.errors import UsageError
-from shapeshift.app.stability_cases import eyes, moving, places, shapes
-from shapeshift.app.stability_cases.case_context import EMPTY, CaseContext, difference
-from shapeshift.app.stability_cases.finding import (
+from shapeshift.app.stability_cases import eyes_and_shapes, moving, places
+from shapeshift.app.stability_cases.case_context import (
+    EMPTY,
+    CaseContext,
     CaseFinding,
     Panel,
     Result,
@@ -24,6 +25,7 @@ from shapeshift.app.stability_cases.finding import (
     broken_pixels,
     clean,
     decibels,
+    difference,
     not_here,
 )
 from shapeshift.app.stability_cases.places import ORACLE_DB
@@ -220,19 +222,19 @@ CASES = {
     "stale-orbit": moving.stale_orbit,
     "stale-yaw": moving.stale_yaw,
     "popping": moving.popping,
-    "disparity": eyes.disparity,
-    "canted": eyes.canted,
-    "stereo": eyes.stereo,
+    "disparity": eyes_and_shapes.disparity,
+    "canted": eyes_and_shapes.canted,
+    "stereo": eyes_and_shapes.stereo,
     "far-origin": places.far_origin,
     "depth-range": places.depth_range,
     "inside": places.inside,
     "lenses": places.lenses,
     "random-eyes": places.random_eyes,
-    "needles": shapes.needles,
-    "faint-layers": shapes.faint,
-    "limits": shapes.limits,
-    "counts": shapes.counts,
-    "crowd": shapes.crowd,
+    "needles": eyes_and_shapes.needles,
+    "faint-layers": eyes_and_shapes.faint,
+    "limits": eyes_and_shapes.limits,
+    "counts": eyes_and_shapes.counts,
+    "crowd": eyes_and_shapes.crowd,
     "extrapolated-x": extrapolated,
     "broken-heads": broken_heads,
     "life": life,

@@ -106,7 +106,7 @@ def learned(
 ) -> tuple[AnchorModel, int]:  # fmt: skip
     """A level that is meant for that size, after so many processor seconds, and its steps."""
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.training.lod.distill import distill
+    from shapeshift.training.distill import distill
 
     seconds, progress = how
     views = learning_views(meter, pixels)

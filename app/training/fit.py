@@ -11,8 +11,7 @@ from shapeshift.app.cluster.open_cluster import NONE, ClusterOptions
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf, Opt
 from shapeshift.app.terminal import open_console, print_json, say
 from shapeshift.app.training.train_options import SETTINGS, Asked, MachineOptions, with_settings
-from shapeshift.training.left_options import LEFT
-from shapeshift.training.settings import TrainSettings, suited
+from shapeshift.training.settings import LEFT, TrainSettings, suited
 
 if TYPE_CHECKING:
     from shapeshift.rasterizer.device import Device
@@ -76,12 +75,8 @@ def run(options: Options) -> int:
     from shapeshift.app.pace import with_pace
     from shapeshift.app.paths import full
     from shapeshift.app.training.run_loop import calibrated
+    from shapeshift.app.training.run_trials import calibrated_once, run_trial, say_of_clock
     from shapeshift.app.training.train_options import settings_of
-    from shapeshift.app.training.trials.run_trials import (
-        calibrated_once,
-        run_trial,
-        say_of_clock,
-    )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
 
@@ -162,7 +157,7 @@ def trainings(options: Options) -> "Iterator[tuple[ReportProgress, TrainSeeds | 
     """How progress is shown and who trains, as Fit takes them."""
     from shapeshift.app.cluster.open_cluster import open_cluster
     from shapeshift.app.progress import progress_bar
-    from shapeshift.app.training.trials.run_trials import Trials
+    from shapeshift.app.training.run_trials import Trials
 
     if options.cluster != NONE:  # whose tasks have a bar of their own
         with open_cluster(options.cluster, options.certificates, options.gpus) as cluster:
@@ -181,7 +176,7 @@ def refuse_options(options: Options) -> None:
     """Raises UsageError for what cannot be done: now, not after the trials."""
     from shapeshift.app.cluster.open_cluster import check_cluster
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.training.trials.run_trials import check_places
+    from shapeshift.app.training.run_trials import check_places
 
     if options.resume:
         raise UsageError("--resume goes on with one training; add --only, or leave it out.")

@@ -101,7 +101,7 @@ def remove(options: Options, model: "AnchorModel") -> int:
     """Takes a stop out of the scene."""
     from dataclasses import replace
 
-    from shapeshift.runtime_models.stops.remove_stop import remove_stop
+    from shapeshift.runtime_models.stops.change_stops import remove_stop
     from shapeshift.training.styles.add_style import as_list
 
     word = options.remove.casefold()
@@ -169,7 +169,7 @@ def style_of(options: Options, model: "AnchorModel") -> "NewStyle":
     from shapeshift.app.errors import UsageError, as_typed
     from shapeshift.app.training.style_looks import usual_name
     from shapeshift.runtime_models.model import BadFile
-    from shapeshift.runtime_models.stops.insert_stop import insert_stop
+    from shapeshift.runtime_models.stops.change_stops import insert_stop
     from shapeshift.training.styles.add_style import NewStyle
 
     names = {stop.name.casefold(): stop.name for stop in model.stops}

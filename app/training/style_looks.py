@@ -40,8 +40,7 @@ def pictures_and_views(
 
     painted: the caller has a painter of its own.  Raises UsageError and BadFile.
     """
-    from shapeshift.training.styles.carried_pictures import CarriedPictures
-    from shapeshift.training.styles.picture_files import PictureFiles, files_for
+    from shapeshift.training.styles.carried_pictures import CarriedPictures, PictureFiles, files_for
     from shapeshift.training.styles.train_stop import dome_views, resized_views
 
     looks = looks_of(options)
@@ -63,8 +62,8 @@ def pictures_and_views(
 
 def network_of(options: Options) -> "StylePictures":
     """The network that --network names, with its style."""
+    from shapeshift.training.styles.carried_pictures import read_picture
     from shapeshift.training.styles.image_network import ImageNetwork, encode_style
-    from shapeshift.training.styles.picture_files import read_picture
 
     assert options.network is not None, "checked before"
     weights, code = read_weights(options.weights), None
@@ -172,8 +171,8 @@ def with_named_style(options: Options) -> Options:
 def style_picture(path: Path) -> "np.ndarray":
     """(H, W, 3) float32 of a file, or of a picture of our own by its name.  Raises BadFile."""
     from shapeshift.training.style_features.named_styles import MADE_STYLES
+    from shapeshift.training.styles.carried_pictures import LEAST_PX, read_picture
     from shapeshift.training.styles.image_network import resized
-    from shapeshift.training.styles.picture_files import LEAST_PX, read_picture
 
     if not path.exists() and path.name in MADE_STYLES:  # the program makes paths absolute
         return MADE_STYLES[path.name](MADE_SIDE, 0)
@@ -236,8 +235,12 @@ def preview_of(
 ) -> "Rule":
     """The colours of --image without training, as a rule for splats.  Raises BadFile."""
     from shapeshift.scene.cameras.framing import default_background
-    from shapeshift.training.style_features.splat_features import VIEW_SIZE, scene_views
-    from shapeshift.training.style_features.zero_shot import StylePreview, recolor_rule
+    from shapeshift.training.style_features.splat_features import (
+        VIEW_SIZE,
+        StylePreview,
+        recolor_rule,
+        scene_views,
+    )
     from shapeshift.training.styles.add_style import BEHIND
     from shapeshift.training.styles.train_stop import resized_views
 

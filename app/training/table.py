@@ -22,8 +22,7 @@ from shapeshift.app.training.train_options import (
 from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.runtime_models.program import portable_program
 from shapeshift.training.baselines.plain_settings import PlainSettings
-from shapeshift.training.left_options import LEFT
-from shapeshift.training.settings import TrainSettings
+from shapeshift.training.settings import LEFT, TrainSettings
 
 if TYPE_CHECKING:
     from shapeshift.app.training.train_baselines import TrainedFile

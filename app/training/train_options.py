@@ -29,8 +29,7 @@ from shapeshift.app.command_line import (
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.baselines.plain_settings import PlainSettings
-from shapeshift.training.left_options import LEFT
-from shapeshift.training.settings import TrainSettings, adjusted, resumed
+from shapeshift.training.settings import LEFT, TrainSettings, adjusted, resumed
 
 # Fields of TrainSettings that are typed; the others are set by fit, by --calibrate and from Python.
 USUAL = (

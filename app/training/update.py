@@ -85,8 +85,8 @@ def run(options: Options) -> int:
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
-    from shapeshift.training.update.begin_update import begin_update
     from shapeshift.training.update.regions import moved_capture
+    from shapeshift.training.update.update_trainer import begin_update
 
     options = with_settings(options)
     check_output(options.out, [options.scene], options.overwrite or options.resume)

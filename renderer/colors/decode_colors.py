@@ -9,13 +9,14 @@ import numpy as np
 
 from shapeshift.renderer.colors.color_cache import (
     ColorCache,
+    EyeColors,
     color_key,
     forget_colors,
     reach_of,
     reach_of_scaffold,
+    shared_is_enough,
     visible_anchors,
 )
-from shapeshift.renderer.colors.eye_colors import EyeColors, shared_is_enough
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
     PICTURE,

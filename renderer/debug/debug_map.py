@@ -11,7 +11,7 @@ from shapeshift.scene.pose import View
 # Why each splat is not drawn, in numpy: the twin of project's gates for debug pictures.
 #
 # float32 and a column at a time: 400,000 splats take some 50 ms.  The slow and exact one is
-# renderer/reference/reference.py.
+# renderer/reference.py.
 
 Points = tuple[np.ndarray, np.ndarray, np.ndarray]  # mean_opacity (N, 4), object (N,), covariance
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite

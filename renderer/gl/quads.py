@@ -12,15 +12,15 @@ from itertools import pairwise
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.splat_edges import BAND_PX, EDGE_POWER, KINDS, POINT_PX
+from shapeshift.rasterizer.debug_passes import BAND_PX, EDGE_POWER, KINDS, POINT_PX
 from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.foveation import foveas_of
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.decode import Decoder
+from shapeshift.renderer.gl.foveated import FoveatedSplatter
 from shapeshift.renderer.gl.gpu import Gpu, overwrite
-from shapeshift.renderer.gl.lenses.foveated import FoveatedSplatter
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter

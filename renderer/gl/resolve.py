@@ -7,7 +7,7 @@ import moderngl
 import numpy as np
 
 from shapeshift.renderer.gl.gpu import Gpu, release_framebuffer
-from shapeshift.renderer.gl.window.layered import WindowBytes
+from shapeshift.renderer.gl.layered import WindowBytes
 from shapeshift.scene.appearance import Background, Sky, up_of_eye
 from shapeshift.scene.pose import View
 

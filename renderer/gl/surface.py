@@ -6,7 +6,7 @@ Of a frame's views depth alone, beside their colours, into smaller targets (Dept
 import moderngl
 import numpy as np
 
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for, release_framebuffer

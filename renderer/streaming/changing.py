@@ -5,7 +5,7 @@ import numpy as np
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.streaming.choose import NOT_DRAWN, downwards, upwards
 from shapeshift.renderer.streaming.pages import PageTable
-from shapeshift.runtime_models.splats.lod.parents import NodeTree
+from shapeshift.runtime_models.splats.parents import NodeTree
 
 NONE = np.zeros(0, np.int64)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.runtime_models.leaf_levels import LeafLevels
-from shapeshift.runtime_models.splats.lod.parents import NodeTree
+from shapeshift.runtime_models.splats.parents import NodeTree
 
 # choose: which level of detail each leaf is drawn at, within a budget of splats.
 #

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.streaming.choose import NOT_DRAWN
 from shapeshift.runtime_models.leaf_levels import LeafSource, LeafSplats

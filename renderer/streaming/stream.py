@@ -11,7 +11,7 @@ from itertools import groupby
 import numpy as np
 
 from shapeshift.rasterizer.device import Device, NoDevice, open_device
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.pages import PAGE
 from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.renderer.settings import StreamStats
@@ -45,7 +45,7 @@ from shapeshift.renderer.streaming.pages import (
 from shapeshift.runtime_models.leaf_levels import LeafSource
 from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
 from shapeshift.runtime_models.program import program
-from shapeshift.runtime_models.splats.lod.parents import NodeTree, with_parents
+from shapeshift.runtime_models.splats.parents import NodeTree, with_parents
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 

@@ -1,22 +1,21 @@
 """The splats of all objects on an OpenCL device: shapes and colours, decoded into one arena."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, bound_clusters
+from shapeshift.rasterizer.clusters import CLUSTER, Clusters, bound_clusters
+from shapeshift.rasterizer.colors import add_heat, blend_heat, grade_color
 from shapeshift.rasterizer.device import Device, open_device
-from shapeshift.rasterizer.grade import grade_color
-from shapeshift.rasterizer.heat import add_heat, blend_heat
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
-from shapeshift.rasterizer.paging.pages import PageMap
+from shapeshift.rasterizer.pages import PageMap
 from shapeshift.rasterizer.project_arena import clusters_unseen
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.limits import arena_rows, check_tiles
-from shapeshift.renderer.resample import scaled
+from shapeshift.renderer.resolution import scaled
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.tiles.inputs import (
     camera_of,
@@ -24,7 +23,6 @@ from shapeshift.renderer.tiles.inputs import (
     read_rows,
     write_rows,
 )
-from shapeshift.renderer.tiles.keep_rows import keep_rows
 from shapeshift.renderer.tiles.slot import Decoding, Slot, run_by, slots_of
 from shapeshift.runtime_models.evaluate import only_fades
 from shapeshift.runtime_models.model import Model, is_antialiased
@@ -35,7 +33,28 @@ from shapeshift.scene.pose import View
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-    from shapeshift.rasterizer.paging.pages import Arena
+    from shapeshift.rasterizer.pages import Arena
+
+    Tables: TypeAlias = "list[Array | None]"  # with a row a splat
+
+
+def keep_rows(
+    device: Device, before: list[Slot], after: list[Slot], tables: "list[tuple[Tables, Tables]]"
+) -> list[bool]:
+    """Copies what objects of the same model have decoded, and puts their slots in place of new
+    ones; which objects these are.  tables: pairs of the same, of the arena before and after.
+    """
+    kept = [False] * len(after)
+    for i, (old, new) in enumerate(zip(before, after, strict=False)):
+        if old.model is not new.model:
+            continue
+        kept[i] = True
+        for sources, targets in tables:
+            for source, target in zip(sources, targets, strict=True):
+                if source is not None and target is not None and old.count:
+                    device.copy_rows(source[old.rows], target, new.start)
+        old.start, after[i] = new.start, old
+    return kept
 
 
 class TilesArena(Drawing):

@@ -16,7 +16,7 @@ from shapeshift.rasterizer.surface import (
     surface_arena,
 )
 from shapeshift.renderer.foveation import hidden_tiles
-from shapeshift.renderer.resample import scaled
+from shapeshift.renderer.resolution import scaled
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.scene.appearance import Background, Color, Sky, up_of_eye
@@ -25,7 +25,7 @@ from shapeshift.scene.pose import View
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-    from shapeshift.rasterizer.paging.pages import Arena
+    from shapeshift.rasterizer.pages import Arena
 
 
 def blend_depth(

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles
-from shapeshift.rasterizer.clusters.clusters import CLUSTER, Clusters, Occluders
+from shapeshift.rasterizer.clusters import CLUSTER, Clusters, Occluders
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.paging.pages import PAGE
+from shapeshift.rasterizer.pages import PAGE
 from shapeshift.rasterizer.project import TILE, Projected, grid_of
 from shapeshift.rasterizer.raster import rasterize_noting
 from shapeshift.renderer.foveation import hidden_tiles
@@ -29,7 +29,7 @@ from shapeshift.scene.pose import View
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-    from shapeshift.rasterizer.paging.pages import Arena
+    from shapeshift.rasterizer.pages import Arena
 
 LEAST_SPLATS = 1 << 15  # that a frame saves: to ask and to note how deep tiles are costs as much
 PAUSE = 12  # frames until it is tried again

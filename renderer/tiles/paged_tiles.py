@@ -6,17 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shapeshift.rasterizer.colors import grade_color, shade_pages, upload_sh
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.grade import grade_color
 from shapeshift.rasterizer.pack import pack
-from shapeshift.rasterizer.paging.pages import (
-    PAGE,
-    DrawnPages,
-    PageMap,
-    gather_pages,
-    scatter_pages,
-)
-from shapeshift.rasterizer.shade_sh import shade_pages, upload_sh
+from shapeshift.rasterizer.pages import PAGE, DrawnPages, PageMap, gather_pages, scatter_pages
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.drawing import SAMPLE, median_distance
 from shapeshift.renderer.limits import arena_rows
@@ -30,7 +23,7 @@ from shapeshift.scene.pose import View
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
-    from shapeshift.rasterizer.paging.pages import Arena
+    from shapeshift.rasterizer.pages import Arena
 
 
 # Pages of the arena for objects whose splats come and go, as a budget has them (streaming/).

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.rasterizer.decode.decode_heads import (
+from shapeshift.rasterizer.colors import shade_sh, upload_sh
+from shapeshift.rasterizer.decode_heads import (
     ACTIVATIONS,
     MOST_HIDDEN,
     MOST_SPLATS,
@@ -15,11 +16,10 @@ from shapeshift.rasterizer.decode.decode_heads import (
 )
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.pack import pack_color
-from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.renderer.limits import arena_rows
 from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.colors.light_harmonics import most_light
+from shapeshift.runtime_models.colors.spherical_harmonics import most_light
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import HEADS, AnchorModel, Mlp, Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, is_each

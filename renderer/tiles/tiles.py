@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles, bin_tiles, quantize_keys, sort_order
-from shapeshift.rasterizer.clusters.clusters import Chosen, Clusters
+from shapeshift.rasterizer.clusters import Chosen, Clusters
+from shapeshift.rasterizer.colors import compile_heat
+from shapeshift.rasterizer.debug_passes import count_overdraw, draw_edges
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.fovea.foveate import rasterize_foveated
-from shapeshift.rasterizer.heat import compile_heat
-from shapeshift.rasterizer.overdraw import count_overdraw
+from shapeshift.rasterizer.foveate import rasterize_foveated
 from shapeshift.rasterizer.project import CULL_REASONS, Projected
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
 from shapeshift.rasterizer.resolve import WindowOverlay, resolve
-from shapeshift.rasterizer.splat_edges import draw_edges
 from shapeshift.renderer.colors.false_colors import has_heat
 from shapeshift.renderer.foveation import foveas_of
 from shapeshift.renderer.settings import RenderSettings

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import channels_of, most_light
+from shapeshift.runtime_models.colors.spherical_harmonics import channels_of, most_light
 from shapeshift.runtime_models.eyes import LOOKS, eyes_of, looks_of, spread_eyes
 from shapeshift.runtime_models.model import HEADS, AnchorFrames, AnchorModel, BadFile, Finding, Mlp
 

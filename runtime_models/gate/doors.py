@@ -40,7 +40,7 @@ DOORS = {
         Door("USD", "USD scenes", "usd-core", ("pxr.Usd", "pxr.UsdVol", "pxr.UsdUtils"),
              f"{_MODELS}.splats.usd.usd_run:usd_arrays", 2, 2e-6, 256 * MB),
         Door("rare photo", "photos in none of the usual formats", "pillow", ("PIL.Image",),
-             f"{_SCENE}.captures.pictures.rare_photo_run:rare_photo", 2, 4e-6, 256 * MB,
+             f"{_SCENE}.captures.rare_photo_run:rare_photo", 2, 4e-6, 256 * MB,
              "PNG or JPEG is wanted"),
         Door("video", "videos", "av", ("av",),
              "shapeshift.decomposition.poses.video_run:take_frames", 5, 4e-5, 2 * GB,

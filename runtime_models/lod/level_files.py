@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import channels_of
+from shapeshift.runtime_models.colors.spherical_harmonics import channels_of
 from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
 from shapeshift.runtime_models.files.memory import Account, unlimited
 from shapeshift.runtime_models.files.npy import write_arrays

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import most_light
+from shapeshift.runtime_models.colors.spherical_harmonics import most_light
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
 

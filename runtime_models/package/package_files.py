@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import channels_of
+from shapeshift.runtime_models.colors.spherical_harmonics import channels_of
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import is_zip, opened_zip, read_member
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Mlp

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import WIDTHS as LIGHT_WIDTHS
+from shapeshift.runtime_models.colors.spherical_harmonics import WIDTHS as LIGHT_WIDTHS
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, unlimited
 from shapeshift.runtime_models.files.npy import read_array
 from shapeshift.runtime_models.files.zip_files import opened_zip

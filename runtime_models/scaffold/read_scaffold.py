@@ -25,16 +25,17 @@ from shapeshift.runtime_models.model import (
     Stop,
 )
 from shapeshift.runtime_models.scaffold.evaluate_scaffold import ScaffoldEvaluator
-from shapeshift.runtime_models.scaffold.scaffold_cloud import Cloud, read_cloud
-from shapeshift.runtime_models.scaffold.scaffold_networks import (
+from shapeshift.runtime_models.scaffold.scaffold_files import (
+    Cloud,
     Networks,
     Shape,
+    read_cloud,
     read_networks,
     rotate_networks,
 )
 from shapeshift.runtime_models.shapes import three
+from shapeshift.runtime_models.splats.operations.activate import origin_of
 from shapeshift.runtime_models.splats.operations.decimate import largest
-from shapeshift.runtime_models.splats.operations.recentre import origin_of
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
 from shapeshift.runtime_models.splats.plain_splats import COLMAP_UP, Reading
 

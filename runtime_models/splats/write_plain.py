@@ -12,7 +12,7 @@ from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import joined, moved, widened
-from shapeshift.runtime_models.splats.operations.recentre import FINE
+from shapeshift.runtime_models.splats.operations.activate import FINE
 from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.usd.read_usd import refuse_without

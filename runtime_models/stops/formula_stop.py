@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import most_light
+from shapeshift.runtime_models.colors.spherical_harmonics import most_light
 from shapeshift.runtime_models.evaluate import Evaluator, directions
 from shapeshift.runtime_models.eyes import eyes_of
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Mlp, Stop
@@ -25,7 +25,7 @@ from shapeshift.runtime_models.package.refit_encoding import (
     solve_rows,
     split_columns,
 )
-from shapeshift.runtime_models.stops.insert_stop import (
+from shapeshift.runtime_models.stops.change_stops import (
     NewUnits,
     above,
     insert_stop,

@@ -17,25 +17,14 @@ from shapeshift.runtime_models.model import (
     SplatLayers,
 )
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
-from shapeshift.runtime_models.web.limits import (
-    COLOR_BITS,
-    FEATURE_BITS,
-    FRAME_BITS,
-    HARMONIC_BITS,
-    MOST_ANCHORS,
-    MOST_SPLATS,
-    MOST_WEIGHTS,
-    POSITION_STEP,
-)
 
 # The file that a web page reads: "SHIFTWEB", a table of contents in JSON, and arrays.
 #
 # Tables are stored as codes between the ends of each column, lowest bytes first: such bytes
 # deflate better than floats do, and 16 bits of a position are finer than what a screen shows.
 #
-# Whatever stands in the table of contents has a TypedDict, here, in web_model.py or in
-# page_scene.py: `python3 tools/web/write_conventions.py` writes their fields down for the page's
-# JavaScript.
+# Whatever stands in the table of contents has a TypedDict, here or in page_scene.py:
+# `python3 tools/web/write_conventions.py` writes their fields down for the page's JavaScript.
 
 MAGIC = b"SHIFTWEB"
 FORMAT: Literal["shapeshift web 1"] = "shapeshift web 1"
@@ -45,6 +34,22 @@ TYPES: dict[str, SectionKind] = {
 }  # fmt: skip
 PLANES: tuple[SectionKind, ...] = ("p8", "p16", "p24")  # by how many bytes a code has
 Section = tuple[SectionKind, int, int]  # type, byte offset, count of numbers
+
+
+# What a page can hold and how finely its tables are stored, for web/conventions.js, too.
+WIDTH = 2048  # texels a row of a list: the least that every WebGL2 driver allows
+BATCH_ROWS = 64  # of anchors that are decoded at once: 131,072, 36 MB between two passes
+BLOCK_VEC4S = 1024  # of a uniform block: 16 kB, the least that every WebGL2 driver allows
+MOST_ANCHORS = 4_000_000  # of plain splats, too
+MOST_SPLATS = 4_194_304  # WIDTH rows of a list
+MOST_BYTES = 1 << 30  # of a scene, inflated
+MOST_WEIGHTS = 8 * 4 * BLOCK_VEC4S  # of one network: 8 of the 12 blocks that a shader may have
+LARGEST_FILE = 24_000_000  # bytes in one HTML file: above, browsers take long to open it
+FEATURE_BITS = 9  # 10 make the page of the demo larger than its package
+FRAME_BITS = 12  # of scales, by their logarithm, and quaternions
+COLOR_BITS = 12  # of harmonics of degree 0, and opacities
+HARMONIC_BITS = 8  # of degree 1 and above
+POSITION_STEP = 1e-4  # of the scene's radius: where 16 bits are coarser, 24 are taken
 
 
 class TableEntry(TypedDict):

@@ -10,9 +10,9 @@ import numpy as np
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import CameraList, data_from_ours, is_centred
+from shapeshift.scene.cameras.camera_path import FPS
 from shapeshift.scene.cameras.colmap_cameras import stale_tables, write_colmap_cameras
 from shapeshift.scene.cameras.own_cameras import own_rows
-from shapeshift.scene.cameras.read_camera_path import FPS
 from shapeshift.scene.cameras.read_floor import EYE_HEIGHT
 from shapeshift.scene.captures.capture_rules import COLMAP_UP
 from shapeshift.scene.captures.colmap_tables import TABLES

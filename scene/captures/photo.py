@@ -17,8 +17,6 @@ from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.lens_resampling import LARGEST, resampled
 from shapeshift.scene.captures.lenses.panorama import is_panorama
-from shapeshift.scene.captures.pictures.rare_photo import is_rare, rare_photo, refuse_scans
-from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
 from shapeshift.scene.captures.radiometric.no_value import (
     FLOATS,
     GREY_16,
@@ -36,6 +34,8 @@ from shapeshift.scene.captures.radiometric.number_photos import (
     radiometric_celsius,
 )
 from shapeshift.scene.captures.radiometric.tiff_bands import band_header, is_misread, open_band
+from shapeshift.scene.captures.rare_photo import is_rare, rare_photo, refuse_scans
+from shapeshift.scene.captures.rare_photo_run import USUAL
 from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27

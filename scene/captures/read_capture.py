@@ -58,9 +58,9 @@ from shapeshift.scene.captures.modalities.two_sorts import (
 )
 from shapeshift.scene.captures.radiometric.stated_bands import of_each_band, sharing_folders
 from shapeshift.scene.captures.read_transforms import read_transforms
+from shapeshift.scene.captures.scans.read_data_sets import TABLE as SITCOMS3D
+from shapeshift.scene.captures.scans.read_data_sets import find_sitcoms3d
 from shapeshift.scene.captures.scans.read_scan import capture_from, is_scan, read_scan
-from shapeshift.scene.captures.scans.read_sitcoms3d import TABLE as SITCOMS3D
-from shapeshift.scene.captures.scans.read_sitcoms3d import find_sitcoms3d
 
 TABLES = ("transforms.json", "transforms_multimodal.json", "cameras.json")
 MINIMAL = ("train.npz", "val.npz", "test.npz")

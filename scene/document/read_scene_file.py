@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 from shapeshift.runtime_models.files.json_fields import Fields, is_count, read_json
 from shapeshift.runtime_models.model import BadFile
@@ -42,17 +43,9 @@ def read_scene_file(path: str | Path) -> SceneFile:
     asked = file.value("format", FORMAT if path.name.lower().endswith(ENDING) else None)
     if asked != FORMAT:
         raise file.error("format", f"'{FORMAT}', which this program reads,")
-    floor_y = file.value("floor_y", None)
-    if floor_y is not None:
-        floor_y = file.number("floor_y", None, "metres, or null for no floor,", -FAR_M, FAR_M)
-    gravity = file.number("gravity_m_s2", 9.81, "0 to 100 m/s2", 0, GRAVITY)
     background = file.optional_object(BACKGROUND)
     rows = file.rows("objects", MOST_OBJECTS, "object")
-    view = read_view(file.optional_object("view"))
-    views = read_views(file)
-    appearance, sky = read_appearance(file), read_sky(file)
-    upright = read_upright(file.optional_object("up"))
-    sections = read_sections(file, ("world",))
+    head = read_head(file)
     file.refuse_unknown_keys()
     items = tuple(read_item(row, path.name) for row in rows)
     names = [item.name for item in items]
@@ -64,15 +57,25 @@ def read_scene_file(path: str | Path) -> SceneFile:
         folder=path.parent,
         items=items,
         background=read_background(background) if background else None,
-        floor_y=floor_y,
-        gravity_m_s2=gravity,
-        view=view,
-        views=views,
-        appearance=appearance,
-        sky=sky,
-        sections=sections,
-        upright=upright,
+        **head,
     )
+
+
+def read_head(file: Fields) -> dict[str, Any]:
+    """What a scene says apart from its objects and its background: fields of SceneFile."""
+    floor_y = file.value("floor_y", None)
+    if floor_y is not None:
+        floor_y = file.number("floor_y", None, "metres, or null for no floor,", -FAR_M, FAR_M)
+    return {
+        "floor_y": floor_y,
+        "gravity_m_s2": file.number("gravity_m_s2", 9.81, "0 to 100 m/s2", 0, GRAVITY),
+        "view": read_view(file.optional_object("view")),
+        "views": read_views(file),
+        "appearance": read_appearance(file),
+        "sky": read_sky(file),
+        "upright": read_upright(file.optional_object("up")),
+        "sections": read_sections(file, ("world",)),
+    }
 
 
 def read_item(row: Fields, file: str) -> SceneItem:

@@ -19,8 +19,7 @@ from shapeshift.runtime_models.stop_weights import Control, StopWeights
 from shapeshift.scene.appearance import NEUTRAL, Appearance, Sky
 from shapeshift.scene.cameras.framing import frame_points, framing_view, scene_points, view_from
 from shapeshift.scene.cameras.upright import Upright
-from shapeshift.scene.orthographic import orthographic
-from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.pose import Pose, View, orthographic
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.sections.section import SceneSection
 from shapeshift.scene.selectors.selector import UPRIGHT, Painted, Selector

@@ -20,6 +20,16 @@ PLAIN = SceneItem(name="plain", model="plain")
 def write_scene_file(file: SceneFile, path: str | Path) -> None:
     """Atomic.  What has its usual value is left out; relative paths follow to another folder."""
     path = Path(path)
+    out = head_row(file)
+    if file.background:
+        out["background"] = background_item_row(file.background, file, path.parent)
+    out["objects"] = [item_row(item, file, path.parent) for item in file.items]
+    text = json.dumps(out, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_whole(path, text.encode())
+
+
+def head_row(file: SceneFile) -> dict:
+    """What a scene says apart from its objects and its background."""
     out: dict = {"format": FORMAT, "gravity_m_s2": file.gravity_m_s2, "floor_y": file.floor_y}
     if file.view:
         out["view"] = view_row(file.view)
@@ -39,12 +49,13 @@ def write_scene_file(file: SceneFile, path: str | Path) -> None:
         out["up"] = {"used": file.upright.used.source, "ways": ways}
     if file.sections:
         out["sections"] = [section_row(one, "world") for one in file.sections]
-    if file.background:
-        row = item_row(file.background, file, path.parent)
-        out["background"] = {k: v for k, v in row.items() if k not in ("name", "static")}
-    out["objects"] = [item_row(item, file, path.parent) for item in file.items]
-    text = json.dumps(out, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_whole(path, text.encode())
+    return out
+
+
+def background_item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
+    """The keys of the background, which has its name and is static in any case."""
+    row = item_row(item, file, folder)
+    return {key: value for key, value in row.items() if key not in ("name", "static")}
 
 
 def view_row(view: FirstView) -> dict:

@@ -162,7 +162,12 @@ def kept_scale(scene: Path) -> Scale:
 
 def read_marks_file(path: Path) -> MarksFile:
     """Raises BadFile, one sentence."""
-    fields = Fields(read_json(path, most_bytes=MOST_BYTES, unique=True), path.name, ADVICE)
+    return marks_of(read_json(path, most_bytes=MOST_BYTES, unique=True), path.name)
+
+
+def marks_of(data: object, name: str) -> MarksFile:
+    """What such a file holds, of what JSON gives; name: for messages.  Raises BadFile."""
+    fields = Fields(data, name, ADVICE)
     fields.count(MARK, VERSION, VERSION)
     scale = fields.number("metres_per_unit", 1.0, "a number from 1e-6 to 1e6", 1e-6, 1e6)
     scale_error = fields.number("scale_error", 0.0, "a number from 0 to 1", 0, 1)
@@ -170,9 +175,9 @@ def read_marks_file(path: Path) -> MarksFile:
     lengths = tuple(read_length(row) for row in fields.rows("lengths", MOST_LENGTHS, "length"))
     names = [mark.name for mark in marks]
     for what, taken in (("marks", names), ("lengths", [each.name for each in lengths])):
-        twice = next((name for name, count in Counter(taken).items() if count > 1), None)
+        twice = next((each for each, count in Counter(taken).items() if count > 1), None)
         if twice is not None:
-            raise BadFile(f"{path.name}: two {what} are called '{twice}'; rename one, {ADVICE}.")
+            raise BadFile(f"{name}: two {what} are called '{twice}'; rename one, {ADVICE}.")
     pairs = tuple(_pair(row, names) for row in fields.rows("differences", MOST_MARKS, "difference"))
     isotherms = tuple(_isotherm(row) for row in fields.rows("isotherms", MOST_MARKS, "isotherm"))
     error = fields.optional_object("held_out")

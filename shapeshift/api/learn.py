@@ -16,8 +16,8 @@ from shapeshift.app.paths import plain
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
-    from shapeshift.app.training.blocks.outcome import TrainOutcome
     from shapeshift.app.training.fit import Options as FitOptions
+    from shapeshift.app.training.train_in_blocks import TrainOutcome
     from shapeshift.rasterizer.device import Device
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.fit.fit import FitReport
@@ -103,7 +103,7 @@ def train_in_blocks(
     more: dict[str, Any], pace: bool, progress: "Callable[[Any], object] | None",
 ) -> TrainedScene:  # fmt: skip
     """As train --blocks.  more: other options of the command."""
-    from shapeshift.app.training.blocks.outcome import train_quietly
+    from shapeshift.app.training.train_in_blocks import train_quietly
     from shapeshift.app.training.train_options import EXPERTS, LINES, USUAL, Options
 
     if out is None:
@@ -169,8 +169,7 @@ def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
     None stands for what was not asked.  Raises UsageError.
     """
     from shapeshift.app.command_line import nearest
-    from shapeshift.training.left_options import left_setting
-    from shapeshift.training.settings import TrainSettings, adjusted, resumed
+    from shapeshift.training.settings import TrainSettings, adjusted, left_setting, resumed
 
     asked = {name: value for name, value in asked.items() if value is not None}
     known = [field.name for field in fields(TrainSettings)]
@@ -216,8 +215,8 @@ def run(
 
 def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
     """The scene of a run that has ended, written where it was asked for."""
-    from shapeshift.app.training.blocks.outcome import TrainOutcome
     from shapeshift.app.training.saving import save
+    from shapeshift.app.training.train_in_blocks import TrainOutcome
     from shapeshift.renderer.pace import measure_pace
     from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.runtime_models.stops.formula_stop import with_placed_formulas
@@ -276,8 +275,8 @@ def update(
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
-    from shapeshift.training.update.begin_update import begin_update
     from shapeshift.training.update.regions import moved_capture
+    from shapeshift.training.update.update_trainer import begin_update
 
     given = opened(scene)
     path = None if out is None else plain(out)

@@ -13,7 +13,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
 from shapeshift.app.training.style_options import Options
 from shapeshift.runtime_models.model import AnchorModel
-from shapeshift.runtime_models.stops.remove_stop import remove_stop
+from shapeshift.runtime_models.stops.change_stops import remove_stop
 
 if TYPE_CHECKING:
     from shapeshift.training.styles.style_pictures import StyleView

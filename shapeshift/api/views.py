@@ -21,8 +21,7 @@ from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.appearance import Background
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, moved
 from shapeshift.scene.cameras.framing import orbit_path
-from shapeshift.scene.pose import MOST_SIDE, View
-from shapeshift.scene.stereo import stereo_pair
+from shapeshift.scene.pose import MOST_SIDE, View, stereo_pair
 
 SWEEP = "sweep"
 AROUND = ("orbit", "front")  # cameras that take their place from the scene

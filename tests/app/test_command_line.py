@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import pytest
 
 from shapeshift.app import cli
-from shapeshift.app.command_help import help_text
+from shapeshift.app.cli import help_text
 from shapeshift.app.command_line import (
     EXPERT,
     POSITIONAL,
@@ -21,7 +21,7 @@ from shapeshift.app.command_line import (
 )
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training import fit, table, train
-from shapeshift.training.left_options import LEFT, left_setting
+from shapeshift.training.settings import LEFT, left_setting
 
 ROOT = Path(__file__).resolve().parents[2]
 PROG = "python3 launch.py draw"

@@ -15,7 +15,7 @@ from PIL import Image
 from shapeshift.app import cli
 from shapeshift.app.charts.chart_rows import RowsFile
 from shapeshift.app.commands.simulate import line
-from shapeshift.app.stability_cases.finding import CaseFinding
+from shapeshift.app.stability_cases.case_context import CaseFinding
 from shapeshift.app.stability_cases.table import open_table
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply

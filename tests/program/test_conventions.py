@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, SplatLayers, Stop
-from shapeshift.scene.pose import Pose, View, look_at, perspective
-from shapeshift.scene.stereo import eyes_apart, stereo_pair
+from shapeshift.scene.pose import Pose, View, eyes_apart, look_at, perspective, stereo_pair
 from tests.support.sources import nodes_of
 
 HALF = np.sqrt(0.5)

@@ -18,7 +18,7 @@ from PIL import Image
 from shapeshift.runtime_models.gate import gate
 from shapeshift.runtime_models.gate.doors import DOORS, ELSEWHERE
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
+from shapeshift.scene.captures.rare_photo_run import USUAL
 from tests.support.hostile.gate_fuzz import MOST_BYTES, MOST_S, Outcome, fuzz
 from tests.support.hostile.gate_seeds import seeds
 from tests.support.sources import nodes_of
@@ -119,7 +119,7 @@ def test_sessions_of_onnxruntime_are_of_networks_of_our_own():
         "runtime_models/scaffold/evaluate_scaffold.py",
     }  # fmt: skip
     assert set(calls(r"\bopen_checked$")) == {
-        "training/gradients/fold_constants.py", "training/gradients/gradient_session.py"
+        "training/gradients/fold_constants.py", "training/gradients/reverse_mode.py"
     }  # fmt: skip
 
 

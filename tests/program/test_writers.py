@@ -14,7 +14,7 @@ FOLDERS = ("app", "decomposition", "rasterizer", "renderer", "runtime_models", "
 OWN = {"first_start.py", "whole_file.py", "las_run.py", "coacd_run.py", "point_clouds.py",
        "convex_parts.py", "colmap_run.py", "colmap_child.py", "triangulation.py",
        "triangulate_run.py", "write_package.py", "read_usd.py", "usd_run.py",
-       "read_wrapped.py", "write_video.py", "extras.py", "caches.py", "match_run.py",
+       "formats.py", "write_video.py", "extras.py", "caches.py", "match_run.py",
        "find_change.py"}  # fmt: skip
 METHODS = {"write_text", "write_bytes", "savez", "savez_compressed", "savetxt", "savefig",
            "tofile", "imwrite", "save", "export", "rename", "os.replace"}  # fmt: skip

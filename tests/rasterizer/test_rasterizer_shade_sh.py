@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
+from shapeshift.rasterizer.colors import shade_sh, upload_sh
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.evaluate import directions
 from tests.support.renderer.rasterizer_scenes import device

@@ -12,7 +12,7 @@ from shapeshift.runtime_models.lint.lint_whole import Sample
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.layers.read_layers import read_layers
-from shapeshift.runtime_models.splats.operations.recentre import COARSE, FINE, origin_of
+from shapeshift.runtime_models.splats.operations.activate import COARSE, FINE, origin_of
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.write_plain import describe_losses, writer_of
@@ -187,7 +187,7 @@ def test_cameras_of_the_file_see_the_same_picture_there(near_and_far, tmp_path):
 
 
 def test_the_oracle_draws_both_alike(near_and_far):
-    from shapeshift.renderer.reference.reference import reference_image
+    from shapeshift.renderer.reference import reference_image
     from shapeshift.renderer.settings import RenderSettings
     from shapeshift.scene.cameras.framing import default_view
     from shapeshift.scene.scene import Scene, SceneObject

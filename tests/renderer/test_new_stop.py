@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.cameras.framing import orbit_path

@@ -10,8 +10,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.rotation import normalize, rotation_matrices
 from shapeshift.scene.metrics import psnr
-from shapeshift.scene.orthographic import PARALLAX_PX, orthographic
-from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.scene.pose import PARALLAX_PX, View, look_at, orthographic, perspective
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import random_layers

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene

@@ -8,16 +8,15 @@ import pytest
 
 from shapeshift.rasterizer.device import NoDevice, open_device
 from shapeshift.renderer.colors.color_cache import reach_of_scaffold
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view, model_points
 from shapeshift.scene.control import control_of
 from shapeshift.scene.pick import Picker, anchor_places
-from shapeshift.scene.pose import Pose, View, look_at, perspective
+from shapeshift.scene.pose import Pose, View, look_at, perspective, stereo_pair
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import Painted
-from shapeshift.scene.stereo import stereo_pair
 from shapeshift.training.evaluation.evaluate import ModelRenderer
 from tests.support.renderer.frames import draw_counted
 from tests.support.splat_scenes import psnr_db, random_layers

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.colors.palette import value_blend, value_weights
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.stop_weights import StopBlend
 from shapeshift.scene.control import control_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.splat_edges import BAND_PX, EDGE_POWER, POINT_PX
+from shapeshift.rasterizer.debug_passes import BAND_PX, EDGE_POWER, POINT_PX
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import EDGES, RenderSettings
 from shapeshift.scene.scene import Scene, SceneObject

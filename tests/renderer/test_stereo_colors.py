@@ -5,16 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.colors.eye_colors import SHARED_DB, EyeColors
+from shapeshift.renderer.colors.color_cache import SHARED_DB, EyeColors
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.colors.color_bounds import color_slope
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import frame_points, scene_points
-from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.scene.pose import View, look_at, perspective, stereo_pair
 from shapeshift.scene.scene import Scene
-from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import without_direction
 from tests.support.renderer.eye_scenes import APART, SCENES, TURNED, eyes
 from tests.support.renderer.frames import draw_counted

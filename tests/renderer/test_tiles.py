@@ -8,7 +8,7 @@ from PIL import Image
 
 from shapeshift.renderer.colors.color_cache import color_key
 from shapeshift.renderer.colors.palette import palette_colors
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.runtime_models.model import SplatLayers, Stop

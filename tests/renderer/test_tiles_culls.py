@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.debug.debug_map import classify
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.scene.scene import Scene

@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.renderer.gl.sort_check import quantize, stable_order
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.gl.context import is_software
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.pose import View, look_at
 from tests.support.renderer.eye_views import APART, eyes

@@ -6,7 +6,7 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject

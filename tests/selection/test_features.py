@@ -18,7 +18,7 @@ FEATURES = {
     "levels of detail, streaming, paging": (
         r"^app/streaming/|/(paging|lod|streaming)/|renderer/levels|paged_tiles|leaf_levels"
         r"|splats/sog/\w*stream",
-        24, 5,
+        18, 5,
     ),
     "inspection, thermal": (r"inspection/|radiometric/|api/inspect", 43, 3),
     "film, gallery": (r"^app/film/|^scene/film/|api/film", 16, 3),

@@ -15,7 +15,7 @@ from PIL import Image
 import shapeshift as ss
 from shapeshift.app.command_line import parse
 from shapeshift.app.commands import render as render_command
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.read_scene import read_model
 from tests.support.splat_scenes import random_layers
 

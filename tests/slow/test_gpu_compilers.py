@@ -19,8 +19,8 @@ from shapeshift.rasterizer.program import read_source
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.tiles import paged_tiles
 from shapeshift.renderer.tiles.paged_tiles import PagedTiles
+from shapeshift.scene.pose import stereo_pair
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.stereo import stereo_pair
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer

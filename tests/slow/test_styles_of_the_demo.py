@@ -11,7 +11,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.runtime_models.stops.remove_stop import remove_stop
+from shapeshift.runtime_models.stops.change_stops import remove_stop
 from shapeshift.training.styles.add_style import NewStyle, add_style, drift_db
 from shapeshift.training.styles.carried_pictures import CarriedPictures
 from shapeshift.training.styles.image_network import ImageNetwork

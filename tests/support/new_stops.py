@@ -7,7 +7,7 @@ import numpy as np
 from shapeshift.runtime_models.model import HEADS, AnchorFrames, AnchorModel, ObjectLabel, Stop
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.runtime_models.rotation import normalize
-from shapeshift.runtime_models.stops.insert_stop import NewUnits, add_units, insert_stop
+from shapeshift.runtime_models.stops.change_stops import NewUnits, add_units, insert_stop
 from tests.support.models import make_random_model
 
 THREE = (

@@ -8,7 +8,7 @@ import pytest
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.first_anchors.views import pixel_of
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.splat_losses import SLOPE, MinScale
+from shapeshift.training.losses.losses import SLOPE, MinScale
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer

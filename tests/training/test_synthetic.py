@@ -9,8 +9,16 @@ from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View, look_at
 from shapeshift.training.synthetic import balls, workshop
-from shapeshift.training.synthetic.openness import FAR, Clearance
-from shapeshift.training.synthetic.placing import elbow, frame, inside, noise, run_of_pipe, turned
+from shapeshift.training.synthetic.placing import (
+    FAR,
+    Clearance,
+    elbow,
+    frame,
+    inside,
+    noise,
+    run_of_pipe,
+    turned,
+)
 from shapeshift.training.synthetic.solids import Ball, Cuboid, Cylinder, Disc, Ring, unit
 from shapeshift.training.synthetic.tracer import (
     Light,

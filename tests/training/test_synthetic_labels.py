@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.synthetic import workshop
-from shapeshift.training.synthetic.furniture import MOTOR, MUG
+from shapeshift.training.synthetic.things import MOTOR, MUG
 from shapeshift.training.synthetic.tracer import photograph, pixel_rays, trace
 from tools.synthetic.labels import (
     LABELS,

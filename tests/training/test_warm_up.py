@@ -9,7 +9,7 @@ import tests.support.training.fit_scenes as fit_scenes
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.splat_losses import (
+from shapeshift.training.losses.losses import (
     MIN_OPACITY,
     MIN_OPACITY_SHARE,
     UNTIL,

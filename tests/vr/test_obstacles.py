@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from shapeshift.app.headset.xr_user import XrUser
-from shapeshift.vr.locomotion.locomotion import Rules
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.locomotion import Rules
 from shapeshift.vr.outline import BEGINS_M, MOST, WAYS, WHOLE_M, Sight, look, nearest_wall
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.scene.world_scenes import item, real
 from tests.support.vr.vr_frames import at, frame
 

@@ -11,10 +11,10 @@ from shapeshift.vr.drawn import FINE as FINE_INK
 from shapeshift.vr.drawn import WRONG, Drawn, PanelQuad, arc, drawn_of
 from shapeshift.vr.frame import LOST
 from shapeshift.vr.glove import LIT, Capsule
-from shapeshift.vr.locomotion.locomotion import Arc, Comfort
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.locomotion import Arc, Comfort
 from shapeshift.vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
-from shapeshift.vr.panel.carried import Carried, carry
+from shapeshift.vr.panel import Carried, carry
+from shapeshift.vr.play_space import PlaySpace
 from shapeshift.vr.touching import Touched
 from tests.support.renderer.frames import texture_target
 from tests.support.vr.vr_hands import HEAD, OPEN, PLANE, a_frame, eyes, hand_at, pixel_of

@@ -10,8 +10,8 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import FLOOR_NAME
 from shapeshift.vr.frame import SIDES, Pulse
-from shapeshift.vr.locomotion.locomotion import Travel, ground_of, move
-from shapeshift.vr.locomotion.play_space import PlaySpace, pinned, turned
+from shapeshift.vr.locomotion import Travel, ground_of, move
+from shapeshift.vr.play_space import PlaySpace, pinned, turned
 from shapeshift.vr.touching import (
     ACTED,
     FULL_N_S,

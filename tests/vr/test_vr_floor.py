@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.floor import REST, Floor, Grid, clearness, spacing_of
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.renderer.frames import texture_target
 from tests.support.vr.vr_hands import HEAD, eyes, pixel_of
 

@@ -8,12 +8,12 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.cards import HALF_CLEAR, card_picture
+from shapeshift.vr.controller_cards import FADES_S, SHOWN_S, hint_lines, hints
 from shapeshift.vr.frame import LOST, SIDES
-from shapeshift.vr.hints import FADES_S, SHOWN_S, hint_lines, hints
-from shapeshift.vr.locomotion.locomotion import Rules
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.locomotion import Rules
 from shapeshift.vr.openxr.hands import PROFILES
 from shapeshift.vr.outline import AWAY_M, BY_HAND, Outlines, hull_of, outline
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import HEAD, a_frame, hand_at
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * 0.05

@@ -82,7 +82,7 @@ def test_sharpness_falls_only_where_frames_are_late(told):
 
 
 def test_a_stick_turns_once_and_to_its_side(told):
-    """Radians to the left, as in vr/locomotion."""
+    """Radians to the left, as in vr/locomotion.py."""
     right, left, little = told["turns"]
     assert right == [pytest.approx(-np.pi / 6)] and left == [pytest.approx(np.pi / 6)]
     assert little == []

@@ -10,7 +10,7 @@ import pytest
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.page import serve
-from shapeshift.app.page.page_server import HERE, LocalServer, PageServer
+from shapeshift.app.page.serve import HERE, LocalServer, PageServer
 from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.package.write_package import write_package
 from tests.support.web.page_scenes import paced_model

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.vr.locomotion.play_space import PlaySpace, heading
+from shapeshift.vr.play_space import PlaySpace, heading
 from tests.support.xr.person import pose_of
 
 

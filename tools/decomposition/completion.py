@@ -55,7 +55,7 @@ from shapeshift.decomposition.partition import (  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.training.synthetic.openness import Clearance  # noqa: E402
+from shapeshift.training.synthetic.placing import Clearance  # noqa: E402
 from shapeshift.training.synthetic.tracer import Place, look, photograph, shade  # noqa: E402
 from shapeshift.training.synthetic.workshop import GREY, LIGHT, dome, radiance, things  # noqa: E402
 from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402

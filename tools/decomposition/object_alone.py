@@ -26,14 +26,18 @@ from shapeshift.rasterizer.bin import bin_tiles  # noqa: E402
 from shapeshift.rasterizer.device import Device  # noqa: E402
 from shapeshift.rasterizer.project import Camera, project  # noqa: E402
 from shapeshift.rasterizer.raster import rasterize_rgba  # noqa: E402
-from shapeshift.runtime_models.colors.light_harmonics import turn_light  # noqa: E402
+from shapeshift.runtime_models.colors.spherical_harmonics import turn_light  # noqa: E402
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
 from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, ObjectLabel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.rotation import product  # noqa: E402
 from shapeshift.scene.pose import Pose, View, look_at, perspective  # noqa: E402
-from shapeshift.training.synthetic.openness import Clearance  # noqa: E402
-from shapeshift.training.synthetic.placing import frame, inside, turned  # noqa: E402
+from shapeshift.training.synthetic.placing import (  # noqa: E402
+    Clearance,
+    frame,
+    inside,
+    turned,
+)
 from shapeshift.training.synthetic.tracer import Place, look, photograph, shade  # noqa: E402
 from shapeshift.training.synthetic.workshop import GOLDEN, GREY, LIGHT, dome, things  # noqa: E402
 from tools.synthetic.labels import LABELS, OBJECTS, label_map  # noqa: E402

@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT))
 
 import shapeshift as ss  # noqa: E402, F401  # makes the folders its subpackages
 from shapeshift.app.charts.chart_rows import write_text  # noqa: E402
-from shapeshift.app.training.blocks.train_in_blocks import join  # noqa: E402
+from shapeshift.app.training.train_in_blocks import join  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.blocks.read_blocks import turned  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
@@ -34,8 +34,11 @@ from shapeshift.runtime_models.package.write_package import write_package  # noq
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
-from shapeshift.training.blocks.begin_block import begin_block  # noqa: E402
-from shapeshift.training.blocks.block_start import BlockStart, begun_anew  # noqa: E402
+from shapeshift.training.blocks.block_start import (  # noqa: E402
+    BlockStart,
+    begin_block,
+    begun_anew,
+)
 from shapeshift.training.blocks.starts import CutList, read_cut  # noqa: E402
 from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint  # noqa: E402
 from shapeshift.training.evaluation.evaluate import ModelRenderer  # noqa: E402

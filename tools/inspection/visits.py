@@ -16,8 +16,8 @@ from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import Pose
 from shapeshift.training.synthetic.balls import save_png
-from shapeshift.training.synthetic.furniture import MOTOR, MUG
 from shapeshift.training.synthetic.placing import box, bump
+from shapeshift.training.synthetic.things import MOTOR, MUG
 from shapeshift.training.synthetic.tracer import (
     Material,
     Solid,

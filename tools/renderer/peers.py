@@ -31,7 +31,7 @@ from shapeshift.app.document import open_document  # noqa: E402
 from shapeshift.app.drawing import save_png  # noqa: E402
 from shapeshift.app.opening import ReadingOptions  # noqa: E402
 from shapeshift.app.page.page_scene import PageSettings, page_scene  # noqa: E402
-from shapeshift.renderer.reference.reference import reference_image  # noqa: E402
+from shapeshift.renderer.reference import reference_image  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402

@@ -28,14 +28,14 @@ from peers import make_views  # noqa: E402
 
 from shapeshift.app.charts.chart_rows import write_lines  # noqa: E402
 from shapeshift.rasterizer.bin import bin_tiles, sort_order  # noqa: E402
+from shapeshift.rasterizer.colors import shade_sh, upload_sh  # noqa: E402
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.rasterizer.pack import pack  # noqa: E402
 from shapeshift.rasterizer.program import build  # noqa: E402
 from shapeshift.rasterizer.project import Projected, grid_of  # noqa: E402
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena  # noqa: E402
 from shapeshift.rasterizer.raster import rasterize_rgba_views  # noqa: E402
-from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh  # noqa: E402
-from shapeshift.renderer.reference.reference import reference_image  # noqa: E402
+from shapeshift.renderer.reference import reference_image  # noqa: E402
 from shapeshift.renderer.settings import RenderSettings  # noqa: E402
 from shapeshift.renderer.tiles.tiles import camera_of  # noqa: E402
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402

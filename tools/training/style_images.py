@@ -37,12 +37,10 @@ from shapeshift.training.style_features.nnfm_pictures import (  # noqa: E402
     nnfm_pictures,
 )
 from shapeshift.training.style_features.splat_features import (  # noqa: E402
-    drawn,
-    scene_views,
-)
-from shapeshift.training.style_features.zero_shot import (  # noqa: E402
     StylePreview,
+    drawn,
     recolor_rule,
+    scene_views,
 )
 from shapeshift.training.styles.add_style import (  # noqa: E402
     BEHIND,

@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT))
 
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.scene.pose import View, look_at, perspective  # noqa: E402
-from shapeshift.training.density.densify import DensificationStats  # noqa: E402
+from shapeshift.training.densify import DensificationStats  # noqa: E402
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded  # noqa: E402
 from shapeshift.training.heads.optimizer import Adam  # noqa: E402
 from shapeshift.training.losses.losses import ImageLoss  # noqa: E402

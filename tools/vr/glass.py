@@ -27,7 +27,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
 from tests.support.vr.vr_glass import BEFORE, upright
 from tests.support.vr.vr_hands import HEAD, a_frame, eyes
 from tests.support.vr.vr_panel import a_state

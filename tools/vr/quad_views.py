@@ -27,7 +27,7 @@ from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.app.paths import DEMO, TOUCH
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.resample import bilinear
+from shapeshift.renderer.resolution import bilinear
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import View

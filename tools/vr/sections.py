@@ -28,8 +28,8 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.sections.section import plane_through
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import HEAD, a_frame, eyes, hand_at
 from tests.support.vr.vr_panel import a_state
 

@@ -25,9 +25,9 @@ from shapeshift.rasterizer.reference import MAX_ALPHA
 from shapeshift.renderer.colors.palette import LUMINANCE
 from shapeshift.renderer.gl.shader import SHADERS
 from shapeshift.renderer.gl.target import MOST_UNIT
-from shapeshift.renderer.reference.reference import JACOBIAN_MARGIN
+from shapeshift.renderer.reference import JACOBIAN_MARGIN
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.web import limits
+from shapeshift.runtime_models.web import web_model
 from shapeshift.runtime_models.web.web_model import ControlEntry, ModelEntry, Section, SectionKind
 from shapeshift.scene.control import SHIFT_S, SNAP, Sweep
 
@@ -52,7 +52,7 @@ def shared_constants() -> dict[str, tuple[object, str]]:
     """name -> (value, what it is)."""
     settings, sweep = RenderSettings(), Sweep(())
     return {
-        **{name: (getattr(limits, name), "runtime_models/web/limits.py") for name in LIMITS},
+        **{name: (getattr(web_model, name), "runtime_models/web/web_model.py") for name in LIMITS},
         "MIN_ALPHA": (settings.min_alpha, "a pixel's alpha below this is not drawn"),
         "MAX_ALPHA": (MAX_ALPHA, "one splat never hides everything behind it"),
         "LOW_PASS": (settings.low_pass, "px^2 added to the screen covariance"),

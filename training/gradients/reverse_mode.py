@@ -1,19 +1,21 @@
 """Reverse mode over ONNX: nodes that calculate the gradient of a loss by one of the inputs.
 
 The gradient of an ONNX network is an ONNX network itself, so onnxruntime gives both in one run.
-Every operator has its vector-Jacobian product in one of the tables of vjp_*.py; what is not there
-is refused by name.  Only what lies between the input and the loss is differentiated; weights are
+Every operator has its vector-Jacobian product in a table of vjp_rules.py; what is not there is
+refused by name.  Only what lies between the input and the loss is differentiated; weights are
 constants.
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.session import load_onnxruntime
+from shapeshift.training.gradients.fold_constants import open_checked
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
-from shapeshift.training.gradients.vjp_elementwise import ELEMENTWISE
-from shapeshift.training.gradients.vjp_layers import LAYERS
+from shapeshift.training.gradients.vjp_rules import ELEMENTWISE, LAYERS
 from shapeshift.training.gradients.vjp_step import Vjp, VjpStep
 
 # Vector-Jacobian products of what moves numbers about without changing them, and of sums.
@@ -243,3 +245,43 @@ def nodes_between(graph: OnnxGraph, loss: str, by: str) -> list:
             needed |= set(node.input)
             found.append(node)
     return found[::-1]
+
+
+# Loss and gradient of an ONNX network in one run of onnxruntime.
+
+
+class GradientSession:
+    """Runs a graph whose last nodes calculate losses, and their gradient by one input."""
+
+    def __init__(
+        self, graph: OnnxGraph, losses: Mapping[str, tuple[str, float]], by: str, threads: int = 0
+    ) -> None:
+        """losses: of each its value in the graph, one number, and its weight in the sum.
+
+        threads: 0 for one a core; they sleep between the runs.  Raises BadFile.
+        """
+        self.by, self.losses = by, tuple(losses)
+        values = [name for name, _ in losses.values()]
+        total = ""
+        for name, weight in losses.values():
+            part = graph.scale(name, weight)
+            total = graph.add_node("Add", total, part) if total else part
+        gradient = add_gradient(graph, total, by)
+        graph.outputs = [*values, gradient]
+        graph.keep_only(graph.outputs)
+        self.outputs = list(graph.outputs)
+        self.session = open_graph(graph, threads)
+
+    def __call__(self, given: Mapping[str, np.ndarray]) -> tuple[dict[str, float], np.ndarray]:
+        """The losses by their names, unweighted, and the gradient of the weighted sum."""
+        *losses, gradient = self.session.run(self.outputs, dict(given))
+        found = {n: float(np.ravel(v)[0]) for n, v in zip(self.losses, losses, strict=True)}
+        return found, gradient
+
+
+def open_graph(graph: OnnxGraph, threads: int = 0):
+    """A session of a graph.  threads: 0 for one a core; they sleep between the runs."""
+    options = load_onnxruntime().SessionOptions()
+    options.log_severity_level, options.intra_op_num_threads = 3, threads
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    return open_checked(graph.model().SerializeToString(), graph.name, options)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.colors.light_harmonics import WIDTHS, channels_of
+from shapeshift.runtime_models.colors.spherical_harmonics import WIDTHS, channels_of
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT
 
 KERNELS = Path(__file__).parents[1] / "kernels"

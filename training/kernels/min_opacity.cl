@@ -1,4 +1,4 @@
-// min_opacity: the gradient of share * max(MIN_OPACITY - opacity, 0) a splat: see splat_losses.py.
+// min_opacity: the gradient of share * max(MIN_OPACITY - opacity, 0) a splat: see losses.py.
 // Reads:   opacity.
 // Writes:  adds to grad_opacity.
 // Units:   opacity 0..1.

@@ -16,9 +16,9 @@ import numpy as np
 from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.gate.network import StrangeNetwork
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.training.gradients.gradient_session import GradientSession, open_graph
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
 from shapeshift.training.gradients.read_network import check_network, read_bytes, read_network
+from shapeshift.training.gradients.reverse_mode import GradientSession, open_graph
 
 FILES = ("vision_model.onnx", "text_model.onnx", "tokenizer.json", "preprocessor_config.json")
 PIXELS, SEEN, WORDS, MASK, READ = (

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.training.gradients.gradient_session import GradientSession
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
+from shapeshift.training.gradients.reverse_mode import GradientSession
 from shapeshift.training.style_features.pixel_descent import DescentSettings, PixelDescent, Slope
 from shapeshift.training.style_features.vgg_features import VggFeatures, as_input
 from shapeshift.training.styles.style_pictures import StyleView

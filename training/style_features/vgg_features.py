@@ -8,9 +8,9 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.evaluation.vgg_distance import MEAN_BGR
-from shapeshift.training.gradients.gradient_session import open_graph
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
 from shapeshift.training.gradients.read_network import parse_model, read_bytes, read_network
+from shapeshift.training.gradients.reverse_mode import open_graph
 
 BETWEEN = ("Conv", "Relu", "MaxPool", "Identity")  # a plain chain of them
 LEAST_SIDE = 16  # pixels: two halvings leave four

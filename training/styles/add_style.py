@@ -10,7 +10,7 @@ from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Model, Splats
 from shapeshift.runtime_models.package.refit_encoding import split_columns
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
-from shapeshift.runtime_models.stops.insert_stop import (
+from shapeshift.runtime_models.stops.change_stops import (
     NewUnits,
     add_units,
     insert_stop,

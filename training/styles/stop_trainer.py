@@ -1,7 +1,7 @@
 """Trains the hidden units and features that a new stop has alone, with the steps of every training.
 
 At the new stop a network's outputs are those of the source stop and what the new units add
-(runtime_models/stops/insert_stop.py).  So only these are trained: heads of one hidden layer on old
+(runtime_models/stops/change_stops.py).  So only these are trained: heads of one hidden layer on old
 and new features, whose outputs are added to the stored ones of the source stop before activation.
 Whatever a package's networks are like, deep, fixed or of any width, this stays the same.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from shapeshift.runtime_models.evaluate import directions, looked_along
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile
 from shapeshift.runtime_models.session import BATCH, FoldedNetwork
-from shapeshift.runtime_models.stops.insert_stop import NewUnits, add_units
+from shapeshift.runtime_models.stops.change_stops import NewUnits, add_units
 from shapeshift.training.export import ACTIVATION
 from shapeshift.training.heads.gaussians import SCALE_CLIP, Gaussians
 from shapeshift.training.heads.networks import HeadLayout, Layers, padded

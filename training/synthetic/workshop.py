@@ -18,22 +18,21 @@ from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import View, look_at
 from shapeshift.training.synthetic.balls import save_png
-from shapeshift.training.synthetic.furniture import (
+from shapeshift.training.synthetic.pipework import gauge, joint, line, return_line, valve
+from shapeshift.training.synthetic.placing import Clearance, frame, inside
+from shapeshift.training.synthetic.things import (
     CABINET,
     MOTOR,
     base_plate,
     bench,
     cabinet,
     conduit,
+    motor,
     mug,
     oil_can,
     screwdriver,
     spanner,
 )
-from shapeshift.training.synthetic.motor import motor
-from shapeshift.training.synthetic.openness import Clearance
-from shapeshift.training.synthetic.pipework import gauge, joint, line, return_line, valve
-from shapeshift.training.synthetic.placing import frame, inside
 from shapeshift.training.synthetic.tracer import (
     Light,
     Place,

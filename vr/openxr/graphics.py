@@ -11,7 +11,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
+from shapeshift.renderer.gl.layered import GlFunctions, NoFunction
 from shapeshift.vr.openxr.instance import Instance, NoHeadset
 from shapeshift.vr.shown import Blit
 

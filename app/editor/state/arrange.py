@@ -60,7 +60,15 @@ def redo(state: EditorState) -> str:
 def go_back(state: EditorState, history: History) -> None:
     """Goes to a step that has been before, with every x as it is now."""
     now = state.edited.history
-    turn_to(state, history.amend(edits.with_x_of(history.file, now.file)))
+    go_to(state, history.amend(edits.with_x_of(history.file, now.file)))
+
+
+def go_to(state: EditorState, history: History) -> None:
+    """Another history, in which the step of now may be any other.  Raises BadFile, with all as it
+    was, where it cannot be so.
+    """
+    now = state.edited.history
+    turn_to(state, history)
     if isinstance(history.film, FilmKeys) and history.film is not state.timeline.keys:
         state.timeline.restore(history.film)
     if history.regions != now.regions:

@@ -16,6 +16,7 @@ from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.files import poll_opener
 from shapeshift.app.editor.window.hands import InputActions
+from shapeshift.app.editor.window.recovering import Recovering
 from shapeshift.app.editor.window.window import (
     CLICK_PIXELS,
     Drag,
@@ -131,10 +132,11 @@ class Objects:
         edits: ObjectEdits,
         saving: Saving,
         adding: Adding,
+        recovering: Recovering,
     ) -> None:
         self._window, self._hands = window, hands
         self.state, self.edits = edits.state, edits
-        self.saving, self.adding = saving, adding
+        self.saving, self.adding, self.recovering = saving, adding, recovering
         self._click: tuple[float, float] | None = None  # where a press was that may be a click
         self._opened = True  # another scene is there, and the section has not unfolded for it
         self._leaving = False  # the window may be closed, whatever is unsaved
@@ -171,14 +173,17 @@ class Objects:
     def asked(self) -> tuple:
         """What boxes ask; another value is drawn at once."""
         saving = self.saving
-        return saving.name, saving.taken, saving.then is not None, self.adding.asking
+        waits = saving.then is not None
+        return saving.name, saving.taken, waits, self.adding.asking, self.recovering.asked()
 
     def status(self) -> str:
-        return said("not saved") if self.unsaved else ""
+        words = [said("not saved")] * self.unsaved + [self.recovering.status()]
+        return ", ".join(filter(None, words))
 
     def handle_event(self, event: Event) -> bool:
         """True for shortcuts, for a click that chooses, and for what is dropped to be added."""
-        if isinstance(event, KeyDown) and (self.saving.asking or self.adding.asking):
+        asks = self.saving.asking or self.adding.asking or self.recovering.asked()
+        if isinstance(event, KeyDown) and asks:
             return True  # a box is open, and keys are for it
         match event:
             case KeyDown(shortcut="z", shift=False):
@@ -234,11 +239,13 @@ class Objects:
         self.state.record_regions()
         if not imgui.is_mouse_down(0):
             self.state.rest()
-        return self.adding.poll()
+        return self.recovering.each_frame() | self.adding.poll()
 
     def draw_boxes(self, ui_scale: float) -> None:
         """The boxes that ask for a name, before something is lost, for what to add."""
         draw_saving(self.saving, self.state, ui_scale)
+        if not self.saving.asking:
+            self.recovering.draw(ui_scale)
         self.adding.draw(ui_scale)
 
 

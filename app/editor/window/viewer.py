@@ -40,6 +40,7 @@ from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Adding, Objects
 from shapeshift.app.editor.window.parts import attach_parts
 from shapeshift.app.editor.window.pictures import write_numbered_png, write_png
+from shapeshift.app.editor.window.recovering import Recovering
 from shapeshift.app.editor.window.section_handles import attach_sections
 from shapeshift.app.editor.window.shell import Shell
 from shapeshift.app.editor.window.shown import FrameRequest, Shown
@@ -121,8 +122,7 @@ class Viewer:
         self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
         self.hooks.opened.append(self._framed.forget)
         self.hooks.event_handlers.insert(0, self.shell.handle_event)
-        hooks = self.hooks
-        hooks.asked += [self.objects.asked, self.files.asked, lambda: state.timeline.problem]
+        self.hooks.asked += [self.files.asked, lambda: state.timeline.problem]
         self._title = ""  # what the window's title says
         self.is_drawn = False  # what the next frame shows, before it began
         self._told: tuple = ()  # what is said and asked, as it was drawn last
@@ -154,12 +154,14 @@ class Viewer:
             lambda: files.recent.paths if files.recent else (),
         )  # fmt: skip
         self.gizmo = gizmo = Gizmo(state, self.viewpoint, self.window)
-        objects = Objects(self.window, self.hands, edits, saving, adding)
+        recovering = Recovering(state, saving, self.shown.upload, self.dial.scene_changed)
+        objects = Objects(self.window, self.hands, edits, saving, adding, recovering)
         hooks.event_handlers.insert(0, gizmo.handle_event)
         hooks.event_handlers.append(objects.handle_event)
         hooks.marks += [gizmo.draw, objects.draw_boxes]
         hooks.each_frame.append(objects.each_frame)
         hooks.status.append(objects.status)
+        hooks.asked.append(objects.asked)
         hooks.opened += [objects.forget, gizmo.release]
         if self.options.screenshot is None:
             hooks.closing.append(objects.may_close)

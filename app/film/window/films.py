@@ -36,7 +36,7 @@ from shapeshift.app.film.window.timeline import CAMERA, STOP, Timeline
 from shapeshift.app.paths import WorkFolders
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_weights import StopWeights, control_text
-from shapeshift.scene.film.film_file import is_film_file, read_film_file
+from shapeshift.scene.film.film_path import is_film_file, read_film_file
 
 # The film of the timeline in the window, while it plays or its playhead is dragged.
 

@@ -21,7 +21,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
 from shapeshift.app.progress import PERIOD
 from shapeshift.runtime_models.program import EXTRAS, ROOT, is_installed
-from shapeshift.scene.film.film_file import ENDING, write_film_file
+from shapeshift.scene.film.film_path import ENDING, write_film_file
 
 # A command of this program as a process of its own, for long work beside the window.
 

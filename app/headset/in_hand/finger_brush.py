@@ -1,4 +1,6 @@
-"""A finger that paints: what lies in a ball about its tip goes into the painted region."""
+"""A finger that paints, what lies in a ball about its tip goes into the painted region; and a hand
+that takes things out.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.parts.parts_tool import ADD, REMOVE, REPLACE, PartsTool
 from shapeshift.app.editor.state.regions import within_balls
+from shapeshift.scene.pose import View
 from shapeshift.vr.frame import Frame, Hand
 from shapeshift.vr.glove import fingertip
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
+from shapeshift.vr.play_space import PlaySpace
 
 PRESSED, LET_GO = 0.6, 0.4  # of a trigger, or a pinch
 LEAST_M, FIRST_M, MOST_M = 0.005, 0.03, 0.3  # radius of the ball, metres of the room
@@ -110,3 +114,56 @@ class FingerBrush:
         else:
             regions.add("painted", index, self.editor.scene.objects[index], np.zeros(3))
         return True
+
+
+# A hand that takes things out of a captured scene: its ray lights them up, its trigger chooses.
+
+NEAR, FAR = 0.01, 1000.0  # metres of the room, of a view along a ray
+NARROW = 0.01  # tangent of that view's half
+SIZE = (10, 10)  # its pixels: a hand means one or two of them
+CENTRE = (SIZE[0] / 2, SIZE[1] / 2)
+
+
+@dataclass
+class PartsHand:
+    """Keeps whether the trigger is down."""
+
+    tool: PartsTool
+    down: bool = False
+
+    def act(self, frame: Frame, play_space: PlaySpace, carried: Carried) -> Frame:
+        """While the tool is on: what the pointing hand means; the frame with what it leaves.
+
+        A or X held adds, B or Y removes.
+        """
+        tool, side = self.tool, carried.pointer
+        if not tool.on:
+            self.down = False
+            return frame
+        hand = frame.hands[side]
+        tool.poll()
+        if hand.aim is None or carried.on_panel:
+            self.down = False
+            tool.look_away()
+            return frame
+        how = how_of(hand)
+        self._point(hand, play_space, how)
+        pressed = hand.trigger > (LET_GO if self.down else PRESSED)
+        if pressed and not self.down:
+            tool.click_lit(how)
+        self.down = pressed
+        taken = replace(hand, trigger=0.0, primary=False, secondary=False)
+        return replace(frame, hands={**frame.hands, side: taken})
+
+    def _point(self, hand: Hand, play_space: PlaySpace, how: str) -> None:
+        """Asks what the ray meets, as soon as the question before is answered."""
+        if self.tool.finder.busy or hand.aim is None:
+            self.tool.how = how
+            return
+        tangents = (-NARROW, NARROW, -NARROW, NARROW)
+        self.tool.point(play_space.view(View(hand.aim, tangents, NEAR, FAR, SIZE)), CENTRE, how)
+
+
+def how_of(hand: Hand) -> str:
+    """What a trigger does with the buttons that are held."""
+    return ADD if hand.primary else REMOVE if hand.secondary else REPLACE

@@ -36,9 +36,9 @@ from shapeshift.scene.sections.section import (
     plane_through,
 )
 from shapeshift.vr.frame import SIDES, Frame, Hand
-from shapeshift.vr.locomotion.locomotion import GRIPS_AT, LETS_GO_AT
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.locomotion import GRIPS_AT, LETS_GO_AT
+from shapeshift.vr.panel import Carried
+from shapeshift.vr.play_space import PlaySpace
 
 # A hand that takes hold of a section or a region: it follows the hand, and stays when let go.
 

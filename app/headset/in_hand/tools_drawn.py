@@ -17,9 +17,8 @@ from shapeshift.vr.cards import Card
 from shapeshift.vr.drawn import DOT_M, FINE, PALE, WRONG, Drawn
 from shapeshift.vr.frame import SIDES, Frame
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
-from shapeshift.vr.panel.plane import facing
+from shapeshift.vr.panel import Carried, facing
+from shapeshift.vr.play_space import PlaySpace
 
 THIN_M, THICK_M = 0.0012, 0.0022  # radii of lines, metres of the room
 HANDLE_M = 0.014  # radius of a handle's ball

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.errors import UsageError
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.vr.glass.held import HeldGlass
+from shapeshift.vr.glass import HeldGlass
 
 
 @dataclass

@@ -18,7 +18,7 @@ from shapeshift.scene.scene import Scene
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.floor import Floor
 from shapeshift.vr.frame import SIDES, Frame, Hand
-from shapeshift.vr.glass.held import (
+from shapeshift.vr.glass import (
     GlassScale,
     HeldGlass,
     Pane,
@@ -28,7 +28,7 @@ from shapeshift.vr.glass.held import (
     frame_of,
     held_glass,
 )
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.scene_depth import EyeDepth
 from shapeshift.vr.see_through import SeeThrough
 from shapeshift.vr.touching import shows

@@ -18,17 +18,22 @@ from shapeshift.scene.control import control_key
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.vr.cards import Card
-from shapeshift.vr.controllers.model import HeldController, controller, labelled
+from shapeshift.vr.controller_cards import (
+    HeldController,
+    controller,
+    hint_opacity,
+    hint_rows,
+    hints,
+    labelled,
+)
 from shapeshift.vr.drawn import Drawn, drawn_of
 from shapeshift.vr.floor import area_edges
 from shapeshift.vr.frame import LOST, SIDES, Frame, grip_of
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.hints import hint_opacity, hint_rows, hints
 from shapeshift.vr.openxr.session import Session
 from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
-from shapeshift.vr.panel.carried import Carried
-from shapeshift.vr.panel.plane import facing
-from shapeshift.vr.shadow.cast import STRAY, Blocks, Cast, Shadow, Shadows, blocks_of, shadow_on
+from shapeshift.vr.panel import Carried, facing
+from shapeshift.vr.shadow import STRAY, Blocks, Cast, Shadow, Shadows, blocks_of, shadow_on
 
 
 class OverSplats:

@@ -12,9 +12,9 @@ from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.terminal import say
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import Frame
-from shapeshift.vr.locomotion.play_space import PlaySpace, play_space_before, underfoot
 from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.session import Session
+from shapeshift.vr.play_space import PlaySpace, play_space_before, underfoot
 
 EVERY_S = 1.0  # between two tries
 REST_S = 0.05  # between two looks at the desk

@@ -17,7 +17,7 @@ from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 from shapeshift.vr.frame import FAR_M, NEAR_M
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 
 RAY_PX, RAY_TANGENT = 17, 0.012  # of the small picture around a ray: pixels of 1.4 mrad
 WIDE_PX, WIDE_TANGENT = 480, 1.0  # of what the head sees: 90 degrees

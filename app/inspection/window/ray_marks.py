@@ -18,8 +18,8 @@ from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 from shapeshift.vr.frame import Frame, Hand
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
+from shapeshift.vr.play_space import PlaySpace
 
 PRESSED, LET_GO = 0.6, 0.4  # of a trigger
 POINTS_EVERY_S, SEES_EVERY_S = 0.15, 0.5  # so often the ray, and what the head sees, are measured

@@ -184,7 +184,7 @@ inline floatn channel_along(__global const float* light, const floatn* value) {
 
 // What the block's light by direction (channels, LIGHTS, WIDTH) gives along unit directions d, or
 // along none, written behind them: spherical harmonics of degree 1 and 2 in units of those of
-// degree 1, light_harmonics.py.
+// degree 1, spherical_harmonics.py.
 inline void light_along(__global const float* light, int channels, floatn* d) {
   const floatn xx = d[0] * d[0], yy = d[1] * d[1], zz = d[2] * d[2];
   const floatn value[LIGHTS] = {d[0], d[1], d[2],

@@ -1,6 +1,6 @@
 // pages: the last rows of a frame are drawn from pages of an arena, each for an object of its own;
 // several may show the same page.  Nothing without PAGED.
-// Reads:   pages (mapped_pages.py): poses of all objects, and from first_entry on a uvec4 a page of
+// Reads:   pages (buffers.py): poses of all objects, and from first_entry on a uvec4 a page of
 //          PAGE splats: arena row, or NO_PAGE; where its object's pose begins; part; antialiased.
 // Defines: Page page_of(i): of splat i of the paged rows.
 // Units:   a part of a splat: 1 where all of it is drawn.

@@ -18,8 +18,7 @@ from shapeshift.runtime_models.lint.lint_whole import (
 )
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from shapeshift.runtime_models.splats.layers.read_layers import check_mode, widened
-from shapeshift.runtime_models.splats.operations.activate import activate
-from shapeshift.runtime_models.splats.operations.recentre import origin_of, recentred
+from shapeshift.runtime_models.splats.operations.activate import activate, origin_of, recentred
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
 from shapeshift.runtime_models.splats.plain_splats import ARRAYS, COLMAP_UP, RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_sog import (

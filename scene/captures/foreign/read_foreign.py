@@ -21,13 +21,17 @@ from shapeshift.scene.captures.foreign.foreign_frames import (
     text_in,
     world_from,
 )
-from shapeshift.scene.captures.foreign.read_alicevision import alicevision_frames
 from shapeshift.scene.captures.foreign.read_blocks import blocks_frames
 from shapeshift.scene.captures.foreign.read_bundler import TableWords, bundler_frames, nvm_frames
 from shapeshift.scene.captures.foreign.read_metashape import metashape_frames
-from shapeshift.scene.captures.foreign.read_openmvg import openmvg_frames
-from shapeshift.scene.captures.foreign.read_opensfm import SHOTS, odm_frames, opensfm_frames
 from shapeshift.scene.captures.foreign.read_realityscan import realityscan_frames
+from shapeshift.scene.captures.foreign.read_sfm_json import (
+    SHOTS,
+    alicevision_frames,
+    odm_frames,
+    openmvg_frames,
+    opensfm_frames,
+)
 from shapeshift.scene.captures.foreign.read_xmp import xmp_frames
 from shapeshift.scene.captures.scans.posed_frames import PosedFrames
 

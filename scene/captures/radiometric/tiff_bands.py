@@ -16,9 +16,9 @@ from PIL.TiffImagePlugin import TiffImageFile
 
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.pictures.rare_photo import is_rare, rare_photo
-from shapeshift.scene.captures.pictures.rare_photo_run import USUAL
 from shapeshift.scene.captures.radiometric.no_value import GDAL_NODATA
+from shapeshift.scene.captures.rare_photo import is_rare, rare_photo
+from shapeshift.scene.captures.rare_photo_run import USUAL
 
 HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 MOST_PAGES, MOST_BANDS, MOST_TAGS = 1024, 4096, 4096

@@ -19,15 +19,21 @@ from shapeshift.scene.captures.scans.posed_frames import (
     photos_in,
     table_of,
 )
+from shapeshift.scene.captures.scans.read_data_sets import (
+    find_nuscenes,
+    find_sdfstudio,
+    find_sitcoms3d,
+    nuscenes_frames,
+    sdfstudio_frames,
+    sitcoms3d_frames,
+)
 from shapeshift.scene.captures.scans.read_nerfies import find_nerfies, nerfies_frames
-from shapeshift.scene.captures.scans.read_nuscenes import find_nuscenes, nuscenes_frames
-from shapeshift.scene.captures.scans.read_polycam import find_polycam, polycam_frames
-from shapeshift.scene.captures.scans.read_scanner_app import (
+from shapeshift.scene.captures.scans.read_phone_scans import (
+    find_polycam,
     find_scanner_app,
+    polycam_frames,
     scanner_app_frames,
 )
-from shapeshift.scene.captures.scans.read_sdfstudio import find_sdfstudio, sdfstudio_frames
-from shapeshift.scene.captures.scans.read_sitcoms3d import find_sitcoms3d, sitcoms3d_frames
 
 # ARKitScenes: VIDEO_frames/ with lowres_wide.traj, its photos, intrinsics and depth.
 

@@ -8,9 +8,8 @@ import pytest
 
 from shapeshift.app import cli
 from shapeshift.app.charts.chart_picture import family
-from shapeshift.app.charts.chart_scene import digest
+from shapeshift.app.charts.chart_scene import budgets_of, digest
 from shapeshift.app.charts.comparison import MOST_DB
-from shapeshift.app.charts.leaf_rows import budgets_of
 from shapeshift.scene.scene import Scene
 from tests.support.splat_scenes import random_layers, shell
 from tests.support.streamed_scenes import open_levels, scene_of, write_levels

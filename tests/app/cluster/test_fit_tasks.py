@@ -15,7 +15,7 @@ from shapeshift.app.command_line import parse
 from shapeshift.app.errors import UsageError
 from shapeshift.app.training.fit import Options, run, without_times
 from shapeshift.app.training.run_loop import INTERRUPTED
-from shapeshift.app.training.trials.run_trials import Trials, calibrated_once
+from shapeshift.app.training.run_trials import Trials, calibrated_once
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.checkpoint import checkpoint_path
@@ -134,7 +134,7 @@ def test_a_training_that_is_interrupted_goes_on_to_the_same_bytes(balls, tmp_pat
         return True
 
     with monkeypatch.context() as patch:
-        patch.setattr("shapeshift.app.training.trials.run_trials.train", stopped)
+        patch.setattr("shapeshift.app.training.run_trials.train", stopped)
         assert run(Options(balls, cut, only=file, device="cpu")) == INTERRUPTED
     assert not cut.exists() and checkpoint_path(cut).exists()
     other = settings_file(tmp_path, seed=1)

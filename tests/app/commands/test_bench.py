@@ -10,7 +10,7 @@ from shapeshift.app import cli, measure
 from shapeshift.app.commands import bench
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.write_package import write_package

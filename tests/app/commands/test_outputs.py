@@ -11,8 +11,8 @@ from shapeshift.app.commands.outputs import as_steps, choose_unit, summary, writ
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.pose import stereo_pair
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import random_package
 from tests.support.renderer.surface_reference import reference_surface
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import shapeshift as ss
-from shapeshift.scene.orthographic import orthographic
+from shapeshift.scene.pose import orthographic
 from tests.support.models import random_package
 
 

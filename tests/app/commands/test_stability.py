@@ -12,8 +12,13 @@ from PIL import Image
 
 import shapeshift as ss
 from shapeshift.app.drawing import open_renderer
-from shapeshift.app.stability_cases.case_context import CaseContext
-from shapeshift.app.stability_cases.finding import at_least, at_most, broken_pixels, not_here
+from shapeshift.app.stability_cases.case_context import (
+    CaseContext,
+    at_least,
+    at_most,
+    broken_pixels,
+    not_here,
+)
 from shapeshift.app.stability_cases.scenes import small_model
 from shapeshift.app.stability_cases.table import CASES, COLUMNS, open_table
 from shapeshift.rasterizer.device import NoDevice
@@ -137,7 +142,7 @@ def test_the_case_fails_where_the_renderer_does(case, name, spoil):
 
 def test_colours_of_the_middle_between_the_eyes_fail(case, monkeypatch):
     """What every stereo frame had before each eye got colours of its own."""
-    monkeypatch.setattr("shapeshift.renderer.colors.eye_colors.SHARED_DB", -1e9)
+    monkeypatch.setattr("shapeshift.renderer.colors.color_cache.SHARED_DB", -1e9)
     assert any("glossy ball" in text for text in failures(CASES["stereo"](case)))
 
 

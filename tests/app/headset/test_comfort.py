@@ -12,14 +12,14 @@ from shapeshift.app.headset.panel_picture import PanelPicture
 from shapeshift.app.headset.worn_settings import FILE, KeptSettings, WornSettings, read_settings
 from shapeshift.app.headset.xr_user import Fitting
 from shapeshift.scene.pose import Pose
+from shapeshift.vr.controller_cards import hint_lines
 from shapeshift.vr.drawn import Drawn, PanelQuad
 from shapeshift.vr.frame import LOST, Area
-from shapeshift.vr.hints import hint_lines
-from shapeshift.vr.locomotion.locomotion import RULES, Rules, Travel, move
-from shapeshift.vr.locomotion.play_space import HIGHEST_M, LOWEST_M, PlaySpace, lift_of, lifted
+from shapeshift.vr.locomotion import RULES, Rules, Travel, move
 from shapeshift.vr.one_hand import alone, shared_stick
 from shapeshift.vr.openxr.room import EYE_HEIGHT_M
-from shapeshift.vr.panel.carried import OPENS_S, Palm
+from shapeshift.vr.panel import OPENS_S, Palm
+from shapeshift.vr.play_space import HIGHEST_M, LOWEST_M, PlaySpace, lift_of, lifted
 from tests.support.vr.vr_frames import at, frame, hand
 from tests.support.vr.vr_panel import Wearer
 

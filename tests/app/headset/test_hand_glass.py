@@ -19,9 +19,9 @@ from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import Sphere
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.frame import LOST, SIDES
-from shapeshift.vr.glass.held import RADIUS_M
+from shapeshift.vr.glass import RADIUS_M
 from shapeshift.vr.openxr.view_configuration import with_insets
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.touching import Touched
 from tests.support.renderer.frames import texture_target
 from tests.support.renderer.heat_scenes import model

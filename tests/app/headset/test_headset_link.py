@@ -9,8 +9,8 @@ from shapeshift.app.headset.session import headset_link
 from shapeshift.app.headset.session.headset_link import PATIENCE_S, Comeback, HeadsetLink
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import LOST, Frame
-from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.openxr.instance import Lost, NoHeadset
+from shapeshift.vr.play_space import PlaySpace
 
 HEAD = Pose(np.array([0.3, 1.6, -0.2]), np.array([np.cos(0.4), 0.0, np.sin(0.4), 0.0]))
 MOVED = Pose(np.array([-1.0, 1.5, 2.0]), np.array([np.cos(0.1), 0.0, -np.sin(0.1), 0.0]))

@@ -9,11 +9,11 @@ import pytest
 from shapeshift.app.headset.over.over_splats import OverSplats
 from shapeshift.app.headset.panel_picture import PANEL
 from shapeshift.app.headset.worn_settings import Wearing
+from shapeshift.vr.controller_cards import FADES_S, SHOWN_S
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.frame import LOST, SIDES
 from shapeshift.vr.glove import CUFF, LIT
-from shapeshift.vr.hints import FADES_S, SHOWN_S
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
 from shapeshift.vr.touching import Touched
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import a_state

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.headset.parts_hand import PartsHand
+from shapeshift.app.headset.in_hand.finger_brush import PartsHand
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import Frame
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.splat_scenes import random_layers
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import PANEL, a_state, an_editor, item

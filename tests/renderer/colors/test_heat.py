@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.bin import bin_tiles
-from shapeshift.rasterizer.heat import add_heat, blend_heat
+from shapeshift.rasterizer.colors import add_heat, blend_heat
 from shapeshift.rasterizer.project import project
 from shapeshift.rasterizer.raster import rasterize_rgba, rasterize_with_heat
 from shapeshift.renderer.colors.false_colors import (
@@ -27,7 +27,7 @@ from shapeshift.renderer.colors.palette import (
     palette_colors,
     palette_values,
 )
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.tiles.slot import ModelHeads
 from shapeshift.runtime_models.model import Stop

@@ -10,7 +10,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.project import Projector
-from shapeshift.renderer.reference.reference import gate_object, reference_image
+from shapeshift.renderer.reference import gate_object, reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate

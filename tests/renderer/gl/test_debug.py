@@ -12,7 +12,7 @@ from shapeshift.renderer.debug.debug import (
     object_poses,
 )
 from shapeshift.renderer.debug.debug_map import classify, fit, heading
-from shapeshift.renderer.reference.reference import gate_object
+from shapeshift.renderer.reference import gate_object
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, EDGES, RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate

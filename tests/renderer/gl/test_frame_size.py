@@ -8,9 +8,9 @@ import pytest
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.limits import TooLarge
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
-from shapeshift.renderer.resample import bilinear
+from shapeshift.renderer.resolution import bilinear
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
 from tests.support.splat_scenes import front_view, psnr_db, stereo_views, two_objects
 

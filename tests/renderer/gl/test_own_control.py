@@ -9,7 +9,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.evaluate import directions
 from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, Stop

@@ -1,4 +1,4 @@
-"""project against the float64 of renderer/reference/reference.py; each gate at its threshold."""
+"""project against the float64 of renderer/reference.py; each gate at its threshold."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.project import Projector
-from shapeshift.renderer.reference.reference import gate_object
+from shapeshift.renderer.reference import gate_object
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import Splats

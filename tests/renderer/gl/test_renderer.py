@@ -10,7 +10,7 @@ from shapeshift.renderer.colors.palette import value_blend
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop

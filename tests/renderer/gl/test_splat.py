@@ -14,7 +14,7 @@ from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.resolve import Resolve
 from shapeshift.renderer.gl.sort_check import Sorter
 from shapeshift.renderer.gl.splat import Splatter
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.scene.pose import Pose, View

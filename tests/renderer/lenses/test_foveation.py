@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.fovea.foveate import COARSE, SEAM, SHARP
+from shapeshift.rasterizer.foveate import COARSE, SEAM, SHARP
 from shapeshift.rasterizer.project import TILE
 from shapeshift.renderer.foveation import RADIUS_DEGREES, fovea_of, foveas_of
 from shapeshift.renderer.gl import target
 from shapeshift.renderer.gl.context import is_software
-from shapeshift.renderer.resample import bilinear
+from shapeshift.renderer.resolution import bilinear
 from shapeshift.renderer.settings import FOVEATIONS, RenderSettings
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import View

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.colors.eye_colors import eyes_among
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.colors.color_cache import eyes_among
+from shapeshift.renderer.reference import reference_image
 from shapeshift.scene.pose import View
 from shapeshift.vr.openxr.view_configuration import with_insets
 from tests.support.renderer.eye_scenes import SCENES, eyes

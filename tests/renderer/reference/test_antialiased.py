@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.renderer.debug.debug import object_poses
 from shapeshift.renderer.debug.debug_map import classify
-from shapeshift.renderer.reference.reference import gate_object, reference_image
+from shapeshift.renderer.reference import gate_object, reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.splats.formats import read_plain

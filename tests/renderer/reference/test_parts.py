@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.debug.debug_map import classify
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from tests.support.renderer.frames import draw
@@ -138,7 +138,7 @@ def test_a_centred_view_projects_as_3dgs_does(place):
     y = min(1.3 * tan_y, max(-1.3 * tan_y, mean[1] / z)) * z
     j = np.array([[focal_x / z, 0, -focal_x * x / z**2], [0, focal_y / z, -focal_y * y / z**2]])
     want = j @ np.diag(np.float64(np.float32(scale)) ** 2) @ j.T + 0.3 * np.eye(2)
-    from shapeshift.renderer.reference.reference import gate_object
+    from shapeshift.renderer.reference import gate_object
 
     found = gate_object(alone(splat).objects[0], view, RenderSettings(), np.zeros(3))
     np.testing.assert_allclose(found.covariance[0], want, rtol=1e-6)

@@ -9,7 +9,7 @@ import pytest
 
 from shapeshift.renderer import renderer as renderer_module
 from shapeshift.renderer.gl.context import is_software
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.appearance import Appearance

@@ -15,7 +15,7 @@ from shapeshift.renderer.streaming.choose import (
     steps_of,
 )
 from shapeshift.runtime_models.leaf_levels import LeafLevels
-from shapeshift.runtime_models.splats.lod.parents import NodeTree
+from shapeshift.runtime_models.splats.parents import NodeTree
 
 KINDS = 4
 

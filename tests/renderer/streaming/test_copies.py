@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.debug.debug import object_color
+from shapeshift.renderer.gl import buffers
 from shapeshift.renderer.gl.gpu import overwrite
-from shapeshift.renderer.gl.paging import mapped_pages
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.splats.lod.parents import with_parents
+from shapeshift.runtime_models.splats.parents import with_parents
 from shapeshift.scene.appearance import Appearance
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject, Tint
@@ -148,7 +148,7 @@ def test_colors_of_copies_write_no_map_of_pages(session_gpu, folder, monkeypatch
         written.append(buffer)
         overwrite(buffer, data)
 
-    monkeypatch.setattr(mapped_pages, "overwrite", note)
+    monkeypatch.setattr(buffers, "overwrite", note)
     model = open_levels(folder, BUDGET)
     with session_gpu.ctx as ctx, Renderer(ctx, "quads") as renderer:
         renderer.streaming.converges = False

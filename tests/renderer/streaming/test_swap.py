@@ -10,7 +10,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.streaming import stream as stream_module
 from shapeshift.renderer.streaming.changing import PARTS, comes_finer, patient, related, swapped
 from shapeshift.renderer.streaming.choose import NOT_DRAWN
-from shapeshift.runtime_models.splats.lod.parents import NodeTree
+from shapeshift.runtime_models.splats.parents import NodeTree
 from shapeshift.scene.pose import Pose
 from tests.support.splat_scenes import shell
 from tests.support.streamed_scenes import open_levels, rest, scene_of, view_at, write_levels

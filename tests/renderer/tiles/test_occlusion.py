@@ -1,6 +1,4 @@
-"""Clusters behind what is drawn are left out: pictures stay the same to the bit, whatever is
-guessed of depths.
-"""
+"""Clusters behind what is drawn are left out: pictures stay the same to the bit."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -8,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.clusters.clusters import CLUSTER, Occluders, bound_clusters
+from shapeshift.rasterizer.clusters import CLUSTER, Occluders, bound_clusters
 from shapeshift.rasterizer.device import NoDevice, open_device
 from shapeshift.rasterizer.project_arena import project_arena
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.tiles import arena as arena_module

@@ -5,14 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.decode import decode_heads
-from shapeshift.rasterizer.decode.decode_heads import (
-    ACTIVATIONS,
-    MOST_HIDDEN,
-    MOST_SPLATS,
-    RUN,
-    WIDTH,
-)
+from shapeshift.rasterizer import decode_heads
+from shapeshift.rasterizer.decode_heads import ACTIVATIONS, MOST_HIDDEN, MOST_SPLATS, RUN, WIDTH
 from shapeshift.rasterizer.pack import pack
 from shapeshift.renderer.tiles.slot import ModelHeads, uncovered
 from shapeshift.runtime_models.evaluate import Evaluator, directions

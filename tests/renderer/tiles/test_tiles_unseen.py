@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.clusters.clusters import CLUSTER, bound_clusters
+from shapeshift.rasterizer.clusters import CLUSTER, bound_clusters
 from shapeshift.rasterizer.project_arena import Limits, clusters_unseen, project_arena
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.tiles import arena as arena_module

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.checkpoint.read_torch import (
     read_tensors,
 )
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.scaffold.scaffold_networks import ACTIVATIONS, STEMS, mlp_of
+from shapeshift.runtime_models.scaffold.scaffold_files import ACTIVATIONS, STEMS, mlp_of
 from tests.support.models import run_in_numpy
 from tests.support.splats import torch_files as made
 

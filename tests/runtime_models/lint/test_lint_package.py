@@ -9,9 +9,8 @@ from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.lint import lint_whole
 from shapeshift.runtime_models.lint.lint_whole import fill_ratio, sample_of
 from shapeshift.runtime_models.model import AnchorModel, BadFile
-from shapeshift.runtime_models.package.lint_package import refuse_filling
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.read_scene import read_model, refuse_filling
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from tests.support.models import make_random_model
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app import cli
-from shapeshift.runtime_models.lint.lint_readers import HALF_LEAST, HALF_MOST, other_readers
+from shapeshift.runtime_models.lint.lint import HALF_LEAST, HALF_MOST, other_readers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.plain_splats import Reading

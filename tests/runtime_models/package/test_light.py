@@ -12,15 +12,15 @@ from scipy.special import sph_harm_y
 
 from shapeshift.runtime_models.bake import bake
 from shapeshift.runtime_models.colors.color_bounds import color_slope
-from shapeshift.runtime_models.colors.light_harmonics import (
-    COEFFICIENTS,
+from shapeshift.runtime_models.colors.spherical_harmonics import (
+    LIGHT_COEFFICIENTS,
     WIDTHS,
     harmonics,
     light_along,
     most_light,
+    shade,
     turn_light,
 )
-from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.drop_unused import drop_unused
@@ -35,8 +35,12 @@ from shapeshift.runtime_models.package.read_package import read_files, read_pack
 from shapeshift.runtime_models.package.write_package import package_files, write_package
 from shapeshift.runtime_models.read_scene import describe
 from shapeshift.runtime_models.stop_weights import StopWeights
-from shapeshift.runtime_models.stops.insert_stop import NewUnits, add_units, insert_stop
-from shapeshift.runtime_models.stops.remove_stop import remove_stop
+from shapeshift.runtime_models.stops.change_stops import (
+    NewUnits,
+    add_units,
+    insert_stop,
+    remove_stop,
+)
 from shapeshift.training.export import with_light as carried
 from tests.support.models import (
     make_random_model,
@@ -82,7 +86,7 @@ def test_they_are_orthogonal_and_of_one_size_over_the_sphere():
     places = [ring * np.cos(turn), ring * np.sin(turn), np.broadcast_to(z[:, None], (8, 16))]
     values = harmonics(np.stack([each.ravel() for each in places], 1))
     mean = np.einsum("n,na,nb->ab", np.repeat(weight, 16) / 32, values, values)
-    np.testing.assert_allclose(mean, np.eye(COEFFICIENTS) / 3, atol=1e-12)
+    np.testing.assert_allclose(mean, np.eye(LIGHT_COEFFICIENTS) / 3, atol=1e-12)
 
 
 def test_no_direction_gives_no_light():
@@ -96,7 +100,7 @@ CHANNELS = pytest.mark.parametrize("channels", list(WIDTHS))
 def test_light_stays_below_its_bound_and_may_reach_it(channels):
     direction = spread(4000)
     light = np.random.default_rng(1).normal(size=(50, WIDTHS[channels]))
-    each = light.reshape(50, channels, COEFFICIENTS)  # red, green, blue
+    each = light.reshape(50, channels, LIGHT_COEFFICIENTS)  # red, green, blue
     most = np.abs(each @ harmonics(direction).T).max(axis=2)
     assert most_light(light).shape == most.shape
     assert (most <= most_light(light)).all()
@@ -309,7 +313,7 @@ def test_units_that_carry_light_go_only_where_there_is_none(size, channels):
     model = replace(bare, networks=bare.networks | {"color": color}, light=light)
     # In reach of the bound alone: units that light opens, and nothing else does.
     biases = (color.biases[0].copy(), color.biases[1])
-    each = light.reshape(30, channels, COEFFICIENTS) @ harmonics(spread(5000)).T
+    each = light.reshape(30, channels, LIGHT_COEFFICIENTS) @ harmonics(spread(5000)).T
     # Units carry the channels, then the channels below 0.
     biases[0][-2 * channels :] = -0.9 * np.tile(np.abs(each).max(axis=(0, 2)), 2)
     gated = replace(model, networks=model.networks | {"color": replace(color, biases=biases)})

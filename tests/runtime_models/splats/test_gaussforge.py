@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import read_raw

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.runtime_models.splats.sog.read_webp import webp_pixels, webp_size
+from shapeshift.runtime_models.splats.sog.sog_files import webp_pixels, webp_size
 
 
 def coded(pixels: np.ndarray, **how) -> bytes:

@@ -9,12 +9,12 @@ from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile, Stop
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.stops.change_stops import remove_stop
 from shapeshift.runtime_models.stops.formula_stop import (
     LUMINANCE,
     with_formula_stop,
     with_placed_formulas,
 )
-from shapeshift.runtime_models.stops.remove_stop import remove_stop
 from tests.support.band_model import EYES, band_model
 
 EYE = np.array([3.0, 1.0, 2.0])

@@ -11,8 +11,7 @@ from shapeshift.runtime_models.package.feature_codes import EXACT, decode_featur
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stop_weights import StopWeights
-from shapeshift.runtime_models.stops.insert_stop import MOST_STOPS, insert_stop
-from shapeshift.runtime_models.stops.remove_stop import remove_stop
+from shapeshift.runtime_models.stops.change_stops import MOST_STOPS, insert_stop, remove_stop
 from tests.support.models import make_random_model, without_control
 from tests.support.new_stops import THREE, framed_model, wild_stop
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.cameras.camera_list import CameraReading
-from shapeshift.scene.cameras.read_transforms_cameras import read_transforms_cameras
+from shapeshift.scene.cameras.read_cameras import read_transforms_cameras
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.initial import cloud_points

@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import CameraReading
-from shapeshift.scene.cameras.read_transforms_cameras import read_transforms_cameras
+from shapeshift.scene.cameras.read_cameras import read_transforms_cameras
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.undistort import pixels_of
 from shapeshift.training.first_anchors.initial import cloud_points

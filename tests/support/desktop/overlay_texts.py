@@ -48,6 +48,7 @@ TABLES = {
 }  # fmt: skip
 TABLES_BESIDE = {
     "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "UNSAVED": ALL},
+    "editor.window.recovering": {"ANSWERS": ALL},
     "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},
     "film.window.films": {"AROUND": ALL, "PAST": ALL},
     "inspection.window.inspect_panel": {
@@ -63,8 +64,7 @@ HEADSET_TABLES = {
         "TURN_NAMES": VALUES, "MODEL_NAMES": VALUES, "EDGE": ALL, "TEXT": ALL, "ROOM": ALL,
         "NO_ROOM": ALL, "SHARP": ALL, "SHARP_NAMES": VALUES, "LATER": ALL, "NO_INSETS": ALL,
     },
-    "sections.tool_sections": {"HOW": VALUES},
-    "sections.room_section": {"QUALITY_NAMES": VALUES, "HOW": ALL},
+    "sections.room_section": {"HOW_TOOLS": VALUES, "QUALITY_NAMES": VALUES, "HOW": ALL},
     "wrist_menu": {"NONE": ALL, "HELP": ALL, "SURE": ALL},
 }  # fmt: skip
 ROWS = ("tips", "moves", "sides")  # what such dictionaries are called

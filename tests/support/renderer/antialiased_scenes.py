@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import SplatLayers

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.runtime_models.model import SplatLayers, Stop
-from shapeshift.scene.pose import Pose, View, look_at, perspective
+from shapeshift.scene.pose import Pose, View, look_at, perspective, stereo_pair
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.stereo import stereo_pair
 from tests.support.splat_scenes import alone, one_splat, random_layers, random_model, shell
 
 APART = 0.064  # metres between the eyes of a person

@@ -5,8 +5,8 @@ import warnings
 import numpy as np
 
 import tests.support.renderer.poison as poison
-from shapeshift.app.stability_cases.finding import covered
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.app.stability_cases.case_context import covered
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.pose import View
 

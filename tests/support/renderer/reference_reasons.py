@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from shapeshift.renderer.reference.reference import gate_object
+from shapeshift.renderer.reference import gate_object
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject

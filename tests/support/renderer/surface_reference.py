@@ -6,7 +6,7 @@ import numpy as np
 
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.reference import MAX_ALPHA, rotations
-from shapeshift.renderer.reference.reference import ReferenceSplats, gate_object
+from shapeshift.renderer.reference import ReferenceSplats, gate_object
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.scene.pose import View

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.rotation import normalize, product, rotation_matr
 from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
 from shapeshift.training.heads.networks import HeadLayout
-from shapeshift.training.losses.splat_losses import MIN_OPACITY
+from shapeshift.training.losses.losses import MIN_OPACITY
 from tests.support.renderer.rasterizer_reference import finite_differences, render_reference
 
 
@@ -165,7 +165,7 @@ def image_loss_reference(image, photo, share: float, weight=None) -> float:
 def step_loss_reference(
     splats: tuple, camera: Camera, photo, background, shares: tuple[float, float]
 ) -> float:
-    """Eq. 8 of drawn splats and the loss of splat_losses.py; shares: of D-SSIM, and of that."""
+    """Eq. 8 of drawn splats and the loss of losses.py; shares: of D-SSIM, and of that."""
     ssim_share, min_opacity_share = shares
     image, _ = render_reference(splats, camera, background)
     image_loss = image_loss_reference(image.transpose(1, 2, 0), photo, ssim_share)

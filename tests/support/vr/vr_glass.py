@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.scene.pose import Pose, View
 from shapeshift.vr.frame import Hand
-from shapeshift.vr.glass.held import HeldGlass
+from shapeshift.vr.glass import HeldGlass
 from tests.support.vr.vr_hands import hand_at
 
 BEFORE = (0.05, 1.45, -0.5)  # a hand before the eyes

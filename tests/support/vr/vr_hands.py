@@ -6,8 +6,7 @@ import numpy as np
 
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.vr.frame import LOST, Frame, Hand
-from shapeshift.vr.panel.carried import Carried
-from shapeshift.vr.panel.plane import PanelPlane
+from shapeshift.vr.panel import Carried, PanelPlane
 
 PLANE = PanelPlane((320, 360), 0.001)
 OPEN = Carried(PLANE, open=True, pinned=True)  # a panel that a menu button has opened

@@ -7,8 +7,8 @@ import numpy as np
 from shapeshift.app.headset.panel_picture import PANEL
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import SIDES
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import a_state
 

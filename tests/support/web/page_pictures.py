@@ -13,7 +13,7 @@ from shapeshift.app.page.page_file import page_text
 from shapeshift.app.page.page_scene import PageSettings, page_scene
 from shapeshift.renderer.colors.false_colors import PICTURE, false_colors
 from shapeshift.renderer.colors.palette import apply_palette, over_background
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.web.web_model import control_entry
 from shapeshift.scene.control import control_of
 from shapeshift.scene.metrics import psnr

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose, View
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.xr.remote import Controller, Remote
 from tests.support.xr.xr_stand import Program
 

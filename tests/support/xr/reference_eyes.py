@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.app.document import DARK
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import read_models, scene_of
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.xr.person import SIZE, pose_of
 
 SCENE = Path(__file__).resolve().parents[3] / "assets" / "touch.scene.json"

@@ -24,9 +24,9 @@ def main(drawing: str) -> None:
     from shapeshift.scene.scene import IDENTITY
     from shapeshift.vr.drawn import Drawn
     from shapeshift.vr.frame import FAR_M, NEAR_M
-    from shapeshift.vr.locomotion.play_space import PlaySpace
     from shapeshift.vr.openxr.instance import Instance
     from shapeshift.vr.openxr.session import Session
+    from shapeshift.vr.play_space import PlaySpace
     from tests.support.renderer.surface_reference import reference_surface
     from tests.support.splat_scenes import alone, shell
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shapeshift.app.training.blocks.train_in_blocks import join
+from shapeshift.app.training.train_in_blocks import join
 from shapeshift.runtime_models.blocks.block_model import joined
 from shapeshift.runtime_models.blocks.read_blocks import turned
 from shapeshift.runtime_models.evaluate import evaluate
@@ -15,10 +15,9 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import package_files, write_package
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.training.blocks import begin_block as block_trainer
+from shapeshift.training.blocks import block_start as block_trainer
 from shapeshift.training.blocks import starts
-from shapeshift.training.blocks.begin_block import begin_block
-from shapeshift.training.blocks.block_start import LEAST_SHARE, BlockStart, cover_of
+from shapeshift.training.blocks.block_start import LEAST_SHARE, BlockStart, begin_block, cover_of
 from shapeshift.training.blocks.cut import Wanted
 from shapeshift.training.blocks.starts import Coarse, CutRules, make_starts, read_cut
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
@@ -127,7 +126,7 @@ def test_a_block_has_the_bits_of_a_run_that_keeps_all_in_memory(
 ):
     """It keeps no photo ready for the loss and lends memory in other sizes, and that is all."""
     assert not block.targets.kept and block.device.pool is not device.pool
-    monkeypatch.setattr("shapeshift.training.blocks.begin_block.with_small_pool", lambda d: d)
+    monkeypatch.setattr("shapeshift.training.blocks.block_start.with_small_pool", lambda d: d)
     start = BlockStart.read(cut / "0.start.npz")
     usual = begin_block(device, start, capture, settings_of(start))
     usual.targets.most = 1 << 30

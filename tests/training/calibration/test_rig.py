@@ -12,6 +12,7 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.calibration.calibrate import (
     PYRAMID,
+    ShapeResiduals,
     calibrate,
     descend,
     factors_of,
@@ -26,7 +27,6 @@ from shapeshift.training.calibration.extrinsics import (
     rig_of,
     with_extrinsics,
 )
-from shapeshift.training.calibration.residuals import ShapeResiduals
 from shapeshift.training.drawing import camera_of, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.photos import LoadedPhoto

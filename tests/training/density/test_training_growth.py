@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.training.density.densify import (
+from shapeshift.training.densify import (
     GRAD2D_THRESHOLD,
     LEAST_STEPS,
     DensificationStats,

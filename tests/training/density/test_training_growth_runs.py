@@ -18,7 +18,7 @@ from shapeshift.training.baselines.plain import one_modality
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.first_anchors import first_anchors
 from shapeshift.training.first_anchors.first_anchors import base_colors
-from shapeshift.training.losses.splat_losses import MIN_OPACITY_SHARE
+from shapeshift.training.losses.losses import MIN_OPACITY_SHARE
 from shapeshift.training.schedule import LIGHT_FROM
 from shapeshift.training.settings import ONE_MODALITY, TrainSettings
 from shapeshift.training.supervision.exposure import Exposures

@@ -10,9 +10,8 @@ import pytest
 from onnx.reference import ReferenceEvaluator
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.training.gradients.gradient_session import GradientSession
 from shapeshift.training.gradients.read_network import read_network
-from shapeshift.training.gradients.reverse_mode import CONSTANT, PRODUCTS
+from shapeshift.training.gradients.reverse_mode import CONSTANT, PRODUCTS, GradientSession
 from tests.support.training.onnx_files import (
     in_float64,
     model_of,

@@ -7,8 +7,8 @@ from onnx import TensorProto, helper
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.gradients import read_network as reading
-from shapeshift.training.gradients.gradient_session import GradientSession
 from shapeshift.training.gradients.read_network import read_network
+from shapeshift.training.gradients.reverse_mode import GradientSession
 from tests.support.training.onnx_files import model_of, tiny_vgg, vision_transformer, write_model
 from tests.support.training.operator_cases import row
 

@@ -10,7 +10,7 @@ from shapeshift.runtime_models.lod.average_anchors import average_anchors
 from shapeshift.runtime_models.model import HEADS, BadFile
 from shapeshift.scene.cameras.framing import orbit_path
 from shapeshift.scene.metrics import psnr
-from shapeshift.training.lod.distill import PictureError, StillHeads, controls_of, distill
+from shapeshift.training.distill import PictureError, StillHeads, controls_of, distill
 from tests.support.models import make_random_model, with_light
 
 SIZE = (40, 40)

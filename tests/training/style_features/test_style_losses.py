@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from shapeshift.training.gradients.gradient_session import GradientSession
 from shapeshift.training.gradients.onnx_graph import OnnxGraph
+from shapeshift.training.gradients.reverse_mode import GradientSession
 from shapeshift.training.style_features import nnfm_pictures
 
 RNG = np.random.default_rng

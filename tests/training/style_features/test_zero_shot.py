@@ -11,20 +11,18 @@ from shapeshift.training.evaluation.evaluate import ModelRenderer
 from shapeshift.training.style_features import splat_features as carrying
 from shapeshift.training.style_features.splat_features import (
     NUMBERS,
-    bilinear,
-    carry_features,
-    reduced,
-    visible,
-)
-from shapeshift.training.style_features.zero_shot import (
     StyleFeatures,
     StylePreview,
     adain,
     all_colors,
+    bilinear,
+    carry_features,
     draw_preview,
     recolor_rule,
+    reduced,
     style_features,
     styled_colors,
+    visible,
 )
 from shapeshift.training.styles.train_stop import dome_views
 from tests.support.new_stops import framed_model
@@ -84,7 +82,7 @@ def test_strength_goes_from_the_own_colours_to_the_styles(scene):
 
 
 def test_the_same_seed_picks_the_same_places(scene, monkeypatch):
-    monkeypatch.setattr("shapeshift.training.style_features.zero_shot.PLACES", 10)
+    monkeypatch.setattr("shapeshift.training.style_features.splat_features.PLACES", 10)
     style = places(scene, RNG(6).random((150, 3)))
     first, again, other = (styled_colors(scene, style, seed=s) for s in (0, 0, 1))
     assert (first == again).all() and (first != other).any()

@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, BadFile
-from shapeshift.runtime_models.stops.insert_stop import insert_stop
+from shapeshift.runtime_models.stops.change_stops import insert_stop
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.styles.stop_trainer import StopSettings, StopTrainer
 from tests.support.models import without_control, without_direction

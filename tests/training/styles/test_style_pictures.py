@@ -8,9 +8,15 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.framing import view_from
-from shapeshift.training.styles.carried_pictures import CarriedPictures, colors_from, sampled
+from shapeshift.training.styles.carried_pictures import (
+    CarriedPictures,
+    PictureFiles,
+    colors_from,
+    files_for,
+    read_picture,
+    sampled,
+)
 from shapeshift.training.styles.image_network import ImageNetwork, encode_style, resized
-from shapeshift.training.styles.picture_files import PictureFiles, files_for, read_picture
 from shapeshift.training.styles.style_pictures import StyleView, Turns
 from shapeshift.training.styles.train_stop import dome_views, resized_views, turns
 from tests.support.new_stops import framed_model

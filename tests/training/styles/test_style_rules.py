@@ -8,7 +8,7 @@ import pytest
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, BadFile, Splats
 from shapeshift.runtime_models.rotation import normalize, rotation_matrices
-from shapeshift.runtime_models.stops.insert_stop import insert_stop
+from shapeshift.runtime_models.stops.change_stops import insert_stop
 from shapeshift.training.styles.add_style import (
     RuleSettings,
     blended,

@@ -14,7 +14,7 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.baselines.plain import PlainTrainer
 from shapeshift.training.baselines.plain_settings import PlainSettings
-from shapeshift.training.blocks import begin_block
+from shapeshift.training.blocks import block_start
 from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.photo_store.open_photos import PhotoRoom, open_photos
@@ -306,8 +306,8 @@ def test_blocks_look_for_it_where_the_coarse_run_found_it(turntable, monkeypatch
 
     known = {"background": None, "downscale": 1, "still_background": said}
     start = SimpleNamespace(notes={}, provenance=known)
-    monkeypatch.setattr(begin_block, "BlockTrainer", lambda device, start, of, given, *_: given)
+    monkeypatch.setattr(block_start, "BlockTrainer", lambda device, start, of, given, *_: given)
     capture = read_capture(turntable[0])
     asked = TrainSettings(iterations=1)
-    given = begin_block.begin_block(open_device("cpu"), start, capture, asked)
+    given = block_start.begin_block(open_device("cpu"), start, capture, asked)
     assert given.background == background

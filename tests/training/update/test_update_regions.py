@@ -14,8 +14,8 @@ from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.sections.section import BoxShape
 from shapeshift.scene.sections.section_texts import read_box
 from shapeshift.training.photos import LoadedPhoto
-from shapeshift.training.update.begin_update import capture_for, counts_of
 from shapeshift.training.update.regions import STEP, UpdateRegion, cut_photo, moved_capture
+from shapeshift.training.update.update_trainer import capture_for, counts_of
 
 TURNED = (0.9238795325112867, 0.0, 0.3826834323650898, 0.0)  # 45 degrees about the vertical
 BOXES = (BoxShape((0.2, 0.1, 0.0), (0.3, 0.2, 0.1), TURNED), BoxShape((-0.6, 0, 0), (0.1,) * 3))

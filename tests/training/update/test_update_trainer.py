@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.runtime_models.colors.light_harmonics import WIDTHS
+from shapeshift.runtime_models.colors.spherical_harmonics import WIDTHS
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS, BadFile
 from shapeshift.runtime_models.package.write_package import package_files, write_package
@@ -16,10 +16,9 @@ from shapeshift.training.export import with_light
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic import balls
 from shapeshift.training.train import Trainer
-from shapeshift.training.update.begin_update import begin_update
 from shapeshift.training.update.regions import UpdateRegion
 from shapeshift.training.update.trainable import layout_of
-from shapeshift.training.update.update_trainer import UpdateBase
+from shapeshift.training.update.update_trainer import UpdateBase, begin_update
 from tests.support.training.training_runs import bits, run, run_keeping
 
 BALL = (0.15, 0.18, 0.55)  # metres: the yellow one, which is gone at the second visit

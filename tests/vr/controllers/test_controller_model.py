@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.controllers.model import AWAY_M, HOW_FAR, KEY, controller, labelled
+from shapeshift.vr.controller_cards import AWAY_M, HOW_FAR, KEY, controller, hint_rows, labelled
 from shapeshift.vr.frame import LOST, SIDES, Hand
 from shapeshift.vr.glove import LIT
-from shapeshift.vr.hints import hint_rows
-from shapeshift.vr.locomotion.locomotion import RULES, Rules
+from shapeshift.vr.locomotion import RULES, Rules
 from shapeshift.vr.openxr.hands import PROFILES
 from tests.support.vr.vr_hands import HEAD, hand_at
 

@@ -6,14 +6,7 @@ import pytest
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.runtime_models.model import Stop
 from shapeshift.vr.cards import METRES_PER_PIXEL, PAD_PX
-from shapeshift.vr.glass.held import (
-    BAR_PX,
-    RADIUS_M,
-    GlassScale,
-    cards_of,
-    held_glass,
-    scale_picture,
-)
+from shapeshift.vr.glass import BAR_PX, RADIUS_M, GlassScale, cards_of, held_glass, scale_picture
 from tests.support.vr.vr_glass import upright
 from tests.support.vr.vr_hands import HEAD
 

@@ -4,7 +4,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from shapeshift.vr.glass.held import RADIUS_M, HeldGlass, Pane, boxes_of, held_glass
+from shapeshift.vr.glass import RADIUS_M, HeldGlass, Pane, boxes_of, held_glass
 from shapeshift.vr.scene_depth import SceneDepth
 from tests.support.renderer.frames import texture_target
 from tests.support.vr.vr_glass import away_of, upright

@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import LOST
-from shapeshift.vr.glass.held import (
+from shapeshift.vr.glass import (
     FACES,
     HANDLE_M,
     RADIUS_M,

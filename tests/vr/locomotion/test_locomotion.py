@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.locomotion.locomotion import (
+from shapeshift.vr.locomotion import (
     HOME_S,
     LONGEST_S,
     RISES_S,
@@ -20,7 +20,7 @@ from shapeshift.vr.locomotion.locomotion import (
     move,
     throw_arc,
 )
-from shapeshift.vr.locomotion.play_space import PlaySpace, underfoot
+from shapeshift.vr.play_space import PlaySpace, underfoot
 from tests.support.vr.vr_frames import LOST, at, frame, hand, tilted, yawed
 
 HZ = 90

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.locomotion.locomotion import LONGEST_S, RULES, Rules, Travel, move
-from shapeshift.vr.locomotion.play_space import FAR_M, LEAST_SCALE, MOST_SCALE, PlaySpace
+from shapeshift.vr.locomotion import LONGEST_S, RULES, Rules, Travel, move
+from shapeshift.vr.play_space import FAR_M, LEAST_SCALE, MOST_SCALE, PlaySpace
 from tests.support.vr.vr_frames import LOST, frame, hand, yawed
 
 START = PlaySpace(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.headset.xr_user import XrUser
-from shapeshift.vr.locomotion.play_space import PlaySpace, resized, underfoot
+from shapeshift.vr.play_space import PlaySpace, resized, underfoot
 from tests.support.scene.world_scenes import item, reaction, real
 from tests.support.vr.vr_frames import at, frame, hand, tilted
 

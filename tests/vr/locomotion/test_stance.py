@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.locomotion.play_space import (
+from shapeshift.vr.play_space import (
     FAR_M,
     LEAST_SCALE,
     MOST_SCALE,

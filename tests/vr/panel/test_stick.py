@@ -5,7 +5,7 @@ import math
 import pytest
 
 from shapeshift.runtime_models.model import Stop
-from shapeshift.vr.panel.carried import (
+from shapeshift.vr.panel import (
     DEAD,
     MIDDLE,
     MOVES,

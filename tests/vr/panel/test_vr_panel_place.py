@@ -9,25 +9,23 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.frame import LOST, Hand
 from shapeshift.vr.glove import fingertip, glove
-from shapeshift.vr.panel.carried import (
-    MIDDLE,
-    MOVES,
-    RESTS,
-    SCROLLS,
-    SLIDES,
-    Carried,
-    carry,
-    left_over,
-)
-from shapeshift.vr.panel.plane import (
+from shapeshift.vr.panel import (
     ABOVE_M,
     ASIDE,
+    MIDDLE,
+    MOVES,
     NEAR_M,
     PRESS,
     RAY_M,
     RELEASE,
+    RESTS,
+    SCROLLS,
+    SLIDES,
+    Carried,
     PanelPlane,
+    carry,
     hang,
+    left_over,
     ray_place,
 )
 from tests.support.vr.vr_hands import HEAD, OPEN, PLANE, a_frame, hand_at, moved

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.vr.shadow.cast import CELLS, Cast, Shadow, Shadows
+from shapeshift.vr.shadow import CELLS, Cast, Shadow, Shadows
 
 SIZE = (120, 90)
 EVEN = Shadow((-0.5, -0.25), 1.0, np.full((CELLS, CELLS), 0.5, np.float32))

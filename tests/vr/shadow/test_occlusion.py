@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.vr.shadow.cast import CELLS, FADES, Shadow, blocks_of, shadow_on
+from shapeshift.vr.shadow import CELLS, FADES, Shadow, blocks_of, shadow_on
 from tests.support.vr.shadow_shapes import (
     disc,
     disc_occlusion,

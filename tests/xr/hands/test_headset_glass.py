@@ -10,7 +10,7 @@ from PIL import Image
 
 from shapeshift.scene.pose import Pose, View
 from shapeshift.vr.frame import SIDES
-from shapeshift.vr.glass.held import RIM_M
+from shapeshift.vr.glass import RIM_M
 from tests.support.xr.person import CARRIES, FREE, SIZE, Person, open_panel, place, pose_of
 from tests.support.xr.reference_eyes import BEHIND, ROUNDING, drawn, eyes_of, scene_at
 from tests.support.xr.validation import complaints, switched_on

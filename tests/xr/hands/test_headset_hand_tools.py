@@ -11,7 +11,7 @@ from shapeshift.app.inspection.window.probe import along_ray
 from shapeshift.app.paths import DEMO
 from shapeshift.training.synthetic.tracer import photograph, trace
 from shapeshift.training.synthetic.workshop import COLD, HOT, place, radiance
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.xr.person import CARRIES, FREE, Person, open_panel, pose_of
 from tests.support.xr.validation import complaints, switched_on
 

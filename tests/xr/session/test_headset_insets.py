@@ -15,8 +15,8 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import View
 from shapeshift.vr.frame import view_names
-from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.openxr.view_configuration import with_insets
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.xr import four_views
 from tests.support.xr.person import SIZE, Person, pose_of
 from tests.support.xr.validation import complaints, switched_on

@@ -16,8 +16,7 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import Pose, View, look_at
-from shapeshift.training.synthetic.openness import Clearance
-from shapeshift.training.synthetic.placing import frame, inside, turned
+from shapeshift.training.synthetic.placing import Clearance, frame, inside, turned
 from shapeshift.training.synthetic.tracer import (
     Light,
     Place,

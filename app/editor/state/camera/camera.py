@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.scene.cameras.framing import FAR_RADII, FOV_Y, NEAR_RADII
-from shapeshift.scene.orthographic import orthographic
-from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.pose import Pose, View, orthographic
 
 POLE = 1.5  # radians of pitch; straight up or down would lose which way is right
 MIN_RADII, MAX_RADII = 0.02, 20.0  # the orbit distance stays within these, in scene radii

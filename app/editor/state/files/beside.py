@@ -13,7 +13,7 @@ from shapeshift.app.editor.texts.table import said
 from shapeshift.app.film.window.timeline import FilmKeys
 from shapeshift.app.paths import is_bundled
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.film.film_file import film_beside, read_film_file, write_film_file
+from shapeshift.scene.film.film_path import film_beside, read_film_file, write_film_file
 from shapeshift.scene.inspection.marks_file import (
     MarksFile,
     marks_path,

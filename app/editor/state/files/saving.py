@@ -98,7 +98,8 @@ class Saving:
                 )
             )
             return False
-        untouched = self._own.has(path, stamp_of(path)) and self._is_open(path)
+        untouched = self._own.has(path, stamp := stamp_of(path)) and self._is_open(path)
+        untouched = untouched and stamp == self._state.edited.stamp
         if path.exists() and not untouched and not replace:
             self.name, self.taken = str(path), True
             return False

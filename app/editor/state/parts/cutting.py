@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.app.editor.state.arrange import edit
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.edited_file import EditedFile
+from shapeshift.app.editor.state.files.edited_file import EditedFile, key_of
 from shapeshift.app.editor.state.parts.piece import (
     MARK,
     Piece,
@@ -151,14 +151,14 @@ def add_piece(
     """
     item = edits.item_named(edited.file, obj.name)
     parent = edited.pieces.get(item.model)
-    base, start = edited.source(item), np.zeros(3)
+    base, start, of = edited.source(item), np.zeros(3), key_of(item)
     if parent is not None:
-        base, start = parent.base, np.array(parent.place)
+        base, start, of = parent.base, np.array(parent.place), parent.key
         of_base = np.zeros(len(parent.rows), bool)
         of_base[np.flatnonzero(parent.rows)[rows]] = True
         rows = of_base
     number = 1 + max((int(name.rsplit(MARK, 1)[1]) for name in edited.pieces), default=0)
-    piece = Piece(base, rows, is_object, name_of_piece(base.path, number))
+    piece = Piece(base, rows, is_object, name_of_piece(base.path, number), of)
     edited.pieces[piece.name] = piece
     return piece, np.array(piece.place) - start
 

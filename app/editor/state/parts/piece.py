@@ -32,6 +32,7 @@ class Piece:
     rows: np.ndarray  # (A,) bool, of the model as it was read
     is_object: bool  # in a frame of its own, as parts are; else in that of the model
     name: str  # that stands for its model in the scene file, until it is saved
+    key: tuple = ()  # of the model as a scene file has it: path, mode, up, flip, part
     _made: list[tuple[Source, Place]] = field(default_factory=list)
 
     @property

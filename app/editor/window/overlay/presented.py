@@ -19,8 +19,8 @@ from shapeshift.app.editor.window.overlay.triangles import (
 from shapeshift.rasterizer.resolve import WindowOverlay
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.layered import Layered, PixelBox, WindowBytes
 from shapeshift.renderer.gl.resolve import MakeBytes
-from shapeshift.renderer.gl.window.layered import Layered, PixelBox, WindowBytes
 
 
 class Presented:

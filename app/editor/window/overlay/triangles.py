@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from imgui_bundle import imgui
 
-from shapeshift.renderer.gl.window.layered import PixelBox
+from shapeshift.renderer.gl.layered import PixelBox
 
 TILE = 16  # pixels: half a button
 CORNER = np.dtype([("place", "2f4"), ("uv", "2f4"), ("color", "u4")])

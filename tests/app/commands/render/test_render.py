@@ -10,14 +10,13 @@ from shapeshift.app import cli
 from shapeshift.app.drawing import is_our_png, open_renderer, parse_size, save_png, split_controls
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.colors.palette import palette_colors
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.cameras.read_cameras import read_cameras
 from shapeshift.scene.metrics import psnr
-from shapeshift.scene.pose import look_at
+from shapeshift.scene.pose import look_at, stereo_pair
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import random_package
 
 TINY = ["--size", "40x30", "--context", "none"]

@@ -17,7 +17,7 @@ from shapeshift.app.film.window.timeline import CAMERA, STOP, Timeline
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.framing import orbit_path
-from shapeshift.scene.film.film_file import read_film_file, write_film_file
+from shapeshift.scene.film.film_path import read_film_file, write_film_file
 from tests.support.desktop.desktop_stand import ball
 from tests.support.three_stops import three_stop_model, three_stop_package
 

@@ -10,7 +10,7 @@ from shapeshift.app.editor.panels import panel
 from shapeshift.app.editor.window.window import Drop
 from shapeshift.app.film.window.timeline import CAMERA, STOP
 from shapeshift.runtime_models.stop_weights import StopWeights
-from shapeshift.scene.film.film_file import read_film_file
+from shapeshift.scene.film.film_path import read_film_file
 from tests.support.desktop.desktop_stand import run_frames
 from tests.support.desktop.widgets import Widgets
 

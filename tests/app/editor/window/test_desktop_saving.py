@@ -1,6 +1,7 @@
 """Scenes are saved from the real window, and nothing is lost or replaced unasked."""
 
 import json
+import time
 
 import glfw
 import numpy as np
@@ -8,12 +9,24 @@ import pytest
 
 from shapeshift.app.editor.state.arrange import steer
 from shapeshift.app.editor.state.files.edited_file import stamp_of
+from shapeshift.app.editor.state.files.journal import Journal
 from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from tests.support.desktop.desktop_stand import ball, run_frames, until_opened
-from tests.support.desktop.objects_stand import CTRL, NAMES, SHIFT, TOUCH, button, key, mouse, names
+from tests.support.desktop.objects_stand import (
+    CTRL,
+    NAMES,
+    SHIFT,
+    TOUCH,
+    button,
+    key,
+    mouse,
+    names,
+    release,
+    viewer_of,
+)
 from tests.support.desktop.real_hands import RealHands
 from tests.support.desktop.widgets import Widgets
 
@@ -240,3 +253,66 @@ def test_paint_on_what_is_no_file_yet_is_asked_about_and_a_lens_is_not(plain):
     plain.objects.saving.answer("Cancel")
     plain.objects.edits.undo()
     assert not plain.objects.unsaved and plain.may_close()
+
+
+def begin_journal(viewer, folder) -> Journal:
+    journal = Journal(viewer.state, folder / "data" / "journals")
+    viewer.objects.recovering.begin(journal, viewer.hooks)
+    return journal
+
+
+def press(viewer, widgets, label: str) -> None:
+    run_frames(viewer, 3)
+    mouse(viewer, *widgets.middle(label))
+    button(viewer, True)
+    button(viewer, False)
+    run_frames(viewer, 3)
+
+
+def test_what_a_killed_window_has_left_is_offered_and_comes_back(
+    window, touch_found, viewer, tmp_path, monkeypatch
+):
+    viewer.state.bodies.follow = lambda edited: None
+    journal, widgets = begin_journal(viewer, tmp_path), Widgets(monkeypatch)
+    viewer.state.chosen = "ball"
+    viewer.objects.edits.delete()
+    run_frames(viewer, 2)
+    (left,) = journal.folder.iterdir()
+    assert not viewer.objects.recovering.status()
+    journal._file.close()  # as a kill does
+    again = viewer_of(window, touch_found, tmp_path)
+    recovering = again.objects.recovering
+    begin_journal(again, tmp_path)
+    for answer in ("Later", "Take it back"):
+        run_frames(again, 3)
+        assert recovering.asked() and names(again) == NAMES and not again.objects.unsaved
+        assert recovering.lines(recovering.work)[1] == "delete ball"
+        key(again, glfw.KEY_DELETE)  # the box is open: not for the scene
+        press(again, widgets, answer)
+        if answer == "Later":
+            assert left.exists() and not recovering.asked() and names(again) == NAMES
+            recovering.opened()
+    end = time.monotonic() + 20
+    while recovering.work is not None and time.monotonic() < end:
+        run_frames(again, 1)
+    assert "ball" not in names(again) and again.objects.unsaved
+    assert "delete ball" in again.state.messages.note
+    (kept,) = journal.folder.iterdir()
+    again.objects.edits.undo()
+    assert kept != left and names(again) == NAMES
+    run_frames(again, 2)
+    assert not list(journal.folder.iterdir()), "nothing is unsaved any more"
+    recovering.close()
+    release(again)
+
+
+def test_what_is_refused_at_closing_is_not_offered_again(viewer, tmp_path, monkeypatch):
+    journal, widgets = begin_journal(viewer, tmp_path), Widgets(monkeypatch)
+    viewer.state.chosen = "ball"
+    viewer.objects.edits.delete()
+    run_frames(viewer, 2)
+    assert list(journal.folder.iterdir()) and not viewer.may_close()
+    press(viewer, widgets, "Do not save")
+    assert viewer.window.closing and viewer.may_close() and not list(journal.folder.iterdir())
+    viewer.window.keep_open()
+    viewer.objects.recovering.close()

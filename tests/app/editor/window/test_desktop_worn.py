@@ -12,7 +12,7 @@ from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.headset import DEMO, Options
 from shapeshift.app.headset.panel_picture import UI_SCALE, PanelPicture
 from shapeshift.app.headset.scene_shelf import open_xr
-from shapeshift.vr.panel.plane import NOBODY
+from shapeshift.vr.panel import NOBODY
 from tests.support.desktop.widgets import Widgets
 
 

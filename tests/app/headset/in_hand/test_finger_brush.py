@@ -12,9 +12,8 @@ from shapeshift.scene.pick import anchor_places
 from shapeshift.scene.selectors.selector import Painted
 from shapeshift.vr.frame import LOST
 from shapeshift.vr.glove import fingertip
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
-from shapeshift.vr.panel.plane import Pointing
+from shapeshift.vr.panel import Carried, Pointing
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import hand_at, moved
 from tests.support.vr.vr_panel import a_state, an_editor, item
 from tests.support.vr.vr_tools import ROOM, Hands

@@ -15,7 +15,7 @@ from shapeshift.app.paths import DEMO
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.inspection.emissivity import Emission, SurfaceRadiation
 from shapeshift.scene.pose import Pose, look_at
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import Wearer, a_state
 from tests.support.vr.vr_tools import AWAY

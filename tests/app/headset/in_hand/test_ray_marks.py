@@ -27,8 +27,8 @@ from shapeshift.scene.inspection.value_picture import ValuePicture
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.frame import LOST
-from shapeshift.vr.locomotion.play_space import PlaySpace
-from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel import Carried
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import a_state
 from tests.support.vr.vr_tools import AWAY

@@ -19,7 +19,7 @@ from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.scene.inspection.marks_file import marks_path, read_marks_file
 from shapeshift.scene.sections.section import BoxShape, PlaneShape
-from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.play_space import PlaySpace
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import Wearer, a_state
 from tests.support.vr.vr_tools import AWAY

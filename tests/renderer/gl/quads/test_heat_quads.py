@@ -10,10 +10,10 @@ from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.gl import shader
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.decode import Heater
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.pose import stereo_pair
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.stereo import stereo_pair
 from tests.support.renderer.frames import step_error
 from tests.support.renderer.gl_models import read
 from tests.support.renderer.heat_scenes import BEHIND, CASES, STOPS, VIEW, decoded, model, scene_of

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.gl.paging.paged_quads import runs_of
+from shapeshift.renderer.gl.paged_quads import runs_of
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.read_scene import read_model

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.gl.stereo_pair import disparities
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View

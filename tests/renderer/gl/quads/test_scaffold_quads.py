@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.models import make_random_model

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.splats.lod.parents import CHILDREN, SPLATS, with_parents
 from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
+from shapeshift.runtime_models.splats.parents import CHILDREN, SPLATS, with_parents
 from tests.support.splat_scenes import shell
 from tests.support.streamed_scenes import open_levels, write_levels
 

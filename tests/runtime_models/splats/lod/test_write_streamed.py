@@ -16,15 +16,16 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.operations.decimate import decimate
 from shapeshift.runtime_models.splats.operations.moment_matching import shown_area
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
-from shapeshift.runtime_models.splats.sog import sh_palette
+from shapeshift.runtime_models.splats.sog import write_sog as sog_module
 from shapeshift.runtime_models.splats.sog import write_streamed as module
 from shapeshift.runtime_models.splats.sog import write_streamed as module_levels
 from shapeshift.runtime_models.splats.sog.read_streamed import levels, read_level, read_tree
-from shapeshift.runtime_models.splats.sog.sh_palette import LEAST_WEIGHT, make_palette
 from shapeshift.runtime_models.splats.sog.write_sog import (
     CODES,
+    LEAST_WEIGHT,
     codebook,
     coded,
+    make_palette,
     shortest,
     write_sog,
 )  # fmt: skip
@@ -151,7 +152,7 @@ def test_what_shows_most_loses_least(monkeypatch, coefficients):
     even = lost(rest, weight, *make_palette(rest, np.ones(3000)))
     before = np.inf
     for rounds in range(4):
-        monkeypatch.setattr(sh_palette, "ROUNDS", rounds)
+        monkeypatch.setattr(sog_module, "PALETTE_ROUNDS", rounds)
         now = lost(rest, weight, *make_palette(rest, weight))
         assert now < before
         before = now

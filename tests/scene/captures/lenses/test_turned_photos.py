@@ -8,8 +8,8 @@ import pytest
 from PIL import Image, ImageOps
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.capture_photos import ORIENTATION, quarter_of, turned_lens
 from shapeshift.scene.captures.colmap_tables import ColmapCamera
-from shapeshift.scene.captures.lenses.turned import ORIENTATION, quarter_of, turned_lens
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from shapeshift.app.opening import contents_of
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_names import is_heat_maker, is_thermal_name, sort_of_name
 from shapeshift.scene.captures.modalities.frame_modalities import light_first
 from shapeshift.scene.captures.modalities.photo_modality import modalities_of, splits_of
-from shapeshift.scene.captures.modalities.stop_contents import contents_of
 from shapeshift.scene.captures.modalities.two_sorts import roles_of
 from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.scene.strangers.modality import SITUATIONS, colmap_of, frames_of, heat, light

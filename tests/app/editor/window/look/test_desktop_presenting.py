@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from shapeshift.renderer.gl.functions import GlFunctions, NoFunction
 from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.layered import GlFunctions, NoFunction
 from shapeshift.renderer.gl.resolve import Resolve
 
 

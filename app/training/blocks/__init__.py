@@ -1,1 +1,0 @@
-"""train --blocks: the coarse run, its cut, the blocks and what they become, each a command."""

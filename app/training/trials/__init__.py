@@ -1,1 +1,0 @@
-"""fit on a cluster: each training of a trial is a command of its own."""

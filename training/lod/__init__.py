@@ -1,1 +1,0 @@
-"""Coarser levels of a package learn to look like the package."""
