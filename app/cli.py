@@ -360,9 +360,13 @@ def answer(arguments: list[str]) -> int:
     except MemoryError as error:
         return refuse(f"{command}: {no_room(str(error))}")
     except Exception as error:
-        if "failed to map segment" in str(error):  # of a library that is loaded late
+        if any(words in str(error) for words in NO_ROOM):
             return refuse(f"{command}: {no_room(str(error))}")
         return report_fault(command, error)
+
+
+# Of a library that is loaded late, and of a thread.
+NO_ROOM = ("failed to map segment", "can't start new thread")
 
 
 def no_room(text: str) -> str:

@@ -84,6 +84,7 @@ def test_a_fault_of_ours_is_one_sentence_and_a_log(monkeypatch, capsys):
         MemoryError("Unable to allocate 3.00 GiB"),
         MemoryError(),
         ImportError("libscipy.so: failed to map segment from shared object"),
+        RuntimeError("can't start new thread"),
     ],
 )
 def test_no_room_is_no_fault_of_ours(monkeypatch, capsys, error):
