@@ -18,7 +18,7 @@ from shapeshift.decomposition.masks.anchor_walk import (
     nodes_of,
     seeds_of_evidence,
 )
-from shapeshift.decomposition.masks.journal import Journal
+from shapeshift.decomposition.masks.journal import MaskJournal
 from shapeshift.decomposition.masks.pixel_walk import PixelWalk
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt, Segmenter
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs
@@ -107,7 +107,7 @@ class PhotoLabelling:
     photos: list[WorkPhoto]
     specs: ObjectSpecs
     segmenter: Segmenter
-    journal: Journal
+    journal: MaskJournal
     progress: Progress = lambda what, done, of: None
     supports: dict[int, Support] = field(default_factory=dict)
     decisions: dict[int, dict[int, Decision]] = field(default_factory=dict)  # by label, view

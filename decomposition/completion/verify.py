@@ -41,8 +41,8 @@ class ModelPictures:
         self._x: Controls | None = None
         self._geometry: list = []
         self._means = np.zeros((0, 3))  # (N, 3) metres
-        self._kept: dict = {}  # (id of a view, x): the view, which keeps the id, and what it saw
-        self._room = MOST_KEPT
+        self.kept: dict = {}  # (id of a view, x): the view, which keeps the id, and what it saw
+        self.room = MOST_KEPT
 
     def draw(self, view: View, x: Controls) -> np.ndarray:
         """(H, W, 4) float32, premultiplied."""
@@ -61,16 +61,16 @@ class ModelPictures:
         if self._empty:
             return self.draw(view, x), np.full((height, width), np.inf, np.float32)
         key = id(view), str(x)
-        if key not in self._kept:
+        if key not in self.kept:
             self._decode(x)
             eye = np.asarray(view.world_from_eye.position, np.float32)
             picture, clear, metres = self._rasterize_depth(view, self._evaluator.color(x, eye))
             rgba = np.concatenate([np.moveaxis(picture, 0, 2), 1 - clear[..., None]], 2)
-            if self._room < rgba.nbytes + metres.nbytes:
+            if self.room < rgba.nbytes + metres.nbytes:
                 return rgba, metres
-            self._room -= rgba.nbytes + metres.nbytes
-            self._kept[key] = view, (rgba, metres)
-        return self._kept[key][1]
+            self.room -= rgba.nbytes + metres.nbytes
+            self.kept[key] = view, (rgba, metres)
+        return self.kept[key][1]
 
     def depth(self, view: View, x: Controls, marked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(H, W) metres along the view behind which LEFT of the light is left, Inf where more is;

@@ -22,7 +22,7 @@ WHITE = 255
 
 
 @dataclass
-class Journal:
+class MaskJournal:
     """Candidates that were taken, by object and view; None where none was."""
 
     folder: Path
@@ -54,12 +54,12 @@ class Journal:
         write_whole(folder / DECISIONS, text.encode())
 
 
-def open_journal(folder: Path, inputs: dict[str, object]) -> Journal:
+def open_journal(folder: Path, inputs: dict[str, object]) -> MaskJournal:
     """The journal of these inputs, with what it holds; of others it begins anew.
 
     Raises BadFile where the folder holds what is no journal.
     """
-    journal = Journal(folder)
+    journal = MaskJournal(folder)
     if folder.exists() or folder.is_symlink():
         refuse_other(folder)
         if saved_object(folder / INPUTS, MOST_BYTES) == inputs:

@@ -135,14 +135,14 @@ class Work:
     def step(self) -> None:
         if self.dragged:
             self.dragged -= 1
-            self._place()
+            self.place()
             if not self.dragged:
                 self.state.rest()
             return
         kinds = (
-            self._place, self._drag, self._copy, self._delete, self._cut, self._region, self._paint,
+            self.place, self._drag, self._copy, self._delete, self.cut, self._region, self._paint,
             self._mark, self._length, self._note, self._film, self._stop, self._view, self._undo,
-            self._redo, self._save, self._floor,
+            self._redo, self.save, self._floor,
         )  # fmt: skip
         weights = np.array([3, 1, 1, 1, 0.5, 1, 2, 3, 2, 1, 0.5, 1, 1, 3, 1, 0.3, 1])
         kinds[self.rng.choice(len(kinds), p=weights / weights.sum())]()
@@ -158,7 +158,7 @@ class Work:
     def _name(self, prefix: str, taken: set[str]) -> str:
         return next(f"{prefix}{n}" for n in range(1, 1000) if f"{prefix}{n}" not in taken)
 
-    def _place(self) -> None:
+    def place(self) -> None:
         where = np.array([self._number() for _ in range(3)])
         arrange.place(self.state, 0, Pose(where, UPRIGHT))
 
@@ -181,7 +181,7 @@ class Work:
             name = self.state.scene.objects[self._any()].name
             self._edit(lambda file: edits.remove(file, name), f"delete {name}")
 
-    def _cut(self) -> None:
+    def cut(self) -> None:
         index = self._any()
         rows = np.zeros(self.state.scene.objects[index].model.splat_count, bool)
         rows[: len(rows) // 4] = True
@@ -247,7 +247,7 @@ class Work:
     def _redo(self) -> None:
         arrange.redo(self.state)
 
-    def _save(self) -> None:
+    def save(self) -> None:
         if not self.saving.save():
             self.saving.named(self.saving.name, replace=True)
         assert not self.saving.asking, self.state.problem

@@ -40,7 +40,7 @@ class Bodies:
         self._made: dict[tuple, Collider | None] = {}  # of a mesh or model; None: there is none
         self._ground: tuple = ()  # floor and gravity of the world
         self._future: Future | None = None
-        self._stale = True  # the world does not know of the last edits yet
+        self.stale = True  # the world does not know of the last edits yet
         self._told: set[str] = set()  # notes of this scene
         self.why_none = ""  # the problem that left nothing to be touched; "": none did
         self._given_up = False  # there can be no world: the scene is there to be seen and edited
@@ -72,7 +72,7 @@ class Bodies:
     def adopt(self, world: "World", edited: EditedFile) -> None:
         """A world that somebody else has made of the file; it follows its edits from now on."""
         self.forget()
-        file, self.world, self._stale = edited.file, world, False
+        file, self.world, self.stale = edited.file, world, False
         self._ground = (file.floor_y, file.gravity_m_s2)
         for item in file.all_items:
             made = world.objects[item.name].collider
@@ -88,7 +88,7 @@ class Bodies:
     @property
     def pending(self) -> bool:
         """Whether there may be a world soon that is not there yet."""
-        return self.world is None and (self.busy or (self._stale and not self._given_up))
+        return self.world is None and (self.busy or (self.stale and not self._given_up))
 
     @property
     def status(self) -> str:
@@ -100,7 +100,7 @@ class Bodies:
 
         Raises BadFile, with the world as it was, for an object that cannot be as the file says.
         """
-        self._stale = True
+        self.stale = True
         self._catch_up(edited)
 
     def poll(self, edited: EditedFile) -> bool:
@@ -114,7 +114,7 @@ class Bodies:
         try:
             self._catch_up(edited)
         except BadFile as error:
-            self.problem, self._stale = str(error), False
+            self.problem, self.stale = str(error), False
             self.why_none, self._given_up = self.problem, self.world is None
         return self.busy
 
@@ -123,21 +123,21 @@ class Bodies:
         self._made[key] = made
         for name, (made_of_it, before) in self._of.items():
             if rough is not None and before is rough and made is not None:
-                self._of[name], self._stale = (made_of_it, made), True
+                self._of[name], self.stale = (made_of_it, made), True
 
     def _catch_up(self, edited: EditedFile) -> None:
         if self.busy or self._given_up:
             return
         file = edited.file
         touched = [item for item in file.all_items if item.collider is not None]
-        if self._stale:
+        if self.stale:
             missing = [item for item in touched if not self._is_made(item)]
             missing.sort(key=lambda item: item.name == BACKGROUND)  # small things first
             if missing:
                 self._start(edited, missing[0], None)
                 return
             self._bring_up_to_date(file, edited, touched)
-        if self.world is not None and not self._stale:
+        if self.world is not None and not self.stale:
             found = ((item, self._collider(item)) for item in touched)
             rough = [(item, made) for item, made in found if made is not None and made.rough]
             if rough:
@@ -153,7 +153,7 @@ class Bodies:
         self._of = {i.name: (made_of(i), colliders[i.name]) for i in touched if i.name in colliders}
         if touched or self.world is not None:
             self._to_world(file, edited, colliders)
-        self._stale = False
+        self.stale = False
 
     def _changes(self, colliders: Mapping[str, "Collider"]) -> bool:
         """Whether an object of the world gets its exact pieces now."""

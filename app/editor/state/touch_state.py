@@ -97,7 +97,7 @@ class TouchState:
     def meet(self, world: World) -> None:
         """The bodies of what was opened are there, or there anew on another floor."""
         if self._known is None:
-            plays = (self.opens_playing or self.wanted) and self._begin(world)
+            plays = (self.opens_playing or self.wanted) and self.begin(world)
             self._unfold, world.paused = True, not plays
             if plays:
                 self._say(said(HOW), HOW_S)
@@ -130,7 +130,7 @@ class TouchState:
         if world is None:
             self._ask_for_bodies()
             return
-        if world.paused and not self._begin(world):
+        if world.paused and not self.begin(world):
             return
         world.paused = not world.paused
         self._say(said("Objects hold still. T lets them move.") if world.paused else said(HOW))
@@ -148,7 +148,7 @@ class TouchState:
         else:
             self._say(said("Objects hold still. T lets them move."))
 
-    def _begin(self, world: World) -> bool:
+    def begin(self, world: World) -> bool:
         """Nothing starts inside another thing; False, and a sentence, where it would."""
         try:
             begin(world)

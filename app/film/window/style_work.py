@@ -37,10 +37,10 @@ class StyleWork(ChildWork):
         """
         super().__init__()
         self._state, self._folder, self._open_file = state, folder, open_file
-        self._object, self._stop = "", ""  # whose package it is, and the stop that it shall show
+        self._object, self.stop = "", ""  # whose package it is, and the stop that it shall show
         self.shape = SHAPES[0]
         self.strength = 1.0
-        self._path = Path()
+        self.path = Path()
         self._going_to = ""  # a stop of what is being opened
 
     def status(self) -> str:
@@ -73,9 +73,9 @@ class StyleWork(ChildWork):
             if item.part is not None:
                 raise UsageError(f"{item.name} is a part of a package; open that alone.")
             make_folder(self._folder)
-            self._path = free_name(self._folder, f"{source.path.stem}-{word}", ENDING)
-            self._object, self._stop = item.name, stop
-            command = ["style", str(source.path), "--out", str(self._path), *words]
+            self.path = free_name(self._folder, f"{source.path.stem}-{word}", ENDING)
+            self._object, self.stop = item.name, stop
+            command = ["style", str(source.path), "--out", str(self.path), *words]
             self._child = ProgramChild(command)
         except (OSError, UsageError) as error:
             self.say_failed(error)
@@ -90,7 +90,7 @@ class StyleWork(ChildWork):
         """Once a frame; what was made of what is open alone is gone to as soon as it is open."""
         busy = super().poll()
         opened, wanted = self._state.sources, self._going_to
-        if not wanted or len(opened) != 1 or opened[0].path != self._path:
+        if not wanted or len(opened) != 1 or opened[0].path != self.path:
             return busy
         self._going_to = ""
         names = [stop.name for stop in self._state.stops(0)]
@@ -104,18 +104,18 @@ class StyleWork(ChildWork):
         state = self._state
         alone = state.edited.path is None and len(state.scene.objects) == 1
         if self._open_file is not None and alone and not unsaved(state):
-            self._going_to = self._stop
-            self._open_file(self._path)
+            self._going_to = self.stop
+            self._open_file(self.path)
             return
         try:
-            put_in_place(state, self._object, self._path, self._stop)
+            put_in_place(state, self._object, self.path, self.stop)
         except (BadFile, OSError) as error:
             state.problem = said(
                 "The new style is in {path}, and cannot be shown: {error}",
-                path=self._path, error=error,
+                path=self.path, error=error,
             )  # fmt: skip
         else:
-            state.say(said("It is in {path}", path=self._path), seconds=8)
+            state.say(said("It is in {path}", path=self.path), seconds=8)
 
 
 def put_in_place(state: EditorState, name: str, path: Path, stop: str) -> None:

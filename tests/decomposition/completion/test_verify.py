@@ -161,8 +161,8 @@ def test_pictures_that_are_kept_are_those_that_are_drawn(device):
     assert np.abs(picture - pictures.draw(camera, 0.0)).max() < 2e-4
     solid = picture[..., 3] > 0.5
     assert np.isfinite(metres[solid]).all() and solid.any()
-    pictures._room, pictures._kept = 0, {}  # none is kept where there is no room
-    assert pictures.seen(camera, 0.0)[0] is not picture and not pictures._kept
+    pictures.room, pictures.kept = 0, {}  # none is kept where there is no room
+    assert pictures.seen(camera, 0.0)[0] is not picture and not pictures.kept
 
 
 def test_a_ghost_that_hides_the_plane_is_no_less_a_hole(device):

@@ -35,7 +35,7 @@ class Journal:
     def __init__(self, state: EditorState, folder: Path) -> None:
         self._state, self.folder = state, folder
         self.words = ""
-        self._file: JournalFile | None = None
+        self.file: JournalFile | None = None
         self._left: list[JournalFile] = []  # that could not be written any more, until one can
         self._begin_anew()
         self._stem = ""
@@ -66,23 +66,23 @@ class Journal:
         """The window goes: what is neither saved nor refused is offered at the next start."""
         if not unsaved(self._state) or self._refused is self._state.edited.history:
             self._remove()
-        for file in (self._file, *self._left):
+        for file in (self.file, *self._left):
             if file is not None:
                 file.close()
-        self._file, self._left = None, []
+        self.file, self._left = None, []
 
     def _remove(self) -> None:
-        for file in (self._file, *self._left):
+        for file in (self.file, *self._left):
             if file is not None:
                 file.remove()
-        self._file, self._left = None, []
+        self.file, self._left = None, []
         self._begin_anew()
 
     def follow(self, now_s: float) -> bool:
         """Writes what was edited since the last call; True while a drag waits to be written."""
         state, history = self._state, self._state.edited.history
         if not unsaved(state):
-            if self._file is not None or self._left:
+            if self.file is not None or self._left:
                 self._remove()
             self.words, self._seen = "", None
             return False
@@ -105,7 +105,7 @@ class Journal:
         try:
             self._write(history)
         except FileNotFoundError:  # somebody has taken the folder, or the file
-            if self._file is None:
+            if self.file is None:
                 raise
             self._set_left()
             self._write(history)
@@ -113,9 +113,9 @@ class Journal:
 
     def _set_left(self) -> None:
         """What there is stays on the disk until something newer is there."""
-        if self._file is not None:
-            self._left.append(self._file)
-        self._file = None
+        if self.file is not None:
+            self._left.append(self.file)
+        self.file = None
         self._begin_anew()
 
     def _fail(self, error: OSError, now_s: float) -> None:
@@ -135,9 +135,9 @@ class Journal:
 
     def _write(self, history: History) -> None:
         """Raises OSError."""
-        if self._file is not None and self._file.size > LARGEST:
+        if self.file is not None and self.file.size > LARGEST:
             self._set_left()
-        begins = self._file is None
+        begins = self.file is None
         numbers, entries = self._number_steps(history), []
         last = numbers[id(history.steps[-1])][1]
         for index, step in enumerate(history.steps):
@@ -168,7 +168,7 @@ class Journal:
         self._left = []
 
     def _append(self, entries: Sequence[Mapping[str, Any]]) -> None:
-        file = self._file = self._file or JournalFile.begin(self.folder, self._stem)
+        file = self.file = self.file or JournalFile.begin(self.folder, self._stem)
         file.append(b"".join(entry_line(dict(entry)) for entry in entries))
 
     def _number_steps(self, history: History) -> dict[int, tuple[HistoryStep, int]]:

@@ -54,8 +54,8 @@ def worked(scene, tmp_path):
     state = tools_journal.open_state(scene)
     journal = journal_of(state, tmp_path)
     work = tools_journal.Work(state, scene.parent, np.random.default_rng(3))
-    work._save = lambda: None
-    work._cut()
+    work.save = lambda: None
+    work.cut()
     for _ in range(100):
         work.step()
         state.record_regions()
@@ -67,8 +67,8 @@ def worked(scene, tmp_path):
 
 def crash(journal: Journal) -> None:
     """As a kill does: the locks are gone, the files stay."""
-    journal._file.close()
-    journal._file = None
+    journal.file.close()
+    journal.file = None
 
 
 def test_all_of_it_comes_back_with_its_steps(worked, scene, tmp_path):
@@ -93,7 +93,7 @@ def test_all_of_it_comes_back_with_its_steps(worked, scene, tmp_path):
 def test_a_scene_that_is_taken_back_and_undone_is_not_unsaved(scene, tmp_path):
     state = tools_journal.open_state(scene)
     journal = journal_of(state, tmp_path)
-    tools_journal.Work(state, scene.parent, np.random.default_rng(0))._place()
+    tools_journal.Work(state, scene.parent, np.random.default_rng(0)).place()
     lay(state, "Sp1")
     journal.follow(0.0)
     crash(journal)
@@ -134,7 +134,7 @@ def test_a_drag_is_written_twice_a_second_and_at_its_end(scene, tmp_path):
     work = tools_journal.Work(state, scene.parent, np.random.default_rng(0))
     sizes = []
     for frame in range(100):  # a second of them
-        work._place()
+        work.place()
         journal.follow(frame / 100)
         sizes.append(files_in(tmp_path)[0].stat().st_size)
     assert len(set(sizes)) == 3  # at 0, 0.4 and 0.8 s
@@ -304,7 +304,7 @@ def test_a_file_that_was_written_since_is_not_laid_over(scene, tmp_path):
     state = tools_journal.open_state(scene)
     journal = journal_of(state, tmp_path)
     lay(state, "Mine")
-    tools_journal.Work(state, scene.parent, np.random.default_rng(0))._place()
+    tools_journal.Work(state, scene.parent, np.random.default_rng(0)).place()
     journal.follow(0.0)
     crash(journal)
     theirs = tools_journal.open_state(scene)

@@ -153,10 +153,10 @@ def test_the_new_stop_is_gone_to_as_soon_as_it_is_open(work, child, tmp_path):
     state, styles, shown = work
     styles.shape = "melt"
     styles.add("RGB")
-    four_stop_package(styles._path)
+    four_stop_package(styles.path)
     child[-1].code = 0
-    styles._stop = read_package(styles._path).stops[-1].name  # as the command would have called it
-    assert styles.poll() and shown == [styles._path]
+    styles.stop = read_package(styles.path).stops[-1].name  # as the command would have called it
+    assert styles.poll() and shown == [styles.path]
     styles.poll()
     assert state.scene.objects[0].x == 0.0  # it is not open yet
     state.open(shown)

@@ -47,7 +47,7 @@ class StandIn:
 
 def test_t_before_there_are_bodies_is_kept_said_and_carried_out(state, monkeypatch):
     touch, bodies = TouchState(state, play=False), state.bodies
-    monkeypatch.setattr(touch, "_begin", lambda world: True)  # nothing stands in anything
+    monkeypatch.setattr(touch, "begin", lambda world: True)  # nothing stands in anything
     touch.toggle()
     assert "They move then" in state.messages.note and touch.status() == KEPT
     touch.toggle()  # taken back
@@ -61,7 +61,7 @@ def test_t_before_there_are_bodies_is_kept_said_and_carried_out(state, monkeypat
 def test_t_where_there_never_will_be_bodies_says_why(state):
     touch, bodies = TouchState(state, play=False), state.bodies
     touch.toggle()
-    bodies._stale = False  # all is up to date, and there is none
+    bodies.stale = False  # all is up to date, and there is none
     assert not touch.meet_world() and not touch.wanted
     assert state.messages.note == NO_BODIES
     bodies.why_none = "'mug': there is nothing to touch."

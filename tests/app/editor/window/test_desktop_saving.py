@@ -279,7 +279,7 @@ def test_what_a_killed_window_has_left_is_offered_and_comes_back(
     run_frames(viewer, 2)
     (left,) = journal.folder.iterdir()
     assert not viewer.objects.recovering.status()
-    journal._file.close()  # as a kill does
+    journal.file.close()  # as a kill does
     again = viewer_of(window, touch_found, tmp_path)
     recovering = again.objects.recovering
     begin_journal(again, tmp_path)
