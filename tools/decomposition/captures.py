@@ -162,6 +162,7 @@ def scene_row(device: Device, case: Case, found: Segmented, masks: str, more: di
 
 def holes(device: Device, case: Case, found: Segmented) -> dict:
     """What completion did behind all objects (Table 4.3)."""
+    assert isinstance(found.model, AnchorModel)
     views = photo_views(device, found, case.capture, trained_downscale(case.model.provenance))
     evidence = row_evidence(device, found.model, views)
     labels = [part.spec.label for part in found.parts if part.rows]

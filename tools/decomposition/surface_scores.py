@@ -53,7 +53,7 @@ def score_surfaces(found: np.ndarray, true: np.ndarray, near_m: float = NEAR_M) 
 
 def surface_of_solids(solids: Sequence[Solid]) -> np.ndarray:
     """(N, 3) metres: where rays from all around first meet a thing that stands alone."""
-    here = Place.of(solids)
+    here = Place.of(list(solids))
     low = np.min([solid.centre - solid.shape.reach for solid in solids], axis=0)
     high = np.max([solid.centre + solid.shape.reach for solid in solids], axis=0)
     random = np.random.default_rng(0)

@@ -56,7 +56,7 @@ def put_window(handle: Any, place: Place) -> bool:
     shows most of it, or, where none shows enough for a hand to take it, onto the first.
     """
     left, top, width, height = place
-    areas = {tuple(glfw.get_monitor_workarea(monitor)) for monitor in glfw.get_monitors()}
+    areas = {work_area(monitor) for monitor in glfw.get_monitors()}
     known = tells_places() and any(_shows(area, place) for area in areas)
     if known and sum(_shared(area, place) for area in areas) >= width * height:
         glfw.set_window_size(handle, width, height)
@@ -66,7 +66,7 @@ def put_window(handle: Any, place: Place) -> bool:
     if known:
         area = max(areas, key=lambda area: _shared(area, place))
     elif first:
-        area = tuple(glfw.get_monitor_workarea(first))
+        area = work_area(first)
     else:
         return False
     x, y, across, down = area
@@ -83,6 +83,12 @@ def put_window(handle: Any, place: Place) -> bool:
     elif tells_places():
         glfw.set_window_pos(handle, x + (across - wide) // 2, y + (down - high + edges[1]) // 2)
     return wide < width or high < height
+
+
+def work_area(monitor: Any) -> Place:
+    """What of the desktop a monitor leaves to windows."""
+    left, top, width, height = glfw.get_monitor_workarea(monitor)
+    return left, top, width, height
 
 
 def _shows(area: Place, place: Place) -> bool:

@@ -1,15 +1,21 @@
 """Editor states of files that were opened, without a window."""
 
+from pathlib import Path
+
 import numpy as np
 
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles
-from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.model import BadFile, Model, SplatLayers, Stop
+
+
+def no_model(path: Path) -> Model:
+    raise BadFile(f"{path} is not read here.")
 
 
 def state_of(found: OpenedFiles) -> EditorState:
-    state = EditorState(lambda path: None)
+    state = EditorState(no_model)
     scene, edited = opened_scene(found)
     state.open_sources(found.sources, scene, None, edited)
     return state

@@ -192,7 +192,7 @@ def test_a_torn_tail_is_left_out_and_told(worked, scene, tmp_path):
         problems: list[str] = []
         again = tools_journal.open_state(scene)
         work = left_work(again, journal.folder, problems)
-        assert not problems and work.torn == len(tail)
+        assert work is not None and not problems and work.torn == len(tail)
         Restoring(again, work).take_back({})
         assert "Last" not in [mark.name for mark in again.edited.marks.marks]
         assert len(again.edited.marks.marks) == len(state.edited.marks.marks) - 1
@@ -314,7 +314,7 @@ def test_a_file_that_was_written_since_is_not_laid_over(scene, tmp_path):
     before = scene.read_bytes(), marks_path(scene).read_bytes()
     again = tools_journal.open_state(scene)
     work = left_work(again, journal.folder, [])
-    assert work.stamp != again.edited.stamp
+    assert work is not None and work.stamp != again.edited.stamp
     assert again.edited.file.floor_y == -1.0, "the file as it is, until somebody chooses"
     Restoring(again, work).take_back({})
     work.file.close()

@@ -150,7 +150,7 @@ def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_fi
         "import sys\nfrom shapeshift.app import cli\n"
         "from shapeshift.app.editor.window import window\n"
         "def crash(self, event=None):\n    raise ZeroDivisionError('the callback broke')\n"
-        "window.Window._note = crash\n"
+        "window.Window.expose = crash\n"
         "old = window.Window.begin_frame\n"
         "def begin(self):\n    self._window.size = (700, 500)\n    return old(self)\n"
         "window.Window.begin_frame = begin\n"

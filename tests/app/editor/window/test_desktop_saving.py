@@ -285,6 +285,7 @@ def test_what_a_killed_window_has_left_is_offered_and_comes_back(
     begin_journal(again, tmp_path)
     for answer in ("Later", "Take it back"):
         run_frames(again, 3)
+        assert recovering.work is not None
         assert recovering.asked() and names(again) == NAMES and not again.objects.unsaved
         assert recovering.lines(recovering.work)[1] == "delete ball"
         key(again, glfw.KEY_DELETE)  # the box is open: not for the scene
