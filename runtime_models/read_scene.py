@@ -12,16 +12,8 @@ from shapeshift.runtime_models.blocks.block_model import BlockModel
 from shapeshift.runtime_models.blocks.read_blocks import LIST as BLOCK_LIST
 from shapeshift.runtime_models.blocks.read_blocks import has_block_list, read_blocks
 from shapeshift.runtime_models.checkpoint.read_png_folder import is_png_folder
-from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.files.memory import refuse_empty
 from shapeshift.runtime_models.files.zip_files import member_names
-from shapeshift.runtime_models.lint.lint_whole import (
-    SAMPLE,
-    fill_ratio,
-    refuse_boundless,
-    sample_of,
-)
-from shapeshift.runtime_models.lint.lint_whole import refuse_filling as refuse_sample
 from shapeshift.runtime_models.lod.level_files import (
     files_of_levels,
     is_levels,
@@ -37,6 +29,7 @@ from shapeshift.runtime_models.model import (
     Stop,
 )
 from shapeshift.runtime_models.package.feature_codes import EXACT, encode_light
+from shapeshift.runtime_models.package.lint_package import refuse_filling
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, format_name
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.refit_encoding import encoding_findings
@@ -85,32 +78,6 @@ KNOWN = (
     ".ksplat, .spz, .sog, .glb, .gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the "
     "folder of a 3DGS or Scaffold-GS run"
 )
-
-
-def refuse_filling(model: AnchorModel, file: str) -> None:
-    """BadFile where the splats of a stop would lie over every pixel in thousands: networks can ask
-    for splats of any size.
-
-    A part of the anchors is decoded for it, at every stop.
-    """
-    step = max(-(-model.splat_count // SAMPLE), 1)
-    few = model.with_anchors(slice(None, None, step))
-    evaluator = Evaluator(few)
-    fullest = None
-    for stop in model.stops:
-        with np.errstate(over="ignore", invalid="ignore"):
-            means, scales, _, opacity = evaluator.geometry(stop.x)
-        finite = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & (opacity > 0)
-        if not finite.any():
-            continue
-        sample = sample_of(means[finite], scales[finite], opacity[finite])
-        refuse_boundless(file, sample)
-        # of all rows that were decoded, times what was left out
-        sample = replace(sample, part=sample.part * len(few.anchors) / len(model.anchors))
-        if fullest is None or fill_ratio(sample) > fill_ratio(fullest):
-            fullest = sample
-    if fullest is not None:
-        refuse_sample(file, fullest)
 
 
 def read_model(path: str | Path, reading: Reading | None = None) -> Model:
