@@ -207,7 +207,7 @@ class Bench:
             code, said = self.run("--resume")
             if code == 0:
                 return "resumed"
-        if code == 2 and "exists" in said and before == whole:
+        if code == 2 and "--overwrite" in said and before == whole:
             return "whole"
         if code == 0:
             return "went_on"
