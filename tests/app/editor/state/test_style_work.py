@@ -128,13 +128,13 @@ def test_shapes_are_the_command_s():
 
 @pytest.mark.slow
 def test_a_stop_comes_and_goes(work):
-    """The real command: four stops, then three again."""
+    """The real command: the new stop is the last of four, then there are three again."""
     state, styles, shown = work
     styles.shape = "points"
     styles.add("RGB")
     wait_for(styles)
     assert not state.problem
-    assert [s.name for s in read_package(shown[0]).stops] == ["RGB", "Points", "Thermal", "Opened"]
+    assert [s.name for s in read_package(shown[0]).stops] == ["RGB", "Thermal", "Opened", "Points"]
     state.open([shown[0]])
     styles.remove("Points")
     wait_for(styles)
