@@ -80,8 +80,10 @@ class Mutant:
         """The file that has the line now, and its text with the fault.  Raises ValueError."""
         line = re.compile(r"\s+".join(map(re.escape, self.before.split())))
         ending = Path(self.file).suffix
-        files = [self.file] if self.file in texts else [f for f in texts if f.endswith(ending)]
-        found = [(file, match) for file in files for match in line.finditer(texts[file])]
+        found = [(self.file, match) for match in line.finditer(texts.get(self.file, ""))]
+        if not found:  # the line went to another file, whether or not its own is still there
+            rest = [file for file in texts if file.endswith(ending)]
+            found = [(file, match) for file in rest for match in line.finditer(texts[file])]
         if len(found) != 1:
             raise ValueError(f"'{self.name}': its line is there {len(found)} times, not once.")
         file, match = found[0]
