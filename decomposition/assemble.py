@@ -32,15 +32,15 @@ from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.parts import part_of
 from shapeshift.scene.colliders.carve import PhotoSight
 from shapeshift.scene.colliders.collider import Collider, Making, collider_of_mesh, mesh_of_splats
-from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume
+from shapeshift.scene.colliders.convex_parts import cut_quickly, hull_volume
 from shapeshift.scene.colliders.cut_apart import apart
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
 # Candidates for an object's proxy, and which of them its silhouettes prefer (OWD, section 3.5).
 
-PIECES = "hulls"  # CoACD's: the name of that candidate
-LIMIT_S = 120.0  # for CoACD, on a machine that is busy with photos
+PIECES = "hulls"  # the name of that candidate
+CELLS = 64  # of the mesh around an object: 2,500 faces show no more
 AS_GOOD = 0.02  # of IoU below the best, at which a candidate of fewer corners is taken
 LEAST_RECALL = 0.85  # below, a proxy does not cover its object
 
@@ -64,15 +64,16 @@ def candidates_of(
     given: Path | None = None,
     cut: bool = True,
 ) -> dict[str, Collider]:
-    """Colliders by name: CoACD's pieces, one hull, the primitives, and a mesh file of the user's.
+    """Colliders by name: convex pieces, one hull, the primitives, and a mesh file of the user's.
 
     mesh: the object's, as standing_mesh() makes it; plane: on which it stands, in the same frame.
-    cut: False leaves out the pieces, which take seconds.  Raises BadFile for a mesh file that
+    cut: False leaves out the pieces, which take a second.  Raises BadFile for a mesh file that
     cannot be used.
     """
     found: dict[str, Collider] = {}
     if cut:
-        parts, _ = cut_into_parts(mesh, making.most_parts, making.report, LIMIT_S)
+        making.report("cutting it into convex pieces", 0.0)
+        parts = cut_quickly(mesh, making.most_parts)
         if plane is not None:
             parts = tuple(part for part in pressed(parts, plane) if hull_volume(part) > 0)
         found[PIECES] = Collider(parts, mesh)
@@ -186,10 +187,16 @@ def assemble(
         for label, proxy in proxies.items()
         if label in planes
     ]
+    loose = [
+        piece + part_of(model, label)[1]
+        for label, proxy in proxies.items()
+        if label not in planes
+        for piece in proxy.collider.parts
+    ]
     hollow = replace(making, hollow=True, faces=BACKGROUND_FACES)
     ground = ground_mesh(
         only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing,
-        seen,
+        seen, loose,
     )  # fmt: skip
     return Assembled(whole, proxies, ground, tuple(told), failed, planes)
 
@@ -289,6 +296,7 @@ def standing_mesh(
     evidence (A,): pixels that show each of its anchors as this object, None: not known.  plane: on
     which it stood, in the same frame; nothing lies below, and what is near above lies on it.
     """
+    making = replace(making or Making(kept=False), cells=CELLS)
     columns = [np.asarray(each) for each in Evaluator(part).geometry(x)]
     use = columns[3] > LEAST_OPACITY
     if evidence is not None:
@@ -301,7 +309,7 @@ def standing_mesh(
             f"{len(use)}; {FEWEST} are wanted: mark it in more photos, or name a mesh file."
         )
     means, scales, wxyz, opacity = (column[use] for column in columns)
-    mesh = mesh_of_splats(means, scales, wxyz, opacity, making or Making(kept=False))
+    mesh = mesh_of_splats(means, scales, wxyz, opacity, making)
     if plane is None:
         return mesh
     return TriangleMesh(pressed([mesh.vertices], plane)[0], mesh.faces)

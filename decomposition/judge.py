@@ -23,7 +23,7 @@ from shapeshift.decomposition.masks.work_photos import WorkPhoto, work_photos
 from shapeshift.decomposition.segment_scene import ObjectJudgement, Segmented, SegmentedPart
 from shapeshift.decomposition.shown import ShownAnchors
 from shapeshift.decomposition.upright_scene import planes_under
-from shapeshift.decomposition.walk_objects import ON_PLANE, heat_of, heights_of
+from shapeshift.decomposition.walk_objects import ON_PLANE, heat_of, heights_of, places_of, ways_of
 from shapeshift.rasterizer.device import Device
 from shapeshift.runtime_models.model import AnchorModel, BadFile, SplatLayers
 from shapeshift.runtime_models.stop import Stop
@@ -151,9 +151,11 @@ def ask(
         if not prompts:
             continue
         image = np.concatenate([photo.pixels(), *heat_of(shown, photo)], axis=2)
-        heights = heights_of(shown, photo.view, photo.stop.x, prompts, nodes)
+        places = places_of(shown, photo.view, photo.stop.x, nodes)
+        heights = heights_of(places, photo.view, prompts, nodes)
         fresh = np.zeros(labels.shape, np.uint8)
-        for k, answer in zip(boxes, walk_together(image, prompts, heights), strict=True):
+        answers = walk_together(image, prompts, heights, ways_of(places, photo.view))
+        for k, answer in zip(boxes, answers, strict=True):
             assert answer is not None, "it has a box"
             fresh[answer.mask] = k
         for k, height in zip(boxes, heights, strict=True):

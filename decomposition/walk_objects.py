@@ -155,8 +155,10 @@ def masks_of_photo(
     given = np.any([*found.values(), np.zeros(photo.view.size[::-1], bool)], axis=0)
     image = np.concatenate([photo.pixels(), *heat_of(shown, photo)], axis=2)
     prompts = list(asked.values())
-    heights = heights_of(shown, photo.view, photo.stop.x, prompts, nodes)
-    for label, answer in zip(asked, walk_together(image, prompts, heights), strict=True):
+    places = places_of(shown, photo.view, photo.stop.x, nodes)
+    heights = heights_of(places, photo.view, prompts, nodes)
+    answers = walk_together(image, prompts, heights, ways_of(places, photo.view))
+    for label, answer in zip(asked, answers, strict=True):
         mask = None if answer is None else answer.mask & ~given
         if mask is None or not mask.any() or mask.all():
             spec, _ = said_here[label]
@@ -175,15 +177,29 @@ FINE, LOW, HIGH = 1.5, -2.0, 6.5  # medians of what lies beside the plane; of as
 ON_PLANE = (60, 30)  # of 255: heights about 0, and by how much they scatter
 
 
-def heights_of(
-    shown: ShownAnchors, view: View, x: Control, prompts: list[Prompt], nodes: Nodes
-) -> list[np.ndarray | None]:
-    """(H, W) uint8 a prompt: how high what the photo shows stands above the plane of what lies
-    around the prompt, finely near it; None where nothing flat is around.
-    """
+def places_of(shown: ShownAnchors, view: View, x: Control, nodes: Nodes) -> np.ndarray:
+    """(H, W, 3) float32 metres: where what a pixel shows is; NaN: not known."""
     means = np.zeros((nodes.count, 3))
     means[nodes.rows] = nodes.means
-    places = shown.places(view, x, means)
+    return shown.places(view, x, means)
+
+
+def ways_of(places: np.ndarray, view: View) -> np.ndarray:
+    """(H, W) how far away places (H, W, 3) are, in pixels that wide there: the focal length times
+    the logarithm of the depth, so that differences are ways along the view.
+    """
+    camera_from_world, fx, _, _, _ = view.pinhole()
+    depth = places @ camera_from_world[2, :3].astype(np.float32) + camera_from_world[2, 3]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return fx * np.log(np.where(depth > 0, depth, np.nan))
+
+
+def heights_of(
+    places: np.ndarray, view: View, prompts: list[Prompt], nodes: Nodes
+) -> list[np.ndarray | None]:
+    """(H, W) uint8 a prompt: how high what the photo shows stands above the plane of what lies
+    around the prompt, finely near it; None where nothing flat is around.  places: of places_of().
+    """
     eye = view.world_from_eye.position
     apart = spacing_of(nodes.means)
     found: list[np.ndarray | None] = []

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import label
+from scipy.ndimage import binary_dilation, label
 
 from shapeshift.decomposition.masks.anchor_click import best_cut
 from shapeshift.decomposition.masks.pixel_grid import (
@@ -43,6 +43,8 @@ MOST, ROOM = 0.3, 0.25  # part of the photo that a click may mean; of its longer
 SPECK = 0.05  # of the largest part's pixels: smaller ones are left out
 HOLE = 0.15  # of the mask's pixels: smaller ones that it encloses may be filled
 STRANGE = -1.5  # mean log odds of a hole's colours, below which it shows what is behind
+LEVEL = 0.5  # of a hole's width: as far behind its rim it is a part of the object, of any colour
+RIM = 2  # pixels around a hole
 
 
 @dataclass(frozen=True)
@@ -95,11 +97,13 @@ def walk_together(
     image: np.ndarray,
     prompts: Sequence[Prompt],
     heights: Sequence[np.ndarray | None] | None = None,
+    ways: np.ndarray | None = None,
 ) -> list[Candidate | None]:
     """A mask a prompt, none of which overlap; None where a prompt says nothing of a place.
 
     image (H, W, C) uint8.  heights: of each prompt (H, W) uint8, how high what the photo shows
-    stands above that on which the object stands.  The order of the prompts changes nothing.
+    stands above that on which the object stands.  ways (H, W): how far away that is, in pixels that
+    wide there, NaN: not known.  The order of the prompts changes nothing.
     """
     heights = heights or [None] * len(prompts)
     boxed = [with_box_of_mask(prompt) for prompt in prompts]
@@ -124,7 +128,7 @@ def walk_together(
             part.outer = ~part.inner
     found: list[Candidate | None] = [None] * len(prompts)
     for k, (at, part) in enumerate(zip(order, parts, strict=True)):
-        found[at] = candidate_of(part, k, owner)
+        found[at] = candidate_of(part, k, owner, ways)
     return found
 
 
@@ -135,24 +139,32 @@ def rank(prompt: Prompt) -> tuple:
     return (box[2] - box[0]) * (box[3] - box[1]), box, clicks
 
 
-def candidate_of(part: WalkArea, number: int, owner: np.ndarray) -> Candidate:
+def candidate_of(
+    part: WalkArea, number: int, owner: np.ndarray, ways: np.ndarray | None
+) -> Candidate:
     left, top, right, bottom = part.region
     here = owner[top:bottom, left:right]
     mask = np.zeros(owner.shape, bool)
     odds, seeds = part.in_photo(part.odds), part.in_photo(part.seeds == INSIDE) > 0.5
     barred = ((here >= 0) & (here != number)) | (part.in_photo(part.seeds == OUTSIDE) > 0)
-    mask[top:bottom, left:right] = tidied(here == number, odds, barred, seeds)
+    away = None if ways is None else ways[top:bottom, left:right]
+    mask[top:bottom, left:right] = tidied(here == number, odds, barred, seeds, away)
     sure = part.share[part.share > 0.5]
     return Candidate(mask, float(np.abs(2 * sure - 1).mean()) if len(sure) else 0.0)
 
 
 def tidied(
-    mask: np.ndarray, odds: np.ndarray, barred: np.ndarray, wanted: np.ndarray
+    mask: np.ndarray,
+    odds: np.ndarray,
+    barred: np.ndarray,
+    wanted: np.ndarray,
+    ways: np.ndarray | None = None,
 ) -> np.ndarray:
     """Without specks beside the largest part, and without holes: a light on it, a label.
 
-    A hole stays whose colours are those around the object (odds (h, w)): what a handle encloses
-    shows the table; and one that has a place of `barred`.  A speck with a place of `wanted` stays.
+    A hole stays whose colours are those around the object (odds (h, w)), unless it lies as far away
+    as its rim (ways (h, w), in pixels that wide): a handle shows the table behind, a face has eyes
+    of its colour; and one that has a place of `barred`.  A speck with a place of `wanted` stays.
     """
     parts, count = label(mask)
     if not count:
@@ -168,7 +180,30 @@ def tidied(
     sizes[0] = kept.sum()  # no hole
     like = np.bincount(flat, odds.ravel()) / np.maximum(np.bincount(flat), 1) > STRANGE
     free = np.bincount(flat, barred.ravel()) == 0
-    return kept | ((sizes < HOLE * kept.sum()) & like & free)[holes]
+    small = (sizes < HOLE * kept.sum()) & free
+    if ways is not None:
+        for hole in np.flatnonzero(small & ~like):
+            like[hole] = is_level(holes == hole, kept, ways)
+    return kept | (small & like)[holes]
+
+
+def is_level(hole: np.ndarray, kept: np.ndarray, ways: np.ndarray) -> bool:
+    """Whether a hole (h, w) of a mask lies no farther behind its rim than a dent of its width."""
+    near = box_slices_of(hole, RIM)
+    hole, kept, ways = hole[near], kept[near], ways[near]
+    rim = ways[binary_dilation(hole, iterations=RIM) & kept]
+    rim, inner = rim[np.isfinite(rim)], ways[hole]
+    if not (len(rim) and np.isfinite(inner).mean() > 0.5):
+        return False
+    behind = np.nanmedian(inner) - np.median(rim)
+    return bool(behind <= LEVEL * np.sqrt(hole.sum()))
+
+
+def box_slices_of(plane: np.ndarray, margin: int) -> tuple[slice, slice]:
+    """The rows and columns of a plane (h, w) bool that is not empty, and so many around."""
+    ends = (np.flatnonzero(plane.any(axis))[[0, -1]] for axis in (1, 0))
+    rows, columns = (slice(max(low - margin, 0), high + margin + 1) for low, high in ends)
+    return rows, columns
 
 
 def owners(parts: list[WalkArea], claims: list[np.ndarray], shape: tuple[int, int]) -> np.ndarray:

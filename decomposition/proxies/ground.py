@@ -21,6 +21,7 @@ from shapeshift.scene.colliders.carve import (
     SeenDepth,
     carved_mesh,
     is_free,
+    is_within,
     votes,
 )
 from shapeshift.scene.colliders.collider import Making, mesh_of_splats
@@ -45,6 +46,7 @@ def ground_mesh(
     making: Making,
     standing: Sequence[tuple[Plane, np.ndarray]] = (),
     seen: Sequence[SeenDepth] = (),
+    loose: Sequence[np.ndarray] = (),
 ) -> TriangleMesh:
     """The background's mesh, in the model's frame: slabs under the planes, and the skin: around
     what rays end on, and where nobody looked around all splats.
@@ -52,9 +54,10 @@ def ground_mesh(
     background: without the objects.  looks, labels (A,): of the whole model, so that a slab lies
     under the things, too.  standing: the plane that each object stands on, and the corners (V, 3)
     of what is touched of it; no skin is left within them, or the object would jump out of it.
+    loose: corners (V, 3) of each piece of things that stand on no plane, with the same in mind.
     Raises BadFile where nothing can be touched.
     """
-    skin = carved_mesh(seen, making.faces) if seen else None
+    skin = carved_mesh(seen, making.faces, loose) if seen else None
     if skin is None:
         skin = mesh_of_splats(*Evaluator(background).geometry(x), making)
     side = CELL * looks.spacing_m
@@ -152,22 +155,6 @@ def free_cells(
     out = np.zeros(cells.shape, bool)
     out[cells] = is_free(votes(seen, places, side))
     return out
-
-
-def is_within(places: np.ndarray, corners: np.ndarray, margin: float) -> np.ndarray:
-    """(N,) bool: the places (N, 3) in the convex hull of corners (V, 3), or so many metres off it.
-
-    Fur and carpets make a skin that stands above the plane around a thing and reaches into it.
-    """
-    from scipy.spatial import ConvexHull
-
-    low, high = corners.min(0) - margin, corners.max(0) + margin
-    near = np.flatnonzero(((places > low) & (places < high)).all(1))
-    equations = ConvexHull(corners).equations  # (F, 4) outward normals
-    inside = (places[near] @ equations[:, :3].T + equations[:, 3] < margin).all(1)
-    found = np.zeros(len(places), bool)
-    found[near[inside]] = True
-    return found
 
 
 def distinct(planes: Sequence[Plane], side: float) -> list[Plane]:

@@ -171,9 +171,14 @@ def is_free(found: Votes) -> np.ndarray:
     return found.through > LEAST_FREE * (found.through + found.ends)
 
 
-def carved_mesh(seen: Sequence[SeenDepth], faces: int) -> TriangleMesh | None:
+def carved_mesh(
+    seen: Sequence[SeenDepth], faces: int, things: Sequence[np.ndarray] = ()
+) -> TriangleMesh | None:
     """A closed mesh of about so many faces around what is surely solid, the world's metres; None
     where that is nothing.
+
+    things: corners (V, 3) of convex pieces of what stands there and is no part of it: nothing is
+    solid within them, or a cell off.
     """
     from scipy import ndimage
 
@@ -186,6 +191,8 @@ def carved_mesh(seen: Sequence[SeenDepth], faces: int) -> TriangleMesh | None:
     least = LEAST_ENDS if len(seen) > FEW else 1
     eyes = np.array([one.view.world_from_eye.position for one in seen])
     free = is_free(found) | ~away_from(places, eyes, AROUND * cell)
+    for corners in things:
+        free |= is_within(places, corners.astype(np.float64), cell)
     # Before a surface its height stays, so that the field passes through 0 where the surface is.
     known = (found.ends >= least) & ((found.height > 0) | ~free)
     field = np.full(shape, 1.0, np.float32)
@@ -241,6 +248,23 @@ def grid_of(
         if len(where) <= 1.2 * MOST_PLACES:
             return low - border, cell, where, shape
         cell *= float(np.sqrt(len(where) / MOST_PLACES))  # places lie on surfaces
+
+
+def is_within(places: np.ndarray, corners: np.ndarray, margin: float) -> np.ndarray:
+    """(N,) bool: the places (N, 3) in the convex hull of corners (V, 3), or so many metres off it.
+
+    Fur and carpets make a skin that stands above the plane around a thing and reaches into it.
+    """
+    from scipy.spatial import ConvexHull
+
+    low, high = corners.min(0) - margin, corners.max(0) + margin
+    near = np.flatnonzero(((places > low) & (places < high)).all(1))
+    equations = ConvexHull(corners).equations  # (F, 4) outward normals
+    for equation in equations:  # one after the other: all at once are hundreds of megabytes
+        near = near[places[near] @ equation[:3] + equation[3] < margin]
+    found = np.zeros(len(places), bool)
+    found[near] = True
+    return found
 
 
 def away_from(places: np.ndarray, eyes: np.ndarray, radius_m: float) -> np.ndarray:

@@ -15,7 +15,13 @@ from shapeshift.runtime_models.model import BadFile, Model, ScaffoldModel
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.colliders.collider_cache import content_key, read_cached, write_cached
 from shapeshift.scene.colliders.collider_pieces import Pieces, hull_faces, read_pieces
-from shapeshift.scene.colliders.collider_wrap import is_watertight, join_meshes, volume, wrap
+from shapeshift.scene.colliders.collider_wrap import (
+    CELLS,
+    is_watertight,
+    join_meshes,
+    volume,
+    wrap,
+)
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume, solid_parts
 from shapeshift.scene.colliders.fill_splats import fill_splats, hull_points, nothing_to_touch
 from shapeshift.scene.colliders.read_mesh import read_mesh
@@ -43,6 +49,7 @@ class Making:
     """How colliders are made."""
 
     faces: int = FACES  # of the mesh, about
+    cells: int = CELLS  # along the longest side of splats, at most, that the mesh is made of
     most_parts: int = MOST_PARTS
     hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
     kept: bool = True  # False: nothing is read from the user's cache or written to it
@@ -126,6 +133,7 @@ def cached_or_made(
             "least 12 faces and 1 to 64 parts are made."
         )
     settings = f"{VERSION} {making.faces} {making.most_parts} {making.hollow}"
+    settings += f" {making.cells}" * (making.cells != CELLS)
     key = content_key(settings, *columns) if making.kept else ""
     made = read_cached(key) if making.kept else None
     if made is None and making.rough and not making.hollow:
@@ -167,7 +175,7 @@ def mesh_of_splats(
 ) -> TriangleMesh:
     """A watertight mesh around the splats; a box around few.  Raises BadFile around none."""
     making.report("looking for what is solid", 0.0)
-    filling = fill_splats(means, scales, wxyz, opacity)
+    filling = fill_splats(means, scales, wxyz, opacity, making.cells)
     if not len(filling.points):
         raise BadFile(nothing_to_touch(len(means)))
     if filling.splats < FEWEST_SPLATS or not filling.cell_m > 0:

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,62 @@ def hull_volume(points: np.ndarray) -> float:
         return float(ConvexHull(points.astype(np.float64)).volume)
     except (QhullError, ValueError):  # flat, or fewer than four
         return 0.0
+
+
+# The same in a second: hulls of samples of the surface, cut at planes across a piece's own axes; of
+# all pieces that one is cut next whose hull a cut takes most off.
+
+SAMPLES = 1500  # of the surface, beside its corners and the middles of its faces
+CUTS = 7  # places along each axis
+WORTH = 0.01  # of all hulls' volume, that a cut has to take off
+OVERLAP = 0.5  # of the way between samples, on either side of a cut: no gap is left
+FEWEST = 8  # samples of a piece
+
+
+@dataclass(frozen=True)
+class CutPiece:
+    """A piece, and what its best cut makes of it."""
+
+    points: np.ndarray  # (n, 3) metres
+    volume: float  # of its hull
+    gain: float  # cubic metres less that both hulls of its halves have; 0: no cut helps
+    halves: tuple[np.ndarray, np.ndarray] | tuple[()]
+
+
+def cut_quickly(mesh: TriangleMesh, most: int) -> tuple[np.ndarray, ...]:
+    """At most `most` hulls (V, 3) float32 that cover a closed mesh."""
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    points = np.concatenate([sample_faces(corners, SAMPLES)[0], mesh.vertices])
+    a, b, c = np.moveaxis(corners, 1, 0)
+    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+    overlap = OVERLAP * float(np.sqrt(area / len(points)))
+    pieces = [best_cut(points, overlap)]
+    while len(pieces) < most:
+        at = max(range(len(pieces)), key=lambda k: pieces[k].gain)
+        if not pieces[at].gain > WORTH * sum(piece.volume for piece in pieces):
+            break
+        pieces[at : at + 1] = [best_cut(half, overlap) for half in pieces[at].halves]
+    return solid_parts(joined([piece.points for piece in pieces], Skin(mesh)), mesh, most)
+
+
+def best_cut(points: np.ndarray, overlap: float) -> CutPiece:
+    """The piece of points (n, 3), and the cut across one of its axes that takes most off its hull.
+
+    overlap: metres that both halves reach over the cut.
+    """
+    whole, away = hull_volume(points), points - points.mean(0)
+    best = CutPiece(points, whole, 0.0, ())
+    for axis in np.linalg.svd(away.T @ away)[2]:
+        along = away @ axis
+        low, high = float(along.min()), float(along.max())
+        for place in np.linspace(low, high, CUTS + 2)[1:-1]:
+            halves = points[along < place + overlap], points[along > place - overlap]
+            if min(map(len, halves)) < FEWEST:
+                continue
+            gain = whole - sum(map(hull_volume, halves))
+            if gain > best.gain:
+                best = CutPiece(points, whole, gain, halves)
+    return best
 
 
 def run_coacd(

@@ -35,9 +35,16 @@ NOTHING = Filling(np.zeros((0, 3)), 0.0, 0)
 
 
 def fill_splats(
-    means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
+    means: np.ndarray,
+    scales: np.ndarray,
+    wxyz: np.ndarray,
+    opacity: np.ndarray,
+    cells: int = CELLS,
 ) -> Filling:
-    """Points within one sigma of the splats that count.  (N, 3) metres twice, (N, 4), (N,)."""
+    """Points within one sigma of the splats that count.  (N, 3) metres twice, (N, 4), (N,).
+
+    cells: along the longest side, at most.
+    """
     known = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & np.isfinite(wxyz).all(1)
     rows = np.flatnonzero(known & (opacity >= FAINT))
     if not len(rows):
@@ -54,7 +61,7 @@ def fill_splats(
     if not len(rows):
         return NOTHING
     reach = np.ptp(means[rows], axis=0) + 2 * np.median(scales[rows].max(1))
-    cell_m = float(max(reach.max() / CELLS, min(SPACING * spacing, reach.max() / COARSEST)))
+    cell_m = float(max(reach.max() / cells, min(SPACING * spacing, reach.max() / COARSEST)))
     if not cell_m > 0:
         return Filling(means[rows].astype(np.float64), 0.0, len(rows))
     axes = rotation_matrices(normalize(wxyz[rows].astype(np.float64))) * scales[rows, None, :]

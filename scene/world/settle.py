@@ -4,6 +4,7 @@ All of it is tried in a copy of the physics; the caller takes over the poses tha
 """
 
 import math
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +24,7 @@ PUT_DOWN_S, REST_S = 1.0, 3.0  # seconds: until a thing lies on what carries it,
 DAMPING = 4.0  # 1/s, while it is put down: it neither bounces nor rolls off
 MOST_GAP = 0.05  # of its size: from a thing to what carries it; above, nothing does
 MOST_PUT = 5.0  # degrees that it may turn while it is put down
+AFTER_S = 0.5  # seconds that the test goes on when one has moved: it is known how
 MOST_MOVED, MOST_TURNED = 0.02, 2.0  # of its size, and degrees: a thing that rests moves no more
 
 
@@ -47,6 +49,7 @@ class BodyMotion:
     fell_m: float  # before anything carried it
     size_m: float  # the longest side of its box
     left_s: float  # when it had moved more than a thing does that rests; inf: never
+    after_s: float  # that this took
     on: int | None  # what it touched last: where several, the lowest
 
     @property
@@ -147,8 +150,13 @@ def extent(box: np.ndarray, way: np.ndarray) -> float:
     return float(np.linalg.norm(sides * way)) / length if length > 0 else float(sides.min())
 
 
-def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int, BodyMotion]:
-    """What gravity does to each body in so many seconds, if nobody touches it."""
+def let_fall(
+    physics: Physics, seconds: float, damping: float = 0.0, after_s: float = math.inf
+) -> dict[int, BodyMotion]:
+    """What gravity does to each body in so many seconds, if nobody touches it.
+
+    after_s: it ends so long after the first one has moved more than a thing does that rests.
+    """
     copy = copy_of(physics)
     bodies = {number: copy.engine_body(number) for number in copy.bodies()}
     starts = {number: copy.pose(number) for number in bodies}
@@ -158,7 +166,11 @@ def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int
     for body in bodies.values() if damping else ():
         body.linear_damping = body.angular_damping = damping
     left_s = dict.fromkeys(bodies, math.inf)
+    done = 0
     for step in range(math.ceil(seconds * copy.hz)):
+        if step / copy.hz > min(left_s.values(), default=math.inf) + after_s:
+            break
+        done = step + 1
         lowest: dict[int, float] = {}
         for contact in copy.step():
             for mine, other in ((contact.a, contact.b), (contact.b, contact.a)):
@@ -180,7 +192,8 @@ def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int
         found[number] = BodyMotion(
             end, float(np.linalg.norm(way)), turned, float(-way[1]),
             max(float(start.position[1]) - first_y, 0.0),
-            float(np.ptp(boxes[number], axis=0).max()), left_s[number], on.get(number),
+            float(np.ptp(boxes[number], axis=0).max()), left_s[number],
+            done / copy.hz, on.get(number),
         )  # fmt: skip
     return found
 
@@ -232,11 +245,12 @@ class Rest:
             return ""
         if self.floats:
             return f"nothing that is in the scene carries {self.name}{STAYS}"
-        moved, on = f"{1e3 * motion.moved_m:.0f} mm", f" on {self.on}" * bool(self.on)
+        moved = f"{1e3 * motion.moved_m:.0f} mm in {motion.after_s:.1f} s"
+        on = f" on {self.on}" * bool(self.on)
         share = f"{100 * motion.moved_m / max(motion.size_m, 1e-9):.0f} % of its size"
         if motion.turned > MOST_TURNED:
             what = "tips over" if motion.turned > TIPPED else "rocks or rolls"
-            what += f"{on}, {motion.turned:.0f} degrees and {moved} in {REST_S:.0f} s"
+            what += f"{on}, {motion.turned:.0f} degrees and {moved}"
         elif abs(motion.down_m) > STEEP * motion.moved_m:
             what = f"{'sinks or falls' if motion.down_m > 0 else 'rises'} by {moved}, {share}"
         else:
@@ -302,10 +316,13 @@ def settle(world: World) -> list[Rest]:
         for number in new:
             physics.float_body(number)
             found[number] = tested[number]
-        tested = let_fall(physics, REST_S)
-        stirring = {n: m for n, m in tested.items() if not m.rests and n not in found}
-        first = min((motion.left_s for motion in stirring.values()), default=0.0)
-        new = [n for n, motion in stirring.items() if motion.left_s <= first]
+        if len(found) == len(put):
+            break
+        tested = let_fall(physics, REST_S, after_s=AFTER_S)
+        new = first_to_stir(tested, found)
+        if not new and any(math.isfinite(motion.left_s) for motion in tested.values()):
+            tested = let_fall(physics, REST_S)  # it came back: all of the test says more
+            new = first_to_stir(tested, found)
         if not new:
             break
     rests = []
@@ -324,6 +341,13 @@ def settle(world: World) -> list[Rest]:
             )
         )
     return rests
+
+
+def first_to_stir(tested: Mapping[int, BodyMotion], kept: Container[int]) -> list[int]:
+    """The bodies that do not rest, and of those the ones that moved first; not those kept."""
+    stirring = {n: m for n, m in tested.items() if not m.rests and n not in kept}
+    first = min((motion.left_s for motion in stirring.values()), default=0.0)
+    return [n for n, motion in stirring.items() if motion.left_s <= first]
 
 
 def name_of(world: World, number: int | None) -> str:

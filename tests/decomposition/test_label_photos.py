@@ -17,7 +17,12 @@ from shapeshift.decomposition.masks.segmenter import Candidate, Prompt
 from shapeshift.decomposition.masks.specs import ObjectSpec, ObjectSpecs, PhotoPrompt
 from shapeshift.decomposition.masks.work_photos import find_photo, work_photos
 from shapeshift.decomposition.segment_scene import SegmentedPart
-from shapeshift.decomposition.walk_objects import heights_of, walk_objects, with_labels
+from shapeshift.decomposition.walk_objects import (
+    heights_of,
+    places_of,
+    walk_objects,
+    with_labels,
+)
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.runtime_models.model import AnchorModel, BadFile, ObjectLabel, Stop
 from tests.support.decomposition.demo_photos import (
@@ -257,14 +262,16 @@ def test_heights_tell_the_bench_from_what_stands_on_it(photos, specs):
     nodes = nodes_of(demo().model, np.array([0, 0.6, 1.8], np.float32))
     left, top, right, bottom = spec.prompts[0].box or (0, 0, 0, 0)
     prompt = Prompt((left, top, right, bottom))
-    (height,) = heights_of(demo(), photo.view, 0.0, [prompt], nodes)
+    places = places_of(demo(), photo.view, 0.0, nodes)
+    (height,) = heights_of(places, photo.view, [prompt], nodes)
     assert height is not None and height.dtype == np.uint8 and height.shape == true.shape
     box = np.s_[int(top) : int(bottom), int(left) : int(right)]
     mug, bench = height[box][true[box] == spec.label], height[box][true[box] == 0]
     assert np.percentile(mug, 20) > np.percentile(bench, 80)
     none = replace(nodes, means=np.random.default_rng(0).uniform(-1, 1, nodes.means.shape))
-    assert heights_of(demo(), photo.view, 0.0, [prompt], none) == [None]
-    assert heights_of(demo(), photo.view, 0.0, [], nodes) == []
+    scattered = places_of(demo(), photo.view, 0.0, none)
+    assert heights_of(scattered, photo.view, [prompt], none) == [None]
+    assert heights_of(places, photo.view, [], nodes) == []
 
 
 def test_photos_that_were_used_are_asked_only_without_others(photos):

@@ -34,7 +34,7 @@ from shapeshift.decomposition.masks.pixel_walk import PixelWalk, walk_together  
 from shapeshift.decomposition.masks.segmenter import Candidate, Prompt  # noqa: E402
 from shapeshift.decomposition.propagate import Support, propagate  # noqa: E402
 from shapeshift.decomposition.shown import ShownAnchors  # noqa: E402
-from shapeshift.decomposition.walk_objects import heights_of  # noqa: E402
+from shapeshift.decomposition.walk_objects import heights_of, places_of, ways_of  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
@@ -110,10 +110,12 @@ class Bench:
             box = (columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + 1 + MARGIN,
                    rows.max() + 1 + MARGIN)  # fmt: skip
             image = self.images[first][..., : 3 if given == "box" else 4]
-            prompt, heights = Prompt(box), None
+            prompt, heights, ways = Prompt(box), None, None
             if "height" in given:
-                heights = heights_of(self.shown, self.views[first], 0.0, [prompt], self.nodes)
-            (found,) = walk_together(image, [prompt], heights)
+                places = places_of(self.shown, self.views[first], 0.0, self.nodes)
+                heights = heights_of(places, self.views[first], [prompt], self.nodes)
+                ways = ways_of(places, self.views[first])
+            (found,) = walk_together(image, [prompt], heights, ways)
             assert found is not None, "it has a box"
             mask = found.mask
         support = Support.none(self.shown.count)

@@ -138,6 +138,11 @@ def test_what_a_mask_encloses_is_filled_unless_it_is_large(side, filled):
         side
     ):  # a hole that shows what lies around, or that is barred, stays one; a wanted speck, too
         assert not tidied(mask, like - 3, nothing, nothing)[20 : 20 + side, 20 : 20 + side].any()
+        # What lies as far away as its rim, half the hole's width at most, is no way through.
+        for behind, level in ((0, True), (0.49, True), (0.51, False), (-9, True), (np.nan, False)):
+            ways = np.where(mask, 1000.0, 1000 + behind * side)
+            found = tidied(mask, like - 3, nothing, nothing, ways)
+            assert found[20 : 20 + side, 20 : 20 + side].any() == (filled and level)
         barred = nothing.copy()
         barred[20, 20] = True
         assert not tidied(mask, like, barred, mask)[20 : 20 + side, 20 : 20 + side].any()

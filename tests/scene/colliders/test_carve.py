@@ -114,6 +114,16 @@ def test_what_is_not_looked_for_carves_and_is_not_solid(seen):
     ]  # fmt: skip
 
 
+def test_within_a_thing_nothing_is_solid(seen):
+    """The box as a thing that stands on no plane: a hull around it, and a cell off, is free."""
+    corners = np.stack(np.meshgrid(*np.stack([LOW, HIGH], 1)), -1).reshape(-1, 3)
+    mesh = carved_mesh(seen, 4000, [corners.astype(np.float32)])
+    assert is_watertight(mesh.faces)
+    away = np.maximum(np.maximum(LOW - mesh.vertices, mesh.vertices - HIGH), 0)
+    assert np.linalg.norm(away, axis=1).min() > 0.02  # metres; a cell has 53 mm
+    assert (np.abs(mesh.vertices[:, 0]) > 1.5).any()  # the floor stays
+
+
 @pytest.mark.parametrize("ends", [1, 2, 10])
 def test_more_than_so_many_rays_through_a_place_make_it_free(ends, monkeypatch):
     monkeypatch.setattr(carve, "LEAST_FREE", 0.5)  # a number that is exact

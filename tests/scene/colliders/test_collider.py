@@ -26,7 +26,12 @@ from shapeshift.scene.colliders.collider import (
     parts_volume,
 )
 from shapeshift.scene.colliders.collider_wrap import squared_distances
-from shapeshift.scene.colliders.convex_parts import MOST_VERTICES, SEARCH, cut_into_parts
+from shapeshift.scene.colliders.convex_parts import (
+    MOST_VERTICES,
+    SEARCH,
+    cut_into_parts,
+    cut_quickly,
+)
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from tests.support.models import make_random_model
 from tests.support.scene.collider_shapes import Cloud, distances, shapes, solid, splatted
@@ -291,6 +296,24 @@ def test_out_of_time_each_part_is_one_hull():
     hulls, finished = cut_into_parts(mesh, 16, lambda what, part: None, limit_s=0.0)
     assert not finished and len(hulls) == 2
     assert {round(float(h[:, 0].mean()), 1) for h in hulls} == {0.0, 0.3}
+
+
+def test_quick_cuts_cover_a_thing_and_no_more():
+    """An L of two bars, a box, two boxes apart; the volumes are those of their formulas."""
+    bars = [trimesh.creation.box((0.4, 0.1, 0.1)), trimesh.creation.box((0.1, 0.3, 0.1))]
+    bars[1].apply_translation((0.15, 0.2, 0))
+    box, far = trimesh.creation.box((0.2, 0.1, 0.1)), trimesh.creation.box((0.2, 0.1, 0.1))
+    far.apply_translation((0.5, 0, 0))
+    for meshes, volume, fewest in ((bars, 0.007, 2), ([box], 0.002, 1), ([box, far], 0.004, 2)):
+        both = trimesh.util.concatenate(meshes)
+        mesh = TriangleMesh(both.vertices.astype(np.float32), both.faces.astype(np.int32))
+        parts = cut_quickly(mesh, 16)
+        made = Collider(parts, mesh)
+        check_hulls(made)
+        assert fewest <= len(parts) <= 4 and uncovered(made, both) < 1e-3  # metres
+        # What hulls reach over cuts is counted twice: half the way between samples, 4 mm here.
+        assert volume * 0.98 < parts_volume(made) < volume * 1.15
+        assert len(cut_quickly(mesh, 1)) == 1
 
 
 def test_models_have_colliders_at_their_x(soon, tmp_path):

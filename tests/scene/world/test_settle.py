@@ -11,7 +11,15 @@ from shapeshift.scene.document.scene_file import SceneFile
 from shapeshift.scene.document.write_scene_file import write_scene_file
 from shapeshift.scene.world.follow import follow, reset_objects
 from shapeshift.scene.world.physics import Physics
-from shapeshift.scene.world.settle import MOST_INSIDE, TOUCHING_M, begin, push_apart, settle
+from shapeshift.scene.world.settle import (
+    AFTER_S,
+    MOST_INSIDE,
+    TOUCHING_M,
+    begin,
+    let_fall,
+    push_apart,
+    settle,
+)
 from tests.support.scene.physics_things import at, box, cup, run, table
 from tests.support.scene.world_scenes import BOX, HALF, item, model, place, real
 
@@ -118,6 +126,21 @@ def test_what_nothing_carries_floats_until_it_is_touched():
     for _ in range(2 * world.hz):
         world.step()
     assert place(world, "a")[1] < 0.2
+
+
+def test_of_what_moves_the_test_ends_when_it_is_known_how():
+    """A box whose middle is beside the edge of the one that carries it tips; how fast does not
+    change with the time that the test would have gone on."""
+    world = real(
+        item("a", position=(0, HALF, 0), static=True),
+        item("b", position=(1.3 * HALF, 3 * HALF, 0)),
+    )
+    (rest,) = settle(world)
+    assert rest.kept and not rest.motion.rests
+    assert rest.motion.after_s == pytest.approx(rest.motion.left_s + AFTER_S, abs=2 / world.hz)
+    assert f"in {rest.motion.after_s:.1f} s" in rest.sentence()
+    whole = let_fall(world.physics, 3.0, after_s=9.0)
+    assert all(motion.after_s == 3.0 for motion in whole.values())
 
 
 def floating(**changes):
