@@ -68,7 +68,7 @@ from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.captures.capture import Capture  # noqa: E402
 from shapeshift.scene.colliders.collider import Making  # noqa: E402
 from shapeshift.scene.colliders.collider_pieces import hull_faces  # noqa: E402
-from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume  # noqa: E402
+from shapeshift.scene.colliders.convex_parts import cut_quickly, hull_volume  # noqa: E402
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape  # noqa: E402
 from tools.decomposition.published_masks import prepare  # noqa: E402
 from tools.decomposition.segmenters import iou  # noqa: E402
@@ -81,7 +81,6 @@ from tools.synthetic.everyday_places import KINDS  # noqa: E402
 
 TESTS = 16  # photos in which silhouettes are held against masks
 RIGHT = 0.75  # IoU of an accepted mask with the true one
-PATIENCE_S = 1200.0  # for CoACD, on a machine that is busy
 SCENE_COLUMNS = (
     "capture", "masks", "given", "miou", "splats", "background", "objects", "object_splats",
     "share_percent", "export_s", "holes_before", "holes_after", "splats_added", "cpu_s",
@@ -283,7 +282,7 @@ def proxy_rows(device: Device, folder: Path, case: Case, found: Segmented) -> It
         begun = seconds_of_all()
         mesh = standing_mesh(one, x, mine, here, making)
         meshed = seconds_of_all()
-        pieces, _ = cut_into_parts(mesh, making.most_parts, making.report, PATIENCE_S)
+        pieces = cut_quickly(mesh, making.most_parts)
         if here is not None:
             pieces = tuple(p for p in pressed(pieces, here) if hull_volume(p) > 0)
         cut = seconds_of_all()
