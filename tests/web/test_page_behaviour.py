@@ -67,7 +67,7 @@ def test_a_palette_can_be_chosen_and_a_value_is_read(page):
     page.until("document.getElementById('reading').textContent.endsWith('°C')")
     box = "(({left, top, right, bottom}) => [left, top, right, bottom])"
     plate = f"{box}(document.getElementById('reading').getBoundingClientRect())"
-    left, top, right, bottom = page.run(plate)
+    left, _, _, bottom = page.run(plate)
     assert 0 < left - 240 <= 20 and 0 < 200 - bottom <= 20  # beside the pointer, not at the legend
     before = page.run("document.getElementById('reading').textContent")
     page.run("shapeshift.panel.setX(0.6), 1")  # the picture changes, the pointer rests
