@@ -18,7 +18,7 @@ from shapeshift.app.terminal import clean_streams, drop_output, print_text, say
 
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
-    "view": ("editor.desktop", "open a scene in a window"),
+    "view": ("editor.options", "open a scene in a window"),
     "render": ("commands.render", "draw a scene into PNG files, no window needed"),
     "film": ("film.film", "a flight through a scene that changes on the way, as a video"),
     "bench": ("commands.bench", "frame times and image error, no window needed"),
@@ -172,12 +172,13 @@ def _width() -> int:
 
 
 @contextlib.contextmanager
-def uncollected() -> Iterator[None]:
-    """An import leaves no garbage; looking for it takes a tenth of a start."""
+def importing() -> Iterator[None]:
+    """Uninterrupted, and an import leaves no garbage: looking for it takes a tenth of a start."""
     before = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with uninterrupted():
+            yield
     finally:
         if before:
             gc.enable()
@@ -276,7 +277,7 @@ def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.progress import lines
     from shapeshift.runtime_models.program import program
 
-    with uninterrupted(), uncollected():
+    with importing():
         module = importlib.import_module(f"shapeshift.app.{COMMANDS[command][0]}")
     prog = f"{program()} {command}"
     if wants_help(arguments):

@@ -1,4 +1,4 @@
-"""Options of launch.py view."""
+"""launch.py view: what may be asked, known before OpenGL is imported."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,3 +70,11 @@ class Options(DrawingOptions):
     the window stays."""
     frames: Annotated[int, EXPERT] = 3
     """How many frames to draw before the --screenshot."""
+
+
+def run(options: Options) -> int:
+    from shapeshift.app.cli import importing
+
+    with importing():
+        from shapeshift.app.editor import desktop
+    return desktop.run(options)

@@ -131,7 +131,7 @@ def test_x_is_a_number_a_name_a_way_or_a_blend_and_nothing_else(demo):
         with pytest.raises(ss.UsageError, match=r"^x: .*RGB, Thermal, Opened"):
             demo.at(wrong)
     for wrong in (-0.01, 1.01, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="0 to 1"):
+        with pytest.raises(ss.UsageError, match="0 to 1"):
             demo.at(wrong)
     for edge in (0.0, 1.0):
         assert demo.at(edge).x == edge
@@ -252,6 +252,24 @@ def test_cameras_are_words_files_views_and_lists(demo, tmp_path):
     assert demo.views(orbit[3]) == [orbit[3]]
     assert demo.views(orbit[3], size=(8, 8))[0].size == (8, 8)
     for wrong in ([], [1, 2], 7.5 * np.ones(2)):
+        with pytest.raises(ss.UsageError, match="a camera is 'orbit'"):
+            demo.views(wrong)
+    poses = np.array([view.world_from_eye.matrix() for view in orbit])
+    for given, views in ((poses, orbit), (poses.tolist(), orbit), (poses[2], orbit[2:3]),
+                         (poses[2].astype(np.float32), orbit[2:3])):  # fmt: skip
+        seen = demo.views(given)
+        assert len(seen) == len(views) and seen[0].tangents == demo.views("front")[0].tangents
+        for a, b in zip(seen, views, strict=True):
+            np.testing.assert_allclose(
+                a.world_from_eye.matrix(), b.world_from_eye.matrix(), atol=1e-6
+            )
+    assert demo.views(poses[0], size=(8, 8))[0].size == (8, 8)
+    mirror, moved = np.diag([1.0, 1, -1, 1]), np.eye(4)
+    moved[3, 0] = 1
+    for wrong in (2 * np.eye(4), mirror, moved, np.full((4, 4), np.nan), np.zeros((4, 4))):
+        with pytest.raises(ss.UsageError, match="a 4x4 of camera= is no rigid pose"):
+            demo.views(wrong)
+    for wrong in (np.eye(3), np.zeros((0, 4, 4)), [orbit[0], np.eye(4)], [[1, 2], [3]]):
         with pytest.raises(ss.UsageError, match="a camera is 'orbit'"):
             demo.views(wrong)
     with pytest.raises(ss.UsageError, match="count is 0"):
