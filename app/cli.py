@@ -18,7 +18,7 @@ from shapeshift.app.terminal import clean_streams, drop_output, print_text, say
 
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
-    "view": ("editor.options", "open a scene in a window"),
+    "view": ("editor.desktop", "open a scene in a window"),
     "render": ("commands.render", "draw a scene into PNG files, no window needed"),
     "film": ("film.film", "a flight through a scene that changes on the way, as a video"),
     "bench": ("commands.bench", "frame times and image error, no window needed"),
@@ -101,6 +101,7 @@ COMMANDS = {
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
     "extras": ("commands.extras", "optional parts of the program, listed or installed"),
 }
+OPTIONS = {"view": "editor.options"}  # where a command's module is long in coming
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
 CLAIMING = ("demo", "film", "fit", "lod", "poses", "segment", "style", "table", "train", "update")
 OPEN_ENDED = ("view", "vr", "serve", "cluster")  # they last as long as somebody looks
@@ -277,8 +278,9 @@ def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.progress import lines
     from shapeshift.runtime_models.program import program
 
+    own = COMMANDS[command][0]
     with importing():
-        module = importlib.import_module(f"shapeshift.app.{COMMANDS[command][0]}")
+        module = importlib.import_module(f"shapeshift.app.{OPTIONS.get(command, own)}")
     prog = f"{program()} {command}"
     if wants_help(arguments):
         defaults = module.defaults() if hasattr(module, "defaults") else {}
@@ -286,6 +288,8 @@ def run_command(command: str, arguments: list[str]) -> int:
         return 0
     options = begin_at_start(parse(module.Options, arguments, prog))
     settle_caches_for(command)
+    with importing():
+        module = importlib.import_module(f"shapeshift.app.{own}")
     if command in OPEN_ENDED:
         return module.run(options)
     with lines(command), claim_of(command, options):

@@ -70,11 +70,3 @@ class Options(DrawingOptions):
     the window stays."""
     frames: Annotated[int, EXPERT] = 3
     """How many frames to draw before the --screenshot."""
-
-
-def run(options: Options) -> int:
-    from shapeshift.app.cli import importing
-
-    with importing():
-        from shapeshift.app.editor import desktop
-    return desktop.run(options)
