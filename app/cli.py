@@ -64,10 +64,7 @@ COMMANDS = {
         "make a scene file's colliders once, into files that travel with it",
     ),
     "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
-    "poses": (
-        "commands.poses",
-        "photos without poses, or a video, to a capture for train",
-    ),
+    "poses": ("commands.poses", "photos without poses, or a video, to a capture for train"),
     "train": ("training.train", "posed photos of several modalities to a scene"),
     "update": (
         "training.update",
@@ -81,14 +78,8 @@ COMMANDS = {
         "training.fit",
         "the smallest scene that shows a capture as well as the largest, and why",
     ),
-    "eval": (
-        "training.evaluate",
-        "PSNR and SSIM of a scene on the held-out photos of a capture",
-    ),
-    "segment": (
-        "decomposition.segment",
-        "cut a scene into objects by label maps of its photos",
-    ),
+    "eval": ("training.evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
+    "segment": ("decomposition.segment", "cut a scene into objects by label maps of its photos"),
     "table": (
         "training.table",
         "one model compared with separate ones and plain splats: dB, bytes, seconds",
