@@ -75,7 +75,7 @@ def test_cells_of_a_hull_are_no_finer_than_the_photos():
 
 
 def test_of_large_photos_the_grid_decides():
-    photos = ball_photos(10, {}, (1280, 960))
+    photos = ball_photos(24, {}, (1280, 960))
     centre, half = common_box([view for view, _ in photos])
     hull = visual_hull(photos, centre, half)
     extent = np.ptp(hull, axis=0).max()
