@@ -16,7 +16,7 @@ from shapeshift.scene.pose import stereo_pair
 from tools.gpu.counting import COUNTS, counting_gl
 from tools.gpu.side_by_side import SIZE, at, count_quads, count_tiles, count_training, made_scenes
 
-ROWS = Path(__file__).resolve().parents[2] / "docs/bench/gpu_counts.csv"
+ROWS = Path(__file__).resolve().parents[3] / "docs/bench/gpu_counts.csv"
 MOST_UPLOADED = 8192  # bytes a frame of quads
 
 
