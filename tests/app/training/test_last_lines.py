@@ -27,7 +27,7 @@ WRITERS = [
         "written to {}/b.json\n",
     ),
     (
-        ("simulate", str(ROOT / "assets/touch.scene.json"), "--seconds", "0.02", "--out", "run"),
+        ("simulate", str(ROOT / "examples/touch.scene.json"), "--seconds", "0.02", "--out", "run"),
         "run.jsonl in {}/run\n",
     ),
     (("cameras", "view.json", "--out", "views.json"), "1 camera in {}/views.json\n"),
