@@ -187,16 +187,10 @@ def assemble(
         for label, proxy in proxies.items()
         if label in planes
     ]
-    loose = [
-        piece + part_of(model, label)[1]
-        for label, proxy in proxies.items()
-        if label not in planes
-        for piece in proxy.collider.parts
-    ]
     hollow = replace(making, hollow=True, faces=BACKGROUND_FACES)
     ground = ground_mesh(
         only_background(whole), looks, model.labels, list(planes.values()), x, hollow, standing,
-        seen, loose,
+        seen, loose_pieces(proxies, planes, model),
     )  # fmt: skip
     return Assembled(whole, proxies, ground, tuple(told), failed, planes)
 
@@ -260,6 +254,18 @@ def most_of(pictures: Sequence[LabelledView], label: int) -> list[LabelledView]:
     counts = [int((picture.labels == label).sum()) for picture in pictures]
     order = np.argsort(-np.array(counts), kind="stable")[:FINEST_PICTURES]
     return [pictures[i] for i in order if counts[i]]
+
+
+def loose_pieces(
+    proxies: dict[int, Proxy], planes: Mapping[int, Plane], model: AnchorModel
+) -> list[np.ndarray]:
+    """(V, 3) metres each, the model's frame: of the proxies of things that stand on no plane."""
+    return [
+        piece + part_of(model, label)[1]
+        for label, proxy in proxies.items()
+        if label not in planes
+        for piece in proxy.collider.parts
+    ]
 
 
 def corners_of(proxy: Proxy, model: AnchorModel, label: int) -> np.ndarray:

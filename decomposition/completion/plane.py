@@ -230,9 +230,7 @@ def footprint_of(
     covered = ndimage.binary_closing(grid.count > 0)
     stood = ndimage.binary_fill_holes(ndimage.binary_closing(foot, iterations=2))
     inside = ndimage.binary_fill_holes(covered | stood)  # never beyond the edge of the plane
-    low = looks.there & (labels != 0) & (grid.height < LOW_THINGS * looks.spacing_m)
-    beside = grow(there(low & (labels != label)))  # their own steps fill there
-    hole = grow(stood) & inside & ~(beside & ~stood)
+    hole = grow(stood) & inside
     if evidence is not None:
         hole &= ~seen_cells(grid, evidence, covered & ~hole) | (core & stood)
     stands = hole
@@ -240,6 +238,7 @@ def footprint_of(
         hole = with_shadow(hole, covered, inside, grid)
     outer = grow(hole, iterations=1 if shadows else 4)  # beyond the contact shadow
     ring = grow(outer, iterations=3) & ~outer & (grid.count > 0)
+    low = looks.there & (labels != 0) & (grid.height < LOW_THINGS * looks.spacing_m)
     usual = np.median(grid.count[grid.count > 0]) if grid.on.any() else 0.0
     thin = ndimage.uniform_filter(grid.count, 3) < 0.35 * usual
     light = grid.colors[..., :3].sum(2)

@@ -3,13 +3,16 @@
 import numpy as np
 from PIL import Image
 from scipy import sparse
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import binary_dilation, gaussian_filter
 
 from shapeshift.decomposition.masks.anchor_walk import conjugate_gradients
+from shapeshift.decomposition.masks.segmenter import Prompt
 
 CONTRAST = 6.0  # an edge of so many times the mean squared difference is e times weaker
 LEAST_WEIGHT = 1e-4
 BINS, BLUR = 12, 0.8  # of a channel's histogram; bins by which it is blurred
+LEVEL = 0.5  # of a hole's width: as far behind its rim it is a part of the object, of any colour
+RIM = 2  # pixels around a hole
 FLOOR = 1e-5  # share of a colour that was never seen
 INSIDE, OUTSIDE, UNKNOWN = 1, 0, -1
 Edges = tuple[np.ndarray, np.ndarray]  # weights (h, w - 1) to the right, (h - 1, w) downwards
@@ -103,3 +106,36 @@ def shares_of(index: np.ndarray, where: np.ndarray, channels: int) -> np.ndarray
     counts = np.bincount(index[where], minlength=BINS**channels).reshape((BINS,) * channels)
     smooth = gaussian_filter(counts.astype(float), BLUR)
     return (smooth / max(smooth.sum(), 1) + FLOOR).ravel()[index]
+
+
+def clicked(prompt: Prompt, shape: tuple[int, ...]) -> np.ndarray:
+    """seeds (h, w) int8: INSIDE and OUTSIDE where clicks are, a pixel around each."""
+    seeds = np.full(shape, UNKNOWN, np.int8)
+    for places, value in ((prompt.inside, INSIDE), (prompt.outside, OUTSIDE)):
+        for x, y in np.floor(places).astype(int):
+            seeds[max(y - 1, 0) : max(y + 2, 0), max(x - 1, 0) : max(x + 2, 0)] = value
+    return seeds
+
+
+def is_level(hole: np.ndarray, kept: np.ndarray, ways: np.ndarray) -> bool:
+    """Whether a hole (h, w) of a mask lies no farther behind its rim than a dent of its width."""
+    near = box_slices_of(hole, RIM)
+    hole, kept, ways = hole[near], kept[near], ways[near]
+    rim = ways[binary_dilation(hole, iterations=RIM) & kept]
+    rim, inner = rim[np.isfinite(rim)], ways[hole]
+    if not (len(rim) and np.isfinite(inner).mean() > 0.5):
+        return False
+    behind = np.nanmedian(inner) - np.median(rim)
+    return bool(behind <= LEVEL * np.sqrt(hole.sum()))
+
+
+def box_slices_of(plane: np.ndarray, margin: int) -> tuple[slice, slice]:
+    """The rows and columns of a plane (h, w) bool that is not empty, and so many around."""
+    ends = (np.flatnonzero(plane.any(axis))[[0, -1]] for axis in (1, 0))
+    rows, columns = (slice(max(low - margin, 0), high + margin + 1) for low, high in ends)
+    return rows, columns
+
+
+def box_slices(region: tuple[int, int, int, int]) -> tuple[slice, slice]:
+    left, top, right, bottom = region
+    return slice(top, bottom), slice(left, right)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation, label
+from scipy.ndimage import label
 
 from shapeshift.decomposition.masks.anchor_click import best_cut
 from shapeshift.decomposition.masks.pixel_grid import (
@@ -18,9 +18,12 @@ from shapeshift.decomposition.masks.pixel_grid import (
     UNKNOWN,
     Edges,
     box_in,
+    box_slices,
     cells_of,
+    clicked,
     edges_of,
     graph_of,
+    is_level,
     resized,
     shares_of,
     solve,
@@ -43,8 +46,6 @@ MOST, ROOM = 0.3, 0.25  # part of the photo that a click may mean; of its longer
 SPECK = 0.05  # of the largest part's pixels: smaller ones are left out
 HOLE = 0.15  # of the mask's pixels: smaller ones that it encloses may be filled
 STRANGE = -1.5  # mean log odds of a hole's colours, below which it shows what is behind
-LEVEL = 0.5  # of a hole's width: as far behind its rim it is a part of the object, of any colour
-RIM = 2  # pixels around a hole
 
 
 @dataclass(frozen=True)
@@ -101,9 +102,8 @@ def walk_together(
 ) -> list[Candidate | None]:
     """A mask a prompt, none of which overlap; None where a prompt says nothing of a place.
 
-    image (H, W, C) uint8.  heights: of each prompt (H, W) uint8, how high what the photo shows
-    stands above that on which the object stands.  ways (H, W): how far away that is, in pixels that
-    wide there, NaN: not known.  The order of the prompts changes nothing.
+    image (H, W, C) uint8.  heights: of each prompt (H, W) uint8, how high what is seen is over what
+    the object stands on; ways: of ways_of().  The order of the prompts changes nothing.
     """
     heights = heights or [None] * len(prompts)
     boxed = [with_box_of_mask(prompt) for prompt in prompts]
@@ -162,9 +162,9 @@ def tidied(
 ) -> np.ndarray:
     """Without specks beside the largest part, and without holes: a light on it, a label.
 
-    A hole stays whose colours are those around the object (odds (h, w)), unless it lies as far away
-    as its rim (ways (h, w), in pixels that wide): a handle shows the table behind, a face has eyes
-    of its colour; and one that has a place of `barred`.  A speck with a place of `wanted` stays.
+    A hole stays whose colours are those around the object (odds (h, w)), unless it is level with
+    its rim (ways (h, w)): a handle shows the table, eyes are the face's; and one that has a place
+    of `barred`.  A speck with a place of `wanted` stays.
     """
     parts, count = label(mask)
     if not count:
@@ -185,25 +185,6 @@ def tidied(
         for hole in np.flatnonzero(small & ~like):
             like[hole] = is_level(holes == hole, kept, ways)
     return kept | (small & like)[holes]
-
-
-def is_level(hole: np.ndarray, kept: np.ndarray, ways: np.ndarray) -> bool:
-    """Whether a hole (h, w) of a mask lies no farther behind its rim than a dent of its width."""
-    near = box_slices_of(hole, RIM)
-    hole, kept, ways = hole[near], kept[near], ways[near]
-    rim = ways[binary_dilation(hole, iterations=RIM) & kept]
-    rim, inner = rim[np.isfinite(rim)], ways[hole]
-    if not (len(rim) and np.isfinite(inner).mean() > 0.5):
-        return False
-    behind = np.nanmedian(inner) - np.median(rim)
-    return bool(behind <= LEVEL * np.sqrt(hole.sum()))
-
-
-def box_slices_of(plane: np.ndarray, margin: int) -> tuple[slice, slice]:
-    """The rows and columns of a plane (h, w) bool that is not empty, and so many around."""
-    ends = (np.flatnonzero(plane.any(axis))[[0, -1]] for axis in (1, 0))
-    rows, columns = (slice(max(low - margin, 0), high + margin + 1) for low, high in ends)
-    return rows, columns
 
 
 def owners(parts: list[WalkArea], claims: list[np.ndarray], shape: tuple[int, int]) -> np.ndarray:
@@ -250,11 +231,6 @@ def settled(part: WalkArea, other: WalkArea, mine: np.ndarray, theirs: np.ndarra
     share = solve(edges, seeds, (pull * prior + middle) / (pull + middle), pull + middle)
     out[top:bottom, left:right] = part.in_photo(share) > 0.5
     return out & mine & theirs
-
-
-def box_slices(region: tuple[int, int, int, int]) -> tuple[slice, slice]:
-    left, top, right, bottom = region
-    return slice(top, bottom), slice(left, right)
 
 
 def with_box_of_mask(prompt: Prompt) -> Prompt:
@@ -374,15 +350,6 @@ def part_of(
     part.inner = part.inner | (clicks > 0.5)
     part.outer = part.outer | (clicks < -0.5)
     return part
-
-
-def clicked(prompt: Prompt, shape: tuple[int, ...]) -> np.ndarray:
-    """seeds (h, w) int8: INSIDE and OUTSIDE where clicks are, a pixel around each."""
-    seeds = np.full(shape, UNKNOWN, np.int8)
-    for places, value in ((prompt.inside, INSIDE), (prompt.outside, OUTSIDE)):
-        for x, y in np.floor(places).astype(int):
-            seeds[max(y - 1, 0) : max(y + 2, 0), max(x - 1, 0) : max(x + 2, 0)] = value
-    return seeds
 
 
 def seeds_of(prompt: Prompt, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
