@@ -96,7 +96,7 @@ class Viewer:
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
-        more = (self.hooks, folders, self.open_soon)
+        more = (self.hooks, folders, self.open_soon, self.shell.actions)
         self.films = attach_films(window, state, self.viewpoint, *more)
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
@@ -170,7 +170,6 @@ class Viewer:
                 "Objects",
                 lambda scale: draw_objects(edits, saving, adding.ask, scale),
                 opens=objects.opens,
-                early=lambda: len(state.scene.objects) > 1,
             )
         )
         hooks.keys["Objects"] = list(OBJECT_KEYS)
@@ -280,8 +279,8 @@ class Viewer:
         size, scale = window.logical_size, window.ui_scale
         state.most_sliders = MOST_SLIDERS if size[1] >= LOW_WINDOW * scale else 1
         rows, wanted = len(state.sliders), self.settings.panel_open
-        both = state.split.on
-        return lay_out(size, scale, rows, state.has_legend, wanted, state.overlay, both)
+        shown = (wanted, state.overlay, state.split.on, self.hooks.film())
+        return lay_out(size, scale, rows, state.has_legend, *shown)
 
     def _free_wanted(self) -> np.ndarray:
         """(4,) pixels: the part of the window that the overlay leaves free."""
@@ -365,6 +364,7 @@ class Viewer:
                 ),
                 draw_slider_bar(state, layout.bar, scale),
                 draw_status(state, words, layout.status, scale),
+                *([self.films.panel.draw_strip(layout.strip, scale)] if layout.strip else ()),
                 *[box for draw in hooks.cards if (box := draw(layout.free, scale)) is not None],
             ]
         if not state.save_picture:  # what is said is no part of a picture
