@@ -1,4 +1,4 @@
-"""Options of launch.py view."""
+"""launch.py view: what may be asked, known before OpenGL is imported."""
 
 from dataclasses import dataclass
 from pathlib import Path

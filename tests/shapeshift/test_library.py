@@ -131,7 +131,7 @@ def test_x_is_a_number_a_name_a_way_or_a_blend_and_nothing_else(demo):
         with pytest.raises(ss.UsageError, match=r"^x: .*RGB, Thermal, Opened"):
             demo.at(wrong)
     for wrong in (-0.01, 1.01, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="0 to 1"):
+        with pytest.raises(ss.UsageError, match="0 to 1"):
             demo.at(wrong)
     for edge in (0.0, 1.0):
         assert demo.at(edge).x == edge

@@ -96,6 +96,28 @@ def test_ends_of_sizes_and_other_containers_are_taken(demo):
     assert demo.render(size=np.array([32, 24])).shape == demo.render(size=[32, 24]).shape
 
 
+def test_a_camera_is_a_4x4_of_transforms_json(demo):
+    orbit = demo.views("orbit", 5)
+    poses = np.array([view.world_from_eye.matrix() for view in orbit])
+    for given, views in ((poses, orbit), (poses.tolist(), orbit), (poses[2], orbit[2:3]),
+                         (poses[2].astype(np.float32), orbit[2:3])):  # fmt: skip
+        seen = demo.views(given)
+        assert len(seen) == len(views) and seen[0].tangents == demo.views("front")[0].tangents
+        for a, b in zip(seen, views, strict=True):
+            np.testing.assert_allclose(
+                a.world_from_eye.matrix(), b.world_from_eye.matrix(), atol=1e-6
+            )
+    assert demo.views(poses[0], size=(8, 8))[0].size == (8, 8)
+    mirror, moved = np.diag([1.0, 1, -1, 1]), np.eye(4)
+    moved[3, 0] = 1
+    for wrong in (2 * np.eye(4), mirror, moved, np.full((4, 4), np.nan), np.zeros((4, 4))):
+        with pytest.raises(ss.UsageError, match="a 4x4 of camera= is no rigid pose"):
+            demo.views(wrong)
+    for wrong in (np.eye(3), np.zeros((0, 4, 4)), [orbit[0], np.eye(4)], [[1, 2], [3]]):
+        with pytest.raises(ss.UsageError, match="a camera is 'orbit'"):
+            demo.views(wrong)
+
+
 def test_a_camera_that_is_no_sequence_is_refused(demo):
     for wrong in (3, 1.5, None):
         with pytest.raises(ss.UsageError, match="a camera is 'orbit'"):

@@ -23,10 +23,6 @@ WRITERS = [
     (("export", "random.shift", "--out", "b.shift"), "{}/b.shift: "),
     (("compare", "random.shift@0", "random.shift@1", "--out", "out", *SMALL), "sheets in {}/out\n"),
     (
-        ("bench", "random.shift", "--frames", "2", "--sweep", "2", "--json", "b.json", *SMALL),
-        "written to {}/b.json\n",
-    ),
-    (
         ("simulate", str(ROOT / "assets/touch.scene.json"), "--seconds", "0.02", "--out", "run"),
         "run.jsonl in {}/run\n",
     ),
