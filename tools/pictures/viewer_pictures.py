@@ -82,8 +82,8 @@ def main() -> None:
         tempfile.TemporaryDirectory() as pictures,
     ):
         for name, stop, sections, act in (
-            ("inspect.png", "Thermal", ("Stops", "Look", "Camera"), lay_marks),
-            ("measure.png", "RGB", ("Look", "Inspect", "Camera"), lay_lengths),
+            ("inspect.png", "Thermal", ("Stops", "Look", "Views"), lay_marks),
+            ("measure.png", "RGB", ("Look", "Inspect", "Views"), lay_lengths),
         ):
             viewer = viewer_on(window, renderer, read(DEMO), Path(pictures), stop)
             viewer.shell.actions.sections.update(dict.fromkeys(sections, False))

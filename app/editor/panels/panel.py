@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import item_label, section, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import (
+    centred_text,
+    item_label,
+    section,
+    symbol_button,
+    tip,
+)
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.layout import Layout
 from shapeshift.app.editor.texts.table import said
@@ -53,7 +59,7 @@ class Tool:
 
 TOOLS = (
     Tool("Slide", "\uf1de", "Stops, how all looks, views, regions with an x of their own.",
-         ("Stops", "Look", "Camera", "Regions"),
+         ("Stops", "Look", "Views", "Regions"),
          ("Slider", "Two stops at once", "Camera", "Regions")),
     Tool("Inspect", "\uf2c9", "Degrees: marks, isotherms, reports. Key Y.", ("Inspect", "Look"),
          ("Inspect",), "No stop of this scene shows values, such as heat."),
@@ -69,7 +75,7 @@ TOOLS = (
          ("Gallery", "Look"), (), "There is nothing to be styled."),
     Tool("Film", "\uf008", "Keys of the camera and of the slider, and the film of them.",
          ("Film",)),
-    Tool("Share", "\uf1e0", "Files for other programs.", ("Export",)),
+    Tool("Share", "\uf1e0", "Files for other programs.", ("Export", "Cameras")),
 )  # fmt: skip
 SETUP = Tool("Settings", "\uf013", "Units, speed and quality.",
              ("Settings", "Performance"))  # fmt: skip
@@ -185,19 +191,10 @@ def _tools(tool: Tool, actions: PanelActions, high: float, ui_scale: float) -> N
         ink = theme.color(theme.ACCENT if lit else theme.TEXT if hovered else theme.MUTED)
         middle, half = corner.x + wide / 2, y + cell * (0.4 if named else 0.5)
         size = min(SYMBOL_PX * ui_scale, 0.65 * cell)
-        _centred(each.symbol, Vec(middle, half), size, ink)
+        centred_text(each.symbol, Vec(middle, half), size, ink)
         if named:
             low_y = y + cell - 0.78 * NAME_PX * ui_scale
-            _centred(said(each.name), Vec(middle, low_y), NAME_PX * ui_scale, ink)
-
-
-def _centred(text: str, middle: imgui.ImVec2, size: float, ink: int) -> None:
-    """A line of a size of its own about a place."""
-    imgui.push_font(None, size)
-    room = imgui.calc_text_size(text)
-    at = Vec(middle.x - room.x / 2, middle.y - room.y / 2)
-    imgui.get_window_draw_list().add_text(at, ink, text)
-    imgui.pop_font()
+            centred_text(said(each.name), Vec(middle, low_y), NAME_PX * ui_scale, ink)
 
 
 def _scrolling(
@@ -269,7 +266,7 @@ def _title(title: str, actions: PanelActions, ui_scale: float) -> None:
     imgui.pop_text_wrap_pos()
     below = imgui.get_cursor_pos()
     imgui.set_cursor_pos(Vec(start.x + room - 3 * side, start.y - 2 * ui_scale))
-    if _symbol("globe", GLOBE, side, False):
+    if symbol_button("globe", GLOBE, side, False):
         imgui.open_popup(LANGUAGES)
     tip("Language", ui_scale)
     if imgui.begin_popup(LANGUAGES):
@@ -277,7 +274,7 @@ def _title(title: str, actions: PanelActions, ui_scale: float) -> None:
         imgui.end_popup()
     imgui.set_cursor_pos(Vec(start.x + room - 2 * side, start.y - 2 * ui_scale))
     chosen = actions.tool() == SETUP.name
-    if _symbol("setup", SETUP.symbol, side, chosen):
+    if symbol_button("setup", SETUP.symbol, side, chosen):
         actions.choose(TOOLS[0].name if chosen else SETUP.name)
     tip(SETUP.what, ui_scale)
     imgui.set_cursor_pos(Vec(start.x + room - side, start.y - 2 * ui_scale))
@@ -285,16 +282,6 @@ def _title(title: str, actions: PanelActions, ui_scale: float) -> None:
         actions.fold(True)
     tip("Fold the panel; H hides all there is.", ui_scale)
     imgui.set_cursor_pos(below)
-
-
-def _symbol(name: str, symbol: str, side: float, lit: bool) -> bool:
-    """A square with a letter of the font of symbols; True when it was clicked."""
-    corner = imgui.get_cursor_screen_pos()
-    clicked = imgui.invisible_button(name, Vec(side, side))
-    ink = theme.ACCENT if lit or imgui.is_item_hovered() else theme.MUTED
-    middle = Vec(corner.x + side / 2, corner.y + side / 2)
-    _centred(symbol, middle, 0.6 * side, theme.color(ink))
-    return clicked
 
 
 def _folded(actions: PanelActions, side: float, plain: int, ui_scale: float) -> Box:

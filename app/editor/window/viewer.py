@@ -10,7 +10,11 @@ from shapeshift.app.editor.panels.legend_panel import draw_legend
 from shapeshift.app.editor.panels.outlines import draw_brush, draw_doubts, draw_outlines, draw_ups
 from shapeshift.app.editor.panels.panel import Section, draw_panel
 from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
-from shapeshift.app.editor.panels.sections.camera_panel import draw_cameras, draw_edges
+from shapeshift.app.editor.panels.sections.camera_panel import (
+    draw_cameras,
+    draw_edges,
+    draw_kept_views,
+)
 from shapeshift.app.editor.panels.sections.export_panel import draw_export
 from shapeshift.app.editor.panels.sections.objects_panel import draw_objects
 from shapeshift.app.editor.panels.sections.plain_sections import plain_sections
@@ -64,9 +68,8 @@ LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took lo
 
 
 class Viewer:
-    """One window, one renderer, one state, one viewpoint, and the loop that ties them.
-
-    Makes the parts; each is handed the state that it reads and what it may call.
+    """One window, one renderer, one state, one viewpoint, and the loop that ties them; makes the
+    parts, each of which is handed the state that it reads and what it may call.
     """
 
     def __init__(
@@ -128,8 +131,6 @@ class Viewer:
         self._told: tuple = ()  # what is said and asked, as it was drawn last
         self.frames, self._overlay_ms = 0, 0.0  # drawn since the window opened, of the last one
 
-    # ---- the parts
-
     def _attach_files(self) -> Files:
         hooks, state = self.hooks, self.state
         actions = OpenActions(
@@ -177,18 +178,17 @@ class Viewer:
 
     def _attach_cameras_and_export(self, folders: WorkFolders) -> None:
         hooks, state, viewpoint = self.hooks, self.state, self.viewpoint
-        hooks.sections.append(
-            Section("Camera", lambda scale: draw_cameras(state, viewpoint, scale), open_first=True)
-        )
         hooks.status.append(lambda: viewpoint.steps.text)
         hooks.marks.append(lambda scale: draw_edges(state, viewpoint, scale))
         exporting = self.exporting = Exporting(state, viewpoint, folders.exports)
-        hooks.sections.append(Section("Export", lambda scale: draw_export(exporting, state, scale)))
+        hooks.sections += [
+            Section("Views", lambda scale: draw_cameras(state, viewpoint, scale), open_first=True),
+            Section("Export", lambda scale: draw_export(exporting, state, scale)),
+            Section("Cameras", lambda scale: draw_kept_views(viewpoint, scale), open_first=True),
+        ]
         hooks.each_frame.append(exporting.poll)
         hooks.opened.append(exporting.forget)
         hooks.status.append(exporting.status)
-
-    # ---- frames
 
     def loop(self) -> None:
         """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
