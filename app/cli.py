@@ -319,7 +319,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def answer(arguments: list[str]) -> int:
-    from shapeshift.app.paths import plain, plain_path
+    from shapeshift.app.paths import plain, plain_path, what_replaced
 
     arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] == ["help"] and len(arguments) == 2:
@@ -333,6 +333,8 @@ def answer(arguments: list[str]) -> int:
         print_text(f"shapeshift {version()}")
         return 0
     command, rest = choose(arguments)
+    if replaced := next(filter(None, map(what_replaced, rest)), ""):
+        return refuse(f"{command}: {replaced}")
     named = rest[0] if rest else "-"  # an address is left to the readers, who say what to do
     known = named.startswith("-") or "://" in named or plain(named).exists()
     if command == "view" and not known:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import shapeshift as ss
+from tests.support.touch_scene import TOUCH
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def test_what_is_no_path_is_refused(demo, call, wrong, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda demo: ss.lint(ss.TOUCH, up="+Z"), "up is for one model; in touch"),
+        (lambda demo: ss.lint(TOUCH, up="+Z"), "up is for one model; in touch"),
         (lambda demo: ss.lint(ss.DEMO, memory_gb=-1), "memory is -1, expected GB"),
         (lambda demo: ss.lod(demo, "a", leaf=63), "leaf is 63, expected 64"),
         (lambda demo: ss.lod(demo, "a", sh_degree=4), "sh_degree is 4, expected 0"),
@@ -52,7 +53,7 @@ def test_what_is_no_path_is_refused(demo, call, wrong, tmp_path, monkeypatch):
         (lambda demo: ss.fit("capture", seeds=0), "seeds is 0; it has to be"),
         (lambda demo: ss.fit("capture", tolerance_db=float("nan")), "tolerance_db is nan; it"),
         (lambda demo: ss.fit("capture", anchor=3), "did you mean"),
-        (lambda demo: ss.colliders(ss.TOUCH, "a.scene.json"), 'has "hulls" as its collider'),
+        (lambda demo: ss.colliders(TOUCH, "a.scene.json"), 'has "hulls" as its collider'),
         (lambda demo: ss.stability(demo, "a", cases=["no"]), "cases: there is no case 'no'"),
         (lambda demo: demo.thermal(out="a.jpg"), r"out is a\.jpg; a file \.png is wanted"),
         (lambda demo: demo.thermal(spott="a"), "there is no option 'spott'; there are above"),
