@@ -44,11 +44,11 @@ def settle(viewer: Viewer) -> None:
 def lay_marks(viewer: Viewer, hands: RealHands) -> None:
     """Three spots, a box and a line, in logical pixels of the window."""
     hands.key("y")
-    for place in ((746, 262), (731, 385), (931, 300)):
+    for place in ((734, 262), (700, 385), (911, 300)):
         hands.click(*place)
-    hands.drag((631, 260), (721, 340))
+    hands.drag((624, 260), (710, 338))
     hands.hold_key("Shift_L", True)
-    hands.drag((631, 425), (991, 425))
+    hands.drag((624, 423), (968, 423))
     hands.hold_key("Shift_L", False)
     settle(viewer)
     viewer.inspecting.bound("above", ABOVE_C)
@@ -62,8 +62,8 @@ def lay_lengths(viewer: Viewer, hands: RealHands) -> None:
     for kind, places in (
         ("distance", ((483, 238), (608, 236))),
         ("area", ((381, 465), (489, 405), (731, 405), (671, 470), (381, 465))),
-        ("angle", ((831, 330), (831, 395), (897, 388))),
-        ("distance", ((846, 182), (936, 437))),
+        ("angle", ((815, 330), (815, 393), (878, 386))),
+        ("distance", ((829, 185), (915, 434))),
     ):
         ruler.choose_kind(kind)
         run_frames(viewer, 1)
