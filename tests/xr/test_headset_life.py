@@ -111,6 +111,7 @@ def test_a_runtime_that_goes_away_is_one_sentence(served, start):
         served.kill_runtime()
         report = program.end()
     assert (report["code"], report["ended"]) == (NO_HEADSET, "runtime lost")
+    assert len(report["eyes"]) == 2 and report["depth"]  # what was known of it, it still says
     assert report["states"][-1] == "FOCUSED"
     said = [line for line in program.told().splitlines() if line.startswith("shapeshift")]
     assert len(said) == 1 and "Monado" in said[0] and "went away" in said[0], said
