@@ -277,12 +277,12 @@ def run_command(command: str, arguments: list[str]) -> int:
         defaults = module.defaults() if hasattr(module, "defaults") else {}
         print_text(help_text(module.Options, prog, defaults))
         return 0
-    options = begin_at_start(parse(module.Options, arguments, prog))
+    options: Any = begin_at_start(parse(module.Options, arguments, prog))
     settle_caches_for(command)
     if command == "view":
         from shapeshift.app.page.serve import view
 
-        return view(options)
+        return view(options, has_display(), importing)
     with importing():
         module = importlib.import_module(f"shapeshift.app.{own}")
     if command in OPEN_ENDED:

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -205,11 +206,13 @@ TAKEN_OVER = ("scenes", "x")  # of view's options; those of reading, too
 OF_THE_WINDOW = ("browser", "panel", "pictures")  # options that a page has no use for
 
 
-def view(options: "ViewOptions") -> int:
-    """In a window; where there can be none, or a browser was asked for, as a page in it."""
-    from shapeshift.app.cli import has_display, importing
+def view(
+    options: "ViewOptions", display: bool, importing: Callable[[], AbstractContextManager[None]]
+) -> int:
+    """In a window; where there can be none, or a browser was asked for, as a page in it.
 
-    display = has_display()
+    importing: what the window's modules are imported in.
+    """
     asked = "A browser was asked for." if options.browser else ""
     if why := asked or ("" if display else "No display here."):
         code = view_in_browser(options, why, display)
@@ -254,7 +257,7 @@ def browse(view: "ViewOptions", why: str, browser: "BaseBrowser | None") -> int:
 
     Without a browser the address is for one elsewhere, by a tunnel.  Raises UsageError, BadFile.
     """
-    scenes = view.scenes or (TOUCH,)
+    scenes = list(view.scenes) or [TOUCH]
     if len(scenes) > 1:
         raise UsageError(f"{why} The page shows one scene; name one of the {len(scenes)}.")
     reading = {each.name: getattr(view, each.name) for each in fields(ReadingOptions)}
