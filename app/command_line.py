@@ -24,6 +24,7 @@ import typing
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields, replace
 from functools import cache, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 Options = TypeVar("Options", bound="DataclassInstance")
 LIKE = 0.7  # of difflib's ratio, of words without dashes: as alike a word is taken for a slip
 #           of the hand; one changed or two swapped letters of four have 0.75
+AS_JSON = "--json"  # one rule in all commands: a switch, its JSON stands alone on standard output
 SWITCHED = {"True": True, "False": False}  # a switch may be followed by either
 NUMBER = re.compile(r"-[\d.]")  # how a value begins that is no option
 
@@ -133,8 +135,13 @@ def parse(kind: type[Options], words: Sequence[str], prog: str) -> Options:
     """
     arguments = arguments_of(kind)
     known = {name: each for each in arguments for name in _spellings(each)}
-    values, loose = _values_of(words, known, partial(_refuse_unknown, kind, prog))
-    values |= _place([each for each in arguments if each.opt.positional], loose, prog)
+    values, loose = _values_of(words, known, partial(_refuse_unknown, kind, prog), prog)
+    alone = [each for each in arguments if each.opt.positional]
+    places = float("inf") if any(each.many for each in alone) else len(alone)
+    for word, after in pairwise(words):
+        if word == AS_JSON in known and after in loose and len(loose) > places:
+            _refuse_json_file(after, prog)
+    values |= _place(alone, loose, prog)
     missing = [a for a in arguments if a.required and a.field.name not in values]
     _refuse_missing(missing, values, shlex.join([*prog.split(), *loose]))
     for each in arguments:
@@ -239,7 +246,7 @@ _EXPECTED = {int: "a whole number", float: "a number", Path: "a path"}
 
 def _values_of(
     words: Sequence[str], known: Mapping[str, Argument],
-    refuse: Callable[[str, Sequence[str]], NoReturn],
+    refuse: Callable[[str, Sequence[str]], NoReturn], prog: str,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """Values by field of the options among the words, and the words that are none.
 
@@ -264,6 +271,8 @@ def _values_of(
         if each.kind is bool:
             said = value if sign else rest.pop(0) if rest and rest[0] in SWITCHED else "True"
             if said not in SWITCHED:
+                if name == AS_JSON:
+                    _refuse_json_file(value, prog)
                 raise UsageError(f"{name} is a switch and takes no value; leave '={value}' out.")
             values[each.field.name] = (name == each.name) == SWITCHED[said]
             continue
@@ -274,6 +283,15 @@ def _values_of(
         else:
             values[each.field.name] = found if each.is_tuple else found[0]
     return values, loose
+
+
+def _refuse_json_file(path: str, prog: str) -> NoReturn:
+    """Raises UsageError for a file after --json, which some commands once wrote to."""
+    file = shlex.quote("FILE.json" if path in ("", "-") else path)
+    raise UsageError(
+        f"--json is a switch that prints to standard output: `{prog} ... --json > {file}` for "
+        f"a file, and no '{path}' after it."
+    )
 
 
 def _following(each: Argument, rest: list[str]) -> list[str]:

@@ -21,6 +21,8 @@ class Page {
         if (!gl) throw new Error("this browser offers no WebGL2");
         this.gl = gl;
         this.wanted = true;
+        /** @type {number[] | null} */ this.pointed = null;  // pixels of the window, of the picture
+        this.unread = false;  // the value at the pointer is of an earlier picture or place
         this.before = this.linked = this.readAt = this.asked = 0;
         /** @type {any} */ this.headset = null;  // while it draws, the page does not
         this.redraw = () => { this.wanted = true; };
@@ -62,9 +64,12 @@ class Page {
             canvas.height = height;
             this.wanted = true;
         }
+        if (!this.wanted) this.read(time);
         if (!this.wanted || this.gl.isContextLost()) return;
         this.wanted = false;
         renderer.draw([{ worldFromEye: camera.pose, tangents: perspective(camera.fovY, [width, height]), near: NEAR_PART * renderer.scene.radius, viewport: [0, 0, width, height] }]);
+        this.unread = true;
+        this.read(time);
         clearTimeout(this.linked);
         this.linked = setTimeout(() => keepLink(linkOf(camera, renderer)), LINK_MS);
     }
@@ -101,12 +106,20 @@ class Page {
         camera.zoom(Math.hypot(...point.map((value, i) => value - camera.pose.position[i])) / camera.distance);
     }
 
-    /** The value of a stop under the pointer. @param {PointerEvent} e */
-    read(e) {
-        if (e.buttons || e.timeStamp - this.readAt < READING_MS || byId("legend").hidden) return;
-        this.readAt = e.timeStamp;
-        const { clientWidth, clientHeight } = this.canvas;
-        this.panel?.read(this.renderer?.valueAt(e.offsetX / clientWidth, 1 - e.offsetY / clientHeight) ?? null);
+    /** Where the value of a stop is wanted: under a pointer at rest or moving, at a finger's last tap. @param {PointerEvent} e */
+    point(e) {
+        this.pointed = e.buttons || e.type === "pointerleave" ? null : [e.clientX, e.clientY, e.offsetX, e.offsetY];
+        this.unread = true;
+    }
+
+    /** The value there, of the picture as it is now, on a plate at the pointer. @param {number} time  milliseconds */
+    read(time) {
+        if (!this.unread || time - this.readAt < READING_MS) return;
+        this.readAt = time;
+        this.unread = false;
+        const [left, top, across, down] = this.pointed ?? [0, 0, 0, 0], { clientWidth, clientHeight } = this.canvas;
+        const shown = this.pointed && !byId("legend").hidden;
+        this.panel?.read((shown ? this.renderer?.valueAt(across / clientWidth, 1 - down / clientHeight) : null) ?? null, [left, top]);
     }
 
     /** Buttons and keys of the whole page. */
@@ -128,7 +141,8 @@ class Page {
         byId("share").addEventListener("click", share);
         byId("touch").addEventListener("click", () => toggle("touch", "aria-pressed"));
         if (!document.fullscreenEnabled) byId("full").hidden = true;
-        this.canvas.addEventListener("pointermove", (e) => this.read(e));
+        for (const name of /** @type {const} */ (["pointermove", "pointerleave", "pointerdown", "click"]))
+            this.canvas.addEventListener(name, (e) => this.point(/** @type {PointerEvent} */ (e)));
         document.addEventListener("keydown", (e) => {
             if (e.ctrlKey || e.metaKey || e.altKey || (e.target instanceof HTMLSelectElement)) return;
             const stop = /^[1-9]$/.test(e.key) && this.panel?.stops[Number(e.key) - 1], button = e.target instanceof HTMLButtonElement;

@@ -6,6 +6,7 @@ import { Shift, Sweep, snap } from "./control.js";
 /** @typedef {import("./renderer/stops.js").Control} Control */
 
 const NEAR = 0.005;  // of the slider: at a stop
+const PLATE_AWAY = 14;  // pixels of the window from the pointer to the plate with its value
 
 /** @param {string} id @returns {any} */
 export const byId = (id) => document.getElementById(id);
@@ -168,9 +169,15 @@ export class Panel {
         box.style.opacity = Math.min(1, 0.3 + 2 * found.weight);
     }
 
-    /** The value of a place of the picture beside the legend; null: there is none. @param {number | null} intensity  0..1 */
-    read(intensity) {
-        const found = this.renderer.measured(this.shown), [low, high] = found?.stop.valueRange ?? [0, 1];
-        byId("reading").textContent = found && intensity !== null ? `${(low + (high - low) * intensity).toFixed(Math.min(9, found.stop.digits ?? 1))} ${found.stop.unit}` : "";
+    /**
+     * The value of a place of the picture, on a plate above it that stays within the window; null: there is none.
+     * @param {number | null} intensity  0..1
+     * @param {[number, number]} place  pixels of the window
+     */
+    read(intensity, [left, top]) {
+        const found = this.renderer.measured(this.shown), [low, high] = found?.stop.valueRange ?? [0, 1], plate = byId("reading");
+        plate.textContent = found && intensity !== null ? `${(low + (high - low) * intensity).toFixed(Math.min(9, found.stop.digits ?? 1))} ${found.stop.unit}` : "";
+        plate.style.left = `${Math.max(0, Math.min(left + PLATE_AWAY, innerWidth - plate.offsetWidth))}px`;
+        plate.style.top = `${Math.max(0, top - PLATE_AWAY - plate.offsetHeight)}px`;
     }
 }

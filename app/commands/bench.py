@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import DrawingOptions
-from shapeshift.app.paths import full
-from shapeshift.app.terminal import open_console, print_json, say
+from shapeshift.app.terminal import open_console, print_json
 from shapeshift.runtime_models.program import portable_program
 
 if TYPE_CHECKING:
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.renderer.settings import RenderSettings
 
-STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
 
 
@@ -28,8 +26,8 @@ class Options(DrawingOptions):
 
     scene: Annotated[Path, POSITIONAL]
     """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""
-    json: Path | None = None
-    """File for the result; - writes it to standard output.  Default: only the table."""
+    json: bool = False
+    """Print the result as JSON on standard output."""
     frames: int = 60
     """Frames of the orbit, mono and stereo each, after 3 that do not count."""
     sweep: int = 200
@@ -70,8 +68,6 @@ def run(options: Options) -> int:
     check_counts(options)
     if budget and (options.settings or options.target):
         raise UsageError("--target-ms chooses the setting; leave --settings and --target out.")
-    if options.json not in (None, STANDARD_OUTPUT):
-        check_result_path(options.json)
     subject = open_document(options.scene, options)
     if options.x:
         subject = subject.placed(options.x)
@@ -87,11 +83,8 @@ def run(options: Options) -> int:
         work = Measure(renderer, ctx, subject, None, size)
         result = measure(work, options, quality_size)
     print_table(result)
-    if options.json == STANDARD_OUTPUT:
+    if options.json:
         print_json(result)
-    elif options.json is not None:
-        write_json(options.json, result)
-        say(f"written to {full(options.json)}")
     return 0
 
 
@@ -182,7 +175,7 @@ def print_table(result: dict) -> None:
         "x sweep": result["sweep_ms"],
     }
     if touch := result.get("touch"):
-        rows |= {"touch scene": touch["frame_ms"], "its physics": touch["physics_ms"]}
+        rows |= {"in motion": touch["frame_ms"], "its physics": touch["physics_ms"]}
     last = list(rows)[-1]
     rows |= result["passes"]
     table = Table("ms", "p50", "p95", "p99")

@@ -26,8 +26,8 @@ class Options(ReadingOptions):
     modality: Annotated[str | None, MODALITY] = None
     """Only this modality of the capture, for a scene that was trained on that alone.  Default:
     all."""
-    json: Path | None = None
-    """File for the result; - writes it to standard output.  Default: only the table."""
+    json: bool = False
+    """Print the result as JSON on standard output."""
     downscale: int | None = None
     """Divide the photos' sides by this number.  Default: as in the training, if the scene knows it,
     else such that neither exceeds 640 pixels."""
@@ -43,9 +43,7 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.commands.bench import write_json
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.paths import full
     from shapeshift.app.progress import working
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.document.scene_file import is_scene_file
@@ -85,11 +83,8 @@ def run(options: Options) -> int:
             f"Photos made {downscale} times smaller, as in the training; --downscale 1 takes them "
             "whole."
         )
-    if options.json == Path("-"):
+    if options.json:
         print_json(result)
-    elif options.json is not None:
-        write_json(options.json, result)
-        say(f"written to {full(options.json)}")
     return 0
 
 

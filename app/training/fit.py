@@ -44,8 +44,8 @@ class Options(ClusterOptions, MachineOptions):
     """dB that each modality may lose in all against the largest model, its error included."""
     seeds: int = 2
     """Trainings of every trial.  Two seeds of one model differ by about 0.2 dB."""
-    json: Path | None = None
-    """File for the report; - writes it to standard output.  Default: only the table."""
+    json: bool = False
+    """Print the report as JSON on standard output."""
     iterations: int | None = None
     """Steps of every training.  Default: 600."""
     seconds: float | None = None
@@ -70,7 +70,6 @@ CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.commands.bench import write_json
     from shapeshift.app.opening import open_capture
     from shapeshift.app.pace import with_pace
     from shapeshift.app.paths import full
@@ -106,11 +105,8 @@ def run(options: Options) -> int:
     size = write_fitted(with_pace(noted_model(need, capture)), need, options.out)
     print_report(need)
     say(f"{full(options.out)}: {size:,} bytes, {WRITTEN}")
-    if options.json == Path("-"):
+    if options.json:
         print_json(result)
-    elif options.json is not None:
-        write_json(options.json, result)
-        say(f"written to {full(options.json)}")
     return 0
 
 

@@ -19,13 +19,16 @@ PLAIN = SceneItem(name="plain", model="plain")
 
 def write_scene_file(file: SceneFile, path: str | Path) -> None:
     """Atomic.  What has its usual value is left out; relative paths follow to another folder."""
-    path = Path(path)
+    write_whole(Path(path), scene_bytes(file, Path(path).parent))
+
+
+def scene_bytes(file: SceneFile, folder: Path) -> bytes:
+    """What is written into that folder.  ValueError for numbers that JSON has not."""
     out = head_row(file)
     if file.background:
-        out["background"] = background_item_row(file.background, file, path.parent)
-    out["objects"] = [item_row(item, file, path.parent) for item in file.items]
-    text = json.dumps(out, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_whole(path, text.encode())
+        out["background"] = background_item_row(file.background, file, folder)
+    out["objects"] = [item_row(item, file, folder) for item in file.items]
+    return (json.dumps(out, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
 def head_row(file: SceneFile) -> dict:

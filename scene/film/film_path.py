@@ -247,5 +247,9 @@ def film_rows(path: FilmPath) -> dict:
 
 def write_film_file(film: FilmPath, path: Path) -> None:
     """Whole or not at all."""
-    text = json.dumps(film_rows(film), indent=1, ensure_ascii=False) + "\n"
-    write_whole(path, text.encode())
+    write_whole(path, film_bytes(film))
+
+
+def film_bytes(film: FilmPath) -> bytes:
+    """What is written."""
+    return (json.dumps(film_rows(film), indent=1, ensure_ascii=False) + "\n").encode()

@@ -6,7 +6,7 @@ the ends themselves; by object, since each has an emissivity of its own.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -127,6 +127,13 @@ class Laying:
         first, mean = coldest[2], total / counted
         ends = (float(first) if np.isfinite(first) else -np.inf, float(hottest[3]))
         return MarkFigures(float(coldest[0]), mean, float(hottest[1]), ends), hottest[4]
+
+    def of_objects(self, names: Mapping[str, str]) -> "Laying":
+        """The same with objects under other names; itself where it has none of them."""
+        if not any(part.object in names for part in self.parts):
+            return self
+        parts = (replace(part, object=names.get(part.object, part.object)) for part in self.parts)
+        return replace(self, parts=tuple(parts))
 
     def words(self) -> str:
         """The moment for people: 2026-11-29 14:05."""

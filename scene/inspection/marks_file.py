@@ -339,4 +339,9 @@ def marks_rows(file: MarksFile) -> dict:
 
 def write_marks_file(file: MarksFile, path: Path) -> None:
     """Whole or not at all."""
-    write_whole(path, (json_text(marks_rows(file)) + "\n").encode())
+    write_whole(path, marks_bytes(file))
+
+
+def marks_bytes(file: MarksFile) -> bytes:
+    """What is written."""
+    return (json_text(marks_rows(file)) + "\n").encode()

@@ -1,10 +1,12 @@
 """The command table: what is chosen, what is refused, and that nobody sees a traceback."""
 
+import importlib
 from pathlib import Path
 
 import pytest
 
 from shapeshift.app import cli
+from shapeshift.app.command_line import arguments_of
 from shapeshift.runtime_models.model import BadFile
 from tests.support.program import ROOT, assert_refused, launch
 
@@ -27,6 +29,25 @@ def test_every_command_is_there_and_has_help():
         done = launch(name, "--help")
         assert done.returncode == 0, done.stderr
         assert "usage" in done.stdout.lower()
+
+
+def test_json_is_a_switch_of_every_command_that_has_it(capsys):
+    """A file after it is refused with the spelling that writes one, before anything is opened."""
+    kinds = {name: importlib.import_module(f"shapeshift.app.{m}").Options
+             for name, (m, _) in cli.COMMANDS.items()}  # fmt: skip
+    found = {name: {a.name: a for a in arguments_of(kind)} for name, kind in kinds.items()}
+    having = {name: known for name, known in found.items() if "--json" in known}
+    assert {"bench", "eval", "fit", "info", "lint", "measure", "poses"} <= having.keys()
+    for name, known in having.items():
+        assert known["--json"].kind is bool, name
+        alone = [a for a in known.values() if a.opt.positional]
+        words = [name, *("a.shift" for _ in alone)]
+        assert cli.main([*words, "--json=b.json"]) == 2
+        told = capsys.readouterr()
+        assert f"{name} ... --json > b.json` for a file" in told.err and told.out == ""
+        if not any(a.many for a in alone):
+            assert cli.main([*words, "--json", "b.json"]) == 2
+            assert capsys.readouterr() == told
 
 
 def test_help_names_every_command():

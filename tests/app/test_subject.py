@@ -104,12 +104,12 @@ def matrix_of(view) -> np.ndarray:
 
 def test_bench(scene, tmp_path, capsys):
     small = ("--frames", 3, "--sweep", 3, "--size", "64x48", "--quality-size", "32x24")
-    assert run("bench", scene, *small, "--json", tmp_path / "a.json") == 0
-    result = json.loads((tmp_path / "a.json").read_text())
+    assert run("bench", scene, *small, "--json") == 0
+    result = json.loads(capsys.readouterr().out)
     assert (result["objects"], result["splats"], result["x"]) == (5, 1700, None)
     assert result["psnr_db"] > 60 and result["quality_images"] == 3 + 5  # x 0 to 1 by quarters
-    assert run("bench", scene, *small, "--x", 1, "--json", tmp_path / "b.json") == 0
-    assert json.loads((tmp_path / "b.json").read_text())["x"] == 1
+    assert run("bench", scene, *small, "--x", 1, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["x"] == 1
     assert run("bench", scene, *small, "--settings", "nope") == 2
     capsys.readouterr()
     refused(capsys, "--up is for one model", "bench", scene, *small, "--up=+Z")

@@ -15,7 +15,7 @@ from shapeshift.app.page.page_scene import PageSettings
 from tests.support.web.page_pictures import write_page
 from tests.support.web.page_scenes import paced_model, several_objects
 
-TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
+TOUCH = Path(__file__).resolve().parents[2] / "examples" / "touch.scene.json"
 X = "shapeshift.renderer.objects[0].x"
 POSE = "JSON.stringify(shapeshift.camera.pose)"
 
@@ -65,6 +65,18 @@ def test_a_palette_can_be_chosen_and_a_value_is_read(page):
     assert 0 <= value <= 1
     page.mouse("mouseMoved", (240, 200))
     page.until("document.getElementById('reading').textContent.endsWith('°C')")
+    box = "(({left, top, right, bottom}) => [left, top, right, bottom])"
+    plate = f"{box}(document.getElementById('reading').getBoundingClientRect())"
+    left, _, _, bottom = page.run(plate)
+    assert 0 < left - 240 <= 20 and 0 < 200 - bottom <= 20  # beside the pointer, not at the legend
+    before = page.run("document.getElementById('reading').textContent")
+    page.run("shapeshift.panel.setX(0.6), 1")  # the picture changes, the pointer rests
+    page.until(f"document.getElementById('reading').textContent !== '{before}'")
+    page.run("shapeshift.panel.setX(0.4), 1")
+    wide, high = page.run("[innerWidth, innerHeight]")
+    page.mouse("mouseMoved", (wide - 2, high // 3))
+    page.until(f"{plate}[2] > {wide - 2}")  # at an edge it stays within
+    assert page.run(plate)[2] <= wide and page.run(plate)[3] < high // 3
 
 
 @pytest.mark.slow

@@ -58,14 +58,14 @@ def trained(work: Path, capture: Path, words: list[str]) -> Path:
     return package
 
 
-def launch(words: list[str]) -> None:
-    subprocess.run([sys.executable, "-P", str(ROOT / "launch.py"), *words], check=True)
+def launch(words: list[str], stdout: int | None = None) -> bytes:
+    program = [sys.executable, "-P", str(ROOT / "launch.py"), *words]
+    return subprocess.run(program, check=True, stdout=stdout).stdout
 
 
-def quality(work: Path, package: Path, capture: Path) -> list[str]:
-    out = work / "eval.json"
-    launch(["eval", str(package), str(capture), "--json", str(out)])
-    rows, scores = [], json.loads(out.read_text())
+def quality(package: Path, capture: Path) -> list[str]:
+    words = ["eval", str(package), str(capture), "--json"]
+    rows, scores = [], json.loads(launch(words, subprocess.PIPE))
     for name, score in scores["modalities"].items():
         each = list(score["psnr_db_each"].values())
         for what, value in (("mean", score["psnr_db"]), ("median", score["median_db"]),
@@ -132,7 +132,7 @@ def main() -> None:
     capture = made(asked.work, size)
     words = ["--seconds", f"{asked.seconds:g}", "--max-anchors", str(asked.max_anchors)]
     package = trained(asked.work, capture, words)
-    rows = quality(asked.work, package, capture) + readings(package, size)
+    rows = quality(package, capture) + readings(package, size)
     head = (
         f"# python3 tools/inspection/hall.py WORK --seconds {asked.seconds:g} --max-anchors "
         f"{asked.max_anchors} --size {asked.size} --out docs/bench/hall.csv\n"

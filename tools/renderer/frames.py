@@ -13,7 +13,6 @@ import io
 import json
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,12 +52,11 @@ def main() -> None:
 
 def bench(scene: Path, x: float, size: str, drawing: str, sweep: int) -> dict:
     """The JSON of one run, with x."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bench.json"
-        words = ["bench", scene, "--x", x, "--size", size, "--drawing", drawing, "--frames", FRAMES,
-                 "--sweep", sweep, "--json", path]  # fmt: skip
-        subprocess.run([sys.executable, ROOT / "launch.py", *map(str, words)], check=True)
-        return json.loads(path.read_text()) | {"x": x}
+    words = ["bench", scene, "--x", x, "--size", size, "--drawing", drawing, "--frames", FRAMES,
+             "--sweep", sweep, "--json"]  # fmt: skip
+    program = [sys.executable, ROOT / "launch.py", *map(str, words)]
+    done = subprocess.run(program, check=True, stdout=subprocess.PIPE)
+    return json.loads(done.stdout) | {"x": x}
 
 
 def table(results: list[dict], options: argparse.Namespace) -> str:

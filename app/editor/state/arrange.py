@@ -1,7 +1,7 @@
 """Edits of what the state shows: the file, its history, the world and the scene change together."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from shapeshift.scene.document.scene_file import (
     object_of,
     sections_of,
 )
+from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 
@@ -32,11 +33,54 @@ MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less count
 COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 
 
-def edit(state: EditorState, file: SceneFile, what: str, together: str = "") -> None:
-    """Takes an edited file over.  Raises BadFile, with all as it was, where it cannot be so."""
+def edit(
+    state: EditorState, file: SceneFile, what: str, together: str = "",
+    heirs: Mapping[str, str] | None = None,
+) -> None:  # fmt: skip
+    """Takes an edited file over; heirs: name of an object -> of the one that it was made of, whose
+    emissivity it has.  Raises BadFile, with all as it was, where it cannot be so.
+    """
     state.record_regions()
-    turn_to(state, state.edited.history.record(file, what, together))
+    history = state.edited.history
+    names = renamed(edits.changes(history.file, file))
+    heirs = {after: before for before, after in names.items()} | dict(heirs or {})
+    marks = inherited(state.edited.marks, heirs, {item.name for item in file.all_items})
+    turn_to(state, history.record(file, what, together, marks=marks))
     state.edited.amend_regions(state.regions)
+
+
+def renamed(changed: Sequence[Change]) -> dict[str, str]:
+    """Names before and after, of objects that have another one now."""
+    pairs = [(each.before, each.after) for each in changed]
+    return {a.name: b.name for a, b in pairs if a is not None and b and a.name != b.name}
+
+
+def inherited(marks: MarksFile, heirs: Mapping[str, str], there: set[str]) -> MarksFile:
+    """What marks keep of objects by their names, as heirs have it; `there` are all names of now."""
+    shares, gone = dict(marks.objects), {*heirs.values()} - there
+    kept = {name: share for name, share in shares.items() if name not in {*heirs, *gone}}
+    kept |= {name: shares[before] for name, before in heirs.items() if before in shares}
+    first = {before: name for name, before in reversed([*heirs.items()]) if before in gone}
+    laid = [mark.laid and mark.laid.of_objects(first) for mark in marks.marks]
+    rows = tuple(
+        mark if mark.laid is now else replace(mark, laid=now)
+        for mark, now in zip(marks.marks, laid, strict=True)
+    )
+    same = kept == shares and all(a is b for a, b in zip(rows, marks.marks, strict=True))
+    return marks if same else replace(marks, objects=tuple(kept.items()), marks=rows)
+
+
+def follow_names(state: EditorState, names: Mapping[str, str]) -> None:
+    """All that the window keeps of objects by their names goes along, also where it is undone."""
+    if not names:
+        return
+    state.chosen = names.get(state.chosen, state.chosen)
+    state.steered = names.get(state.steered, state.steered)
+    state.split.name = names.get(state.split.name, state.split.name)
+    state.chain.loose = {names.get(name, name) for name in state.chain.loose}
+    state.bodies.call_anew(names)
+    for hear in state.renamed:
+        hear(names)
 
 
 def undo(state: EditorState) -> str:
@@ -86,6 +130,8 @@ def turn_to(state: EditorState, history: History) -> None:
     if history.file is before.file:
         return
     changed = edits.changes(before.file, history.file)
+    names = renamed(changed)
+    follow_names(state, names)
     try:
         world = state.world
         state.bodies.follow(state.edited)
@@ -96,6 +142,7 @@ def turn_to(state: EditorState, history: History) -> None:
             state.settings = with_background(state.settings, history.file.sky, state.scene)
     except BadFile:
         state.edited.history = before
+        follow_names(state, {after: name for name, after in names.items()})
         state.bodies.follow(state.edited)
         raise
 
@@ -127,10 +174,8 @@ def arrange(state: EditorState, changed: Sequence[Change]) -> None:
         {"visible"} & change.fields or None in (change.before, change.after) for change in changed
     ):
         state.reframe()
-    names = {change.before.name: change.after for change in changed if change.before}
-    if state.chosen in names:
-        chosen = names[state.chosen]
-        state.chosen = chosen.name if chosen is not None else ""
+    if state.chosen in [each.before.name for each in changed if each.before and not each.after]:
+        state.chosen = ""
 
 
 def fresh_row(

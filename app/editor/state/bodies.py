@@ -87,6 +87,10 @@ class Bodies:
             elif item.collider is not None:
                 self._made[making_of(item)] = None
 
+    def call_anew(self, names: Mapping[str, str]) -> None:
+        """Objects have other names; what was made of them stays theirs."""
+        self._of = {names.get(name, name): made for name, made in self._of.items()}
+
     @property
     def busy(self) -> bool:
         return self._future is not None

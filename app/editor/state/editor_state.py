@@ -1,7 +1,7 @@
 """What the window shows: scene, control values over time, settings, messages; no GL, no imgui."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,6 +58,7 @@ class EditorState:
         self._followed: Scene | None = None  # the world's, as it was taken over last
         self.chosen = ""  # name of the object that is edited; "": none
         self.steered = ""  # name of the object whose x a hand has moved last
+        self.renamed: list[Callable[[Mapping[str, str]], None]] = []  # hear: before -> after
         self.grip = Grip()  # of the track that the mouse holds
         self.most_sliders = 2  # that there is room for
         self.split = SplitState()
@@ -77,8 +78,7 @@ class EditorState:
         self.messages = Messages()
         self.centre, self.radius = np.zeros(3), 1.0
         self._points = (np.zeros((0, 3)), np.zeros(0))
-        self._picker = Picker()
-        self.shown_scene = ShownScene()
+        self._picker, self.shown_scene = Picker(), ShownScene()
         self._movable: tuple[Scene | None, list[int]] = (None, [])
         self.chain = Chain()
         self._legend: tuple[Scene | None, bool] = (None, False)

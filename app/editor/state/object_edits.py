@@ -25,12 +25,19 @@ class ObjectEdits:
         self.typed: tuple[str, str] = ("", "")  # the chosen object, and its name as it is typed
 
     def edit(
-        self, change: Callable[..., SceneFile], *values: object, what: str, together: str = ""
-    ) -> bool:
-        """Does an edit of scene/document/edits.py; where it cannot be done False, and says why."""
-        state = self.state
+        self, change: Callable[..., SceneFile], *values: object, what: str, together: str = "",
+        made_of: str = "",
+    ) -> bool:  # fmt: skip
+        """Does an edit of scene/document/edits.py; where it cannot be done False, and says why.
+
+        made_of: name of the object of which all is made that comes.
+        """
+        state, before = self.state, self.state.edited.file
         try:
-            edit(state, change(state.edited.file, *values), what, together)
+            file = change(before, *values)
+            known = {item.name for item in before.all_items}
+            come = [item.name for item in file.all_items if item.name not in known]
+            edit(state, file, what, together, dict.fromkeys(come * bool(made_of), made_of))
         except ValueError as error:  # BadFile is one
             self.state.messages.fail(str(error))
             return False
@@ -64,7 +71,7 @@ class ObjectEdits:
             file = edits.set_pose(file, copy, Pose(pose.position + by, pose.wxyz))
             return edits.set_x(file, copy, obj.x)
 
-        if self.edit(beside, what=f"copy {name}"):
+        if self.edit(beside, what=f"copy {name}", made_of=name):
             state.chosen = next(i.name for i in state.edited.file.items if i.name not in known)
             self.count_changed()
 

@@ -1,6 +1,7 @@
 """Touching a scene: its world played and stepped, what a hand holds, what has just answered."""
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +59,7 @@ class TouchState:
         self.colliders = False  # they are shown
         self.labels: list[Label] = []
         self.flashes: list[Flash] = []
+        state.renamed.append(self._rename)
         self._known: World | None = None
         self._unfold = False
         self.wanted = False  # that objects move, as soon as they have bodies
@@ -88,6 +90,10 @@ class TouchState:
         self.reactions.clear()
         self.labels.clear()
         self.flashes.clear()
+
+    def _rename(self, names: Mapping[str, str]) -> None:
+        """Objects of the scene have other names."""
+        self.pads = {names.get(name, name): pad for name, pad in self.pads.items()}
 
     def opens(self) -> bool:
         """Once for every world: its section unfolds."""

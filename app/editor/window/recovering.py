@@ -43,6 +43,7 @@ class Recovering:
     def begin(self, journal: Journal, hooks: Hooks) -> None:
         """From now on all is kept; called when what lies beside the scene has been read."""
         self.journal, self._saving.refused = journal, journal.refuse
+        self._saving.begins = journal.begin_saving
         hooks.opened.append(self.opened)
         self.opened()
 
@@ -62,6 +63,16 @@ class Recovering:
             words = said("Unsaved work is kept of {names}: open that, and it is offered.")
             problems.append(words.format(names=", ".join(names)))
         self._first = False
+        if self.work is not None and (path := self._state.edited.path) is not None:
+            if self.work.has_written(path):
+                self._saving.own(path)
+        if self.work is not None and self.work.is_saved:
+            names = ", ".join(path.name for path in self.work.saving)
+            self._state.say(
+                said("All of it was saved before the program ended: {names}.", names=names)
+            )
+            self.work.file.remove()
+            self.work = None
         for problem in problems:
             self._state.problem = problem
 
@@ -105,7 +116,16 @@ class Recovering:
         deeds = [said_deed(what) for what in work.deeds]
         more = [said("{count} more", count=len(deeds) - MOST_DEEDS)] * (len(deeds) > MOST_DEEDS)
         lines += [", ".join([*deeds[:MOST_DEEDS], *more])]
-        if work.stamp != self._state.edited.stamp:
+        path = self._state.edited.path
+        if path is not None and work.has_written(path):
+            late = [each.name for each in work.saving if not work.has_written(each)]
+            lines.append(
+                said(
+                    "It was being saved: {name} has it already, {late} not yet.",
+                    name=path.name, late=", ".join(late),
+                )
+            )  # fmt: skip
+        elif work.stamp != self._state.edited.stamp:
             lines.append(
                 said(
                     "The file was written by somebody else since. Taken back, the work is as it "

@@ -1,5 +1,6 @@
 """Marks of the scene that is open: laid, read, named, kept beside it; no GL, no imgui."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,6 +56,7 @@ class Inspecting:
         self._measured: tuple[Scene | None, MeasuredScene | None] = (None, None)
         self._surfaces: tuple = ()  # a picture, and what was said of emissivity when it was made
         self._known: set[str] | None = None  # objects that were there, or were handed an emissivity
+        state.renamed.append(self._rename)
 
     # ---- the scene
 
@@ -233,6 +235,7 @@ class Inspecting:
     def shine(self, name: str, emissivity: float | None, of_object: bool = False) -> None:
         """The emissivity of a mark, or an object, of its own; None: of all that is seen."""
         if of_object:
+            self._known = self._known and {*self._known, name}  # what is said of it stands
             kept = tuple(pair for pair in self.file.objects if pair[0] != name)
             new = ((name, emissivity),) if emissivity is not None else ()
             file = replace(self.file, objects=(*kept, *new))
@@ -242,6 +245,14 @@ class Inspecting:
             file = replace(self.file, marks=marks)
         together = f"emissivity {name} {of_object} {emissivity is not None}"
         self.edit(file, what="emissivity", together=together)
+
+    def _rename(self, names: Mapping[str, str]) -> None:
+        """Objects of the scene have other names."""
+        if self._known is not None:
+            self._known |= {names[name] for name in self._known if name in names}
+        if self.picture is not None:  # it is as it was but for what its objects are called
+            owners = tuple(names.get(name, name) for name in self.picture.owner_names)
+            self.picture = replace(self.picture.as_photographed(), owner_names=owners)
 
     @property
     def chosen_object(self) -> str:
@@ -277,13 +288,13 @@ class Inspecting:
                 continue
             owner = int(picture.owner_at(picture.pixel_of(mark.place[None])[0])[0])
             name = picture.owner_names[owner] if owner >= 0 else ""
-            if name not in new or name in objects or mark.emissivity is None:
+            if name not in new or name in self._known or mark.emissivity is None:
                 continue
             objects[name] = mark.emissivity
             self._known.add(name)
             words = {"name": name, "share": f"{mark.emissivity:g}", "mark": mark.name}
             self.note(said("{name} has the emissivity {share} of {mark} now.", **words))
-        if len(objects) > len(self.file.objects):
+        if objects != dict(self.file.objects):
             self.edit(replace(self.file, objects=tuple(objects.items())), what="emissivity")
 
     def corrected(self, picture: ValuePicture) -> ValuePicture:

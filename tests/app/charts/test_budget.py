@@ -208,7 +208,7 @@ def test_render_within_a_budget(tmp_path, cache):
 def test_bench_says_what_it_chose(tmp_path, cache):
     scene = random_package(tmp_path, 40)
     words = ("bench", scene, "--context", "none", "--size", "40x30", "--quality-size", "40x30",
-             "--frames", 2, "--sweep", 2, "--json", "-")  # fmt: skip
+             "--frames", 2, "--sweep", 2, "--json")  # fmt: skip
     done = launch(*words, "--target-ms", 1e-6, "--floor-db", 1)
     assert done.returncode == 0, done.stderr
     assert "Nothing at 1 dB or better" in done.stderr

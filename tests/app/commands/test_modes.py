@@ -89,7 +89,7 @@ def test_render_follows_a_camera_file(scene, tmp_path):
 
 
 def test_bench_json_has_the_promised_keys(scene, tmp_path):
-    done = launch("bench", scene, "--frames", 3, "--sweep", 3, "--size", "64x48", "--json", "-",
+    done = launch("bench", scene, "--frames", 3, "--sweep", 3, "--size", "64x48", "--json",
                   "--quality-size", "32x24", "--context", "none")  # fmt: skip
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)

@@ -1,6 +1,7 @@
 """One history for edits of every kind: what is saved beside the scene, what would be lost."""
 
 import json
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +9,15 @@ import pytest
 
 from shapeshift.app.editor.state.arrange import redo, undo
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files import saving as saving_module
 from shapeshift.app.editor.state.files.beside import open_beside
+from shapeshift.app.editor.state.files.journal import Journal
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.app.editor.state.files.saving import LOSE, Saving, unsaved, what_is_lost
 from shapeshift.app.editor.state.user.own_files import OwnFiles
+from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.app.editor.window.recovering import Recovering
 from shapeshift.app.inspection.window.inspecting import Inspecting
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
@@ -22,6 +27,7 @@ from shapeshift.scene.film.film_path import film_beside
 from shapeshift.scene.inspection.marks import Mark
 from shapeshift.scene.inspection.marks_file import MarksFile, marks_path, read_marks_file
 from tests.support.desktop.desktop_stand import ball
+from tools.app import journal as tools_journal
 
 
 def opened(path: Path) -> EditorState:
@@ -142,3 +148,54 @@ def test_refusing_to_save_is_asked_once_and_told(path, tmp_path):
     saving.before_losing(lambda: told.append("then"))
     saving.answer(LOSE)
     assert told == ["at once", "refused", "then"]
+
+
+class Killed(BaseException):
+    """The process ends here."""
+
+
+@pytest.mark.parametrize("at", ["before", "not ours yet", "half", "all"])
+def test_a_kill_amid_saving_is_no_work_of_somebody_else(tmp_path, monkeypatch, at):
+    """Scene, list of own files, marks are written in this order; `at`: what there is of it."""
+    scene = tools_journal.write_scene(tmp_path / "scene")
+    state = tools_journal.open_state(scene)
+    journal = Journal(state, tmp_path / "data")
+    saving = tools_journal.saving_of(state, scene.parent)
+    journal.opened()
+    saving.begins = journal.begin_saving
+    lay(state, "Sp1")
+    tools_journal.Work(state, scene.parent, np.random.default_rng(0)).place()
+    done = tools_journal.described(state)
+
+    def ends(*_) -> None:
+        raise Killed
+
+    places = {
+        "before": (saving_module, "write_whole"), "not ours yet": (saving, "own"),
+        "half": (saving_module, "write_beside"),
+    }  # fmt: skip
+    with monkeypatch.context() as killed, suppress(Killed):
+        if at in places:
+            killed.setattr(*places[at], ends)
+        saving.save()  # nothing was kept before it: the same frame has the edit
+    journal.file.close()  # as a kill does: the locks are gone, the files stay
+    again = tools_journal.open_state(scene)
+    its = tools_journal.saving_of(again, scene.parent)
+    recovering = Recovering(again, its, lambda scene: None, lambda: None)
+    recovering.begin(Journal(again, journal.folder), Hooks())
+    try:
+        if at == "all":
+            assert recovering.work is None and not [*journal.folder.glob("*.journal")]
+            assert again.messages.note.endswith("work.scene.json, work.marks.json.")
+        else:
+            said = "\n".join(recovering.lines(recovering.work))
+            assert "somebody else" not in said
+            assert ("work.scene.json has it already, work.marks.json not yet" in said) == (
+                at != "before"
+            )
+            recovering.answer("Take it back")
+        assert tools_journal.described(again) == done and not again.problem
+        assert (at == "all") != unsaved(again)
+        assert its.in_place and (at == "all" or its.save()) and not its.asking
+    finally:
+        recovering.close()

@@ -12,14 +12,15 @@ from shapeshift.app.editor.state.files.edited_file import EditedFile, stamp_of
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.film.window.timeline import FilmKeys
 from shapeshift.app.paths import is_bundled
+from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.film.film_path import film_beside, read_film_file, write_film_file
+from shapeshift.scene.film.film_path import film_beside, film_bytes, read_film_file
 from shapeshift.scene.inspection.marks_file import (
     MarksFile,
+    marks_bytes,
     marks_path,
     moved_marks,
     read_marks_file,
-    write_marks_file,
 )
 
 Found = TypeVar("Found")
@@ -75,7 +76,7 @@ class Beside:
     path: Path
     changed: bool  # since it was read or written
     empty: bool
-    write: Callable[[], None]
+    content: Callable[[], bytes]
 
     def is_due(self, edited: EditedFile) -> bool:
         """Whether saving writes it: also in another place, where it says something."""
@@ -101,11 +102,11 @@ def files_beside(state: EditorState, scene: Path, origin: np.ndarray) -> list[Be
     return [
         Beside(
             where, marks is not edited.saved_marks, marks == MarksFile(),
-            lambda: write_marks_file(moved_marks(marks, origin), where),
+            lambda: marks_bytes(moved_marks(marks, origin)),
         ),
         Beside(
             film_where, film_unsaved(state), not (keys.cameras or keys.stops),
-            lambda: write_film_file(keys.path(origin.tolist()), film_where),
+            lambda: film_bytes(keys.path(origin.tolist())),
         ),
     ]  # fmt: skip
 
@@ -119,7 +120,7 @@ def write_beside(state: EditorState, due: list[Beside]) -> list[Path]:
     """Writes them; returns where they are.  Raises OSError."""
     edited = state.edited
     for each in due:
-        each.write()
+        write_whole(each.path, each.content())
         edited.stamps[each.path] = stamp_of(each.path)
     edited.saved_marks, edited.saved_film = edited.marks, state.timeline.keys
     return [each.path for each in due]

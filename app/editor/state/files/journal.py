@@ -5,6 +5,7 @@ once, a drag twice a second.  The next start offers it; saving or refusing all r
 """
 
 import hashlib
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -80,6 +81,21 @@ class Journal:
     @property
     def _unsaved(self) -> bool:
         return self._stood is not None or unsaved(self._state)
+
+    def begin_saving(self, files: Mapping[Path, bytes]) -> None:
+        """What is about to be written: after a kill amid that it is known as this window's."""
+        history = self._history()
+        if history is self._refused or not self._unsaved:
+            return
+        try:
+            if history is not self._seen:
+                self._write_or_begin(history)
+                self._seen = history
+            if self.file is not None:
+                sums = {str(path): sum_of(content) for path, content in files.items()}
+                self._append([{"at": self._now[0], "last": self._now[1], "saving": sums}])
+        except OSError as error:
+            self._fail(error, time.perf_counter())
 
     def refuse(self) -> None:
         """Nobody wants to save what there is now."""
@@ -218,6 +234,11 @@ class Journal:
                 looks = not compared(before.file, step.file)[1]
                 return same and looks and step.regions == before.regions
         return False
+
+
+def sum_of(content: bytes) -> str:
+    """By which a file's content is known again."""
+    return hashlib.sha256(content).hexdigest()
 
 
 def key_of_scene(state: EditorState) -> str:

@@ -1,14 +1,14 @@
 """What a window that was killed has left: read, offered, and taken back into the scene."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from shapeshift.app.editor.state.arrange import go_to
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import ModelKey, stamp_of
-from shapeshift.app.editor.state.files.journal import key_of_scene, stem_of
+from shapeshift.app.editor.state.files.journal import key_of_scene, stem_of, sum_of
 from shapeshift.app.editor.state.files.journal_file import JournalFile, journals_of
 from shapeshift.app.editor.state.files.journal_rows import RowReader
 from shapeshift.app.editor.state.files.opened import Progress, Source
@@ -34,6 +34,7 @@ class LeftWork:
     rows: dict[int, Any]
     at: int
     torn: int  # bytes at the end
+    saving: dict[Path, str] = field(default_factory=dict)  # sums of what was being saved at the end
 
     @property
     def name(self) -> str:
@@ -44,6 +45,19 @@ class LeftWork:
         """Of the scene file when the journal was begun; (): there was none."""
         found = self.head.get("stamp")
         return tuple(found) if isinstance(found, list) else ()
+
+    def has_written(self, path: Path) -> bool:
+        """Whether what lies there is exactly what its window was saving when it ended."""
+        wanted = self.saving.get(path.absolute())
+        try:
+            return wanted is not None and sum_of(path.read_bytes()) == wanted
+        except OSError:
+            return False
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether all that was being saved lies there."""
+        return bool(self.saving) and all(map(self.has_written, self.saving))
 
     @property
     def deeds(self) -> list[str]:
@@ -104,6 +118,8 @@ def replay(file: JournalFile, entries: Sequence[Mapping[str, Any]], torn: int) -
         last = fields.count("last", 0, MOST_NUMBER)
         for number, row in fields.typed("rows", dict, {}).items():
             work.rows[int(number) if number.isdecimal() else -1] = row
+        sums = fields.typed("saving", dict, {})
+        work.saving = {Path(path): each for path, each in sums.items() if isinstance(each, str)}
         if "step" in entry:
             work.steps[work.at] = dict(entry)
         work.steps = {n: step for n, step in work.steps.items() if n <= last}
@@ -166,11 +182,16 @@ class Restoring:
         numbers = sorted(steps)
         history = History(tuple(steps[n] for n in numbers), numbers.index(work.at))
         go_to(state, history)
-        if work.stamp != edited.stamp:
+        path = edited.path
+        if work.stamp != edited.stamp and not (path and work.has_written(path)):
             edited.stamp = work.stamp  # saving asks, as over what somebody else has written
         stamps = Fields(work.head, "its head").typed("stamps", dict, {})
         before = {Path(path): tuple(stamp) for path, stamp in stamps.items()}
-        edited.stamps |= {p: stamp for p, stamp in before.items() if stamp != stamp_of(p)}
+        edited.stamps |= {
+            p: stamp
+            for p, stamp in before.items()
+            if stamp != stamp_of(p) and not work.has_written(p)
+        }
 
     def _pieces_of(
         self, step: HistoryStep, sources: Mapping[ModelKey, Source], made: Mapping[str, Piece]

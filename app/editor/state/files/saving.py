@@ -1,6 +1,6 @@
 """Saving the scene that is open, and asking before something is lost."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,10 @@ from shapeshift.app.editor.state.parts.write_pieces import with_written_pieces
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.texts.table import THE_SCENE, said
 from shapeshift.app.paths import is_bundled, plain
+from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import ENDING, FAR_M, SceneFile
-from shapeshift.scene.document.write_scene_file import write_scene_file
+from shapeshift.scene.document.write_scene_file import scene_bytes
 
 LONGEST_PATH = 1000  # letters
 MOST_NAMES = 8  # of one kind of what would be lost
@@ -39,6 +40,8 @@ class Saving:
         self.taken = False  # a file of that name is there, and nobody has said to replace it
         self.then: Callable[[], None] | None = None  # what waits for an answer
         self.refused: Callable[[], None] = lambda: None  # hears that nothing is to be saved
+        # Hears what is about to be written, all of it:
+        self.begins: Callable[[Mapping[Path, bytes]], None] = lambda files: None
 
     @property
     def asking(self) -> bool:
@@ -124,6 +127,7 @@ class Saving:
         state = self._state
         try:
             due = due_beside(state, source, origin_of_source(state))
+            self.begins({each.path: each.content() for each in due})
             written = write_beside(state, due)
         except (OSError, ValueError) as error:
             self._say_failed(source, error)
@@ -149,20 +153,17 @@ class Saving:
             pieces = with_written_pieces(edited, checked(edited.file), path.absolute())
             file = filed(pieces, state, path)
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_scene_file(file, path)
+            content = scene_bytes(file, path.parent)
+            beside_it = {each.path: each.content() for each in due}
+            self.begins({path.absolute(): content} | beside_it)
+            write_whole(path, content)
         except (OSError, ValueError) as error:
             self._say_failed(path, error)
             return False
         self.name = ""
         path = path.absolute()
         edited.path, edited.stamp = path, stamp_of(path)
-        try:
-            self._own.wrote(path, edited.stamp)
-        except OSError as error:
-            why = error.strerror or error
-            self._state.messages.fail(
-                said("That this file is yours cannot be remembered: {why}.", why=why)
-            )
+        self.own(path)
         edited.saved, edited.saved_regions = edited.file, state.regions.kept
         self._remember(path)
         try:
@@ -174,6 +175,16 @@ class Saving:
         self._state.say(said("Saved {path}", path=names))
         self._go_on()
         return True
+
+    def own(self, path: Path) -> None:
+        """Remembers that this person has saved what lies there now."""
+        try:
+            self._own.wrote(path, stamp_of(path))
+        except OSError as error:
+            why = error.strerror or error
+            self._state.messages.fail(
+                said("That this file is yours cannot be remembered: {why}.", why=why)
+            )
 
     def before_losing(self, then: Callable[[], None]) -> None:
         """Does it at once, or after a question where changes would be lost."""

@@ -95,7 +95,8 @@ def cut(
             piece, place = add_piece(edited, obj, pick.rows, True)
             pieces.append((pick.name, pick.rows, place))
             file = edits.add(file, item_of_piece(edited, obj, pick, piece, place))
-        edit(state, file, what)
+        heirs = dict.fromkeys([rest, *(pick.name for pick in taken)], obj.name)
+        edit(state, file, what, heirs=heirs)
     except (BadFile, ValueError) as error:
         for name in set(edited.pieces) - names:
             del edited.pieces[name]

@@ -11,8 +11,10 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source, read_files
 from shapeshift.app.editor.state.files.saving import Saving, unsaved
+from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.parts.cutting import delete_rows, hide_rows, make_object
 from shapeshift.app.editor.state.regions import Region
+from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import AnchorModel, BadFile, ObjectLabel
@@ -23,6 +25,9 @@ from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, HULLS
+from shapeshift.scene.inspection.laying import LaidPart, Laying
+from shapeshift.scene.inspection.marks import Mark
+from shapeshift.scene.inspection.marks_file import MarksFile
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import IDENTITY
 from shapeshift.scene.sections.section import PlaneShape, SceneSection
@@ -94,6 +99,50 @@ def same_picture(one: np.ndarray, other: np.ndarray) -> None:
     # A millionth of a metre, to which poses are rounded, moves no pixel by a step of 8 bits.
     np.testing.assert_allclose(one, other, atol=1 / 255)
     assert np.abs(one - other).mean() < 1e-4
+
+
+def test_pieces_and_what_is_left_have_the_emissivity_of_what_was_cut(state):
+    (name,) = names(state)
+    state.edited.record_marks(MarksFile(objects=((name, 0.7),)), "emissivity")
+    make_object(state, 0, some(COUNT), "mug")
+    assert dict(state.edited.marks.objects) == {BACKGROUND: 0.7, "mug": 0.7}
+    undo(state)
+    assert state.edited.marks.objects == ((name, 0.7),)
+
+
+def test_what_is_kept_by_an_objects_name_follows_it(state):
+    """Its emissivity, what a mark was laid on, its own slider, its pad; undone, it goes back."""
+    make_object(state, 0, some(COUNT), "mug")
+    touch, objects = TouchState(state, False), ObjectEdits(state, None, lambda: None)
+    part = LaidPart.of("mug", np.array([40.0]))
+    laid = Laying("2026-11-29T14:05:00", VIEW, "heat", "C", (0.0, 90.0), (part,))
+    mark = Mark("Sp1", "spot", np.zeros((1, 3)), laid=laid)
+    before = MarksFile(marks=(mark,), objects=(("mug", 0.6), ("die", 0.3)))  # that one is gone
+    state.edited.record_marks(before, "emissivity")
+    state.chain.loose.add("mug")
+    state.steered = state.chosen = state.split.name = "mug"
+    touch.pads["mug"] = (0.5, 0.5)
+
+    def kept() -> tuple:
+        marks, split = state.edited.marks, state.split.name
+        hand = state.steered, state.chosen, split, *state.chain.loose, *touch.pads
+        return dict(marks.objects), marks.marks[0].laid.parts[0].object, *hand
+
+    for step, name, shares in (
+        (
+            lambda: objects.edit(edits.rename, "mug", "die", what="rename mug"),
+            "die",
+            {"die": 0.6},
+        ),
+        (lambda: undo(state), "mug", dict(before.objects)),
+        (lambda: redo(state), "die", {"die": 0.6}),
+    ):
+        step()
+        assert kept() == (shares, *[name] * 6)
+    objects.duplicate()
+    copy = state.chosen
+    assert dict(state.edited.marks.objects) == {"die": 0.6, copy: 0.6} and copy != "die"
+    assert state.edited.marks.marks[0].laid.parts[0].object == "die"
 
 
 def test_a_piece_becomes_an_object_in_one_step_and_goes_back(state):
