@@ -41,7 +41,7 @@ FEWEST = 8  # cells
 STEEP = 0.7  # least height of a plane's unit normal: nothing stands on a steeper one
 
 
-class Splats(NamedTuple):
+class NearSplats(NamedTuple):
     """Of a background, in its own frame."""
 
     means: np.ndarray  # (N, 3) metres
@@ -58,7 +58,7 @@ class QuickGround:
 
 
 @dataclass
-class Columns:
+class HeightMap:
     """Heights over a grid in x and z."""
 
     low: np.ndarray  # (2,) metres, world: its corner in x and z
@@ -95,7 +95,7 @@ def ground_of_model(
     rows, times = rows_near(places, own, each)
     few = model.with_anchors(rows) if isinstance(model, AnchorModel) else model.with_rows(rows)
     columns = [np.asarray(column) for column in Evaluator(few).geometry(x)]
-    made = quick_ground(Splats(*columns, np.repeat(times, each)), world_from_object, things)
+    made = quick_ground(NearSplats(*columns, np.repeat(times, each)), world_from_object, things)
     if made.mesh is None:
         return None, made.stands
     vertices = made.mesh.vertices @ object_from_world[:3, :3].T + object_from_world[:3, 3]
@@ -136,7 +136,7 @@ def stood(collider: Collider, world_from_object: np.ndarray, plane: Plane) -> Co
 def mended(
     columns: Sequence[np.ndarray], pose: Pose, stood_on: Sequence[tuple[np.ndarray, Plane]]
 ) -> tuple[np.ndarray, ...]:
-    """Splats of a background whose planes go on under the things (V, 3) metres, world, on them:
+    """NearSplats of a background whose planes go on under the things (V, 3) metres, world, on them:
     without the ghosts that training hides inside a thing, and closed where nothing was seen.
     """
     means, scales, wxyz, opacity = columns
@@ -195,7 +195,7 @@ def facing(normal: np.ndarray) -> np.ndarray:
 
 
 def quick_ground(
-    splats: Splats, world_from_object: np.ndarray, things: Sequence[np.ndarray]
+    splats: NearSplats, world_from_object: np.ndarray, things: Sequence[np.ndarray]
 ) -> QuickGround:
     """What is solid under things (V, 3) metres, world, one or more; (4, 4) of the background."""
     size = max(float(np.ptp(each, axis=0).max()) for each in things)
@@ -213,8 +213,8 @@ def quick_ground(
 
 
 def columns_of(
-    splats: Splats, world_from_object: np.ndarray, things: Sequence[np.ndarray], size: float
-) -> Columns | None:
+    splats: NearSplats, world_from_object: np.ndarray, things: Sequence[np.ndarray], size: float
+) -> HeightMap | None:
     """The height in each column at which light from above is stopped; None of no splats."""
     points, depth = scattered(splats, world_from_object, WIDEST * size)
     if not len(depth):
@@ -228,7 +228,7 @@ def columns_of(
     at, total = (x * shape[1] + z) * shape[2] + down, int(np.prod(shape))
     light = np.bincount(at, depth / cell_m**2, total)
     stops = light.reshape(shape).astype(np.float32)
-    columns = Columns(low[[0, 2]], cell_m, np.full(stops.shape[:2], np.nan))
+    columns = HeightMap(low[[0, 2]], cell_m, np.full(stops.shape[:2], np.nan))
     found = surface(stops, 0)
     for thing in things:
         top, foot = ((high[1] - end) / level_m for end in (thing[:, 1].max(), thing[:, 1].min()))
@@ -246,7 +246,7 @@ def columns_of(
 
 
 def scattered(
-    splats: Splats, world_from_object: np.ndarray, widest_m: float
+    splats: NearSplats, world_from_object: np.ndarray, widest_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (3, M) metres, world, on the discs of splats, and the light (M,) that each stops:
     optical depth times square metres.
@@ -278,7 +278,7 @@ def surface(stops: np.ndarray, start: float) -> np.ndarray:
     return first + (total < OPAQUE).sum(axis=2)
 
 
-def stand_of(columns: Columns, thing: np.ndarray) -> Plane | None:
+def stand_of(columns: HeightMap, thing: np.ndarray) -> Plane | None:
     """The plane around the foot of a thing (V, 3); None where too little lies on one."""
     outer, inner = columns.box(thing, AROUND), columns.box(thing, 0)
     ring = np.zeros(columns.height.shape, bool)
@@ -323,7 +323,7 @@ def close_gaps(height: np.ndarray) -> None:
         height[fill] = total[fill] / share[fill]
 
 
-def flatten(columns: Columns, thing: np.ndarray, stand: Plane) -> None:
+def flatten(columns: HeightMap, thing: np.ndarray, stand: Plane) -> None:
     """Under a thing lies its plane, and around it where the heights are nearly on that."""
     outer, inner = columns.box(thing, AROUND), columns.box(thing, 1)
     under = heights(stand, columns.places()).reshape(columns.height.shape)
@@ -333,7 +333,7 @@ def flatten(columns: Columns, thing: np.ndarray, stand: Plane) -> None:
     height[inner] = under[inner]
 
 
-def block(columns: Columns, deep_m: float) -> TriangleMesh:
+def block(columns: HeightMap, deep_m: float) -> TriangleMesh:
     """The watertight mesh of what lies below the heights: between their middles, and down to far
     below the lowest, where columns without a height are.
     """
