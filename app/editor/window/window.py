@@ -109,6 +109,7 @@ class Window:
         self._monitor_size = self._size_for_monitor()
         theme.apply(self.ui_scale)
         self._restyle = False  # the next frame's type has another size
+        self.every_letter = False  # of all languages: their list has been opened
         self.presented = Presented(self.ctx, lambda: self.size)
         self.textures = Textures(self.ctx, self.presented.renderer)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
@@ -158,9 +159,10 @@ class Window:
         self._chosen_size = size
         self.restyle()
 
-    def restyle(self) -> None:
-        """The next frame has other letters: another language."""
+    def restyle(self, every_letter: bool = False) -> None:
+        """The next frame has other letters: another language, or those of all from now on."""
         self._restyle = True
+        self.every_letter |= every_letter
         self.note()
 
     def _size_for_monitor(self) -> float:
@@ -244,7 +246,7 @@ class Window:
         """
         if self._restyle:
             self._restyle = False
-            theme.apply(self.ui_scale)
+            theme.apply(self.ui_scale, every_letter=self.every_letter)
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*self.logical_size)
         density = self._window.pixel_ratio
@@ -311,7 +313,7 @@ class Window:
             io.add_key_event(TEXT_KEYS[key], action != glfw.RELEASE)
         if action == glfw.RELEASE:
             self._chorded.discard(key)
-        if action == glfw.RELEASE or io.want_text_input:
+        if action == glfw.RELEASE or (io.want_text_input and key != glfw.KEY_F1):
             return
         if action == glfw.REPEAT and key not in REPEATING:
             return
