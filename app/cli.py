@@ -64,10 +64,7 @@ COMMANDS = {
         "make a scene file's colliders once, into files that travel with it",
     ),
     "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
-    "poses": (
-        "commands.poses",
-        "photos without poses, or a video, to a capture for train",
-    ),
+    "poses": ("commands.poses", "photos without poses, or a video, to a capture for train"),
     "train": ("training.train", "posed photos of several modalities to a scene"),
     "update": (
         "training.update",
@@ -81,14 +78,8 @@ COMMANDS = {
         "training.fit",
         "the smallest scene that shows a capture as well as the largest, and why",
     ),
-    "eval": (
-        "training.evaluate",
-        "PSNR and SSIM of a scene on the held-out photos of a capture",
-    ),
-    "segment": (
-        "decomposition.segment",
-        "cut a scene into objects by label maps of its photos",
-    ),
+    "eval": ("training.evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
+    "segment": ("decomposition.segment", "cut a scene into objects by label maps of its photos"),
     "table": (
         "training.table",
         "one model compared with separate ones and plain splats: dB, bytes, seconds",
@@ -101,6 +92,7 @@ COMMANDS = {
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
     "extras": ("commands.extras", "optional parts of the program, listed or installed"),
 }
+OPTIONS = {"view": "editor.options"}  # where a command's module is long in coming
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
 CLAIMING = ("demo", "film", "fit", "lod", "poses", "segment", "style", "table", "train", "update")
 OPEN_ENDED = ("view", "vr", "serve", "cluster")  # they last as long as somebody looks
@@ -172,12 +164,13 @@ def _width() -> int:
 
 
 @contextlib.contextmanager
-def uncollected() -> Iterator[None]:
-    """An import leaves no garbage; looking for it takes a tenth of a start."""
+def importing() -> Iterator[None]:
+    """Uninterrupted, and an import leaves no garbage: looking for it takes a tenth of a start."""
     before = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with uninterrupted():
+            yield
     finally:
         if before:
             gc.enable()
@@ -276,8 +269,9 @@ def run_command(command: str, arguments: list[str]) -> int:
     from shapeshift.app.progress import lines
     from shapeshift.runtime_models.program import program
 
-    with uninterrupted(), uncollected():
-        module = importlib.import_module(f"shapeshift.app.{COMMANDS[command][0]}")
+    own = COMMANDS[command][0]
+    with importing():
+        module = importlib.import_module(f"shapeshift.app.{OPTIONS.get(command, own)}")
     prog = f"{program()} {command}"
     if wants_help(arguments):
         defaults = module.defaults() if hasattr(module, "defaults") else {}
@@ -285,6 +279,8 @@ def run_command(command: str, arguments: list[str]) -> int:
         return 0
     options = begin_at_start(parse(module.Options, arguments, prog))
     settle_caches_for(command)
+    with importing():
+        module = importlib.import_module(f"shapeshift.app.{own}")
     if command in OPEN_ENDED:
         return module.run(options)
     with lines(command), claim_of(command, options):
@@ -323,7 +319,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def answer(arguments: list[str]) -> int:
-    from shapeshift.app.paths import plain, plain_path
+    from shapeshift.app.paths import plain, plain_path, what_replaced
 
     arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] == ["help"] and len(arguments) == 2:
@@ -337,6 +333,8 @@ def answer(arguments: list[str]) -> int:
         print_text(f"shapeshift {version()}")
         return 0
     command, rest = choose(arguments)
+    if replaced := next(filter(None, map(what_replaced, rest)), ""):
+        return refuse(f"{command}: {replaced}")
     named = rest[0] if rest else "-"  # an address is left to the readers, who say what to do
     known = named.startswith("-") or "://" in named or plain(named).exists()
     if command == "view" and not known:

@@ -77,13 +77,14 @@ class Document:
 
     @property
     def background(self) -> Background:
-        """Behind everything: the file's sky, what one model was trained before, else black."""
+        """Behind everything: the sky, what the first model was trained before, else black."""
         return self.background_or(BLACK)
 
     def background_or(self, otherwise: Color) -> Background:
         """The same, else `otherwise`: display sRGB."""
-        if self.file:
-            return behind_of(self.file.sky) or otherwise
+        behind = behind_of(self.file.sky) if self.file else None
+        if behind is not None or not self.scene.objects:
+            return behind or otherwise
         return default_background(self.scene.objects[0].model, otherwise)
 
     @property

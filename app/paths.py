@@ -12,7 +12,8 @@ from shapeshift.runtime_models import program
 
 SCHEME = "file:"
 ASSETS = Path(__file__).resolve().parents[1] / "assets"  # what the program brought along
-DEMO, TOUCH = ASSETS / "workshop.shift", ASSETS / "touch.scene.json"
+DEMO = ASSETS / "workshop.shift"  # as it was trained, in one piece
+TOUCH = ASSETS / "demo.scene.json"  # the same with things that were cut out of it
 LONGEST_NAME = 100  # letters, of a file that is named after an object
 MAC_DATA = "~/Library/Application Support"
 STANDARD_STREAM = "-"  # stands for one where a file is wanted
@@ -96,6 +97,19 @@ def file_name(text: str) -> str:
     """A name that is a file's on every system, of one that people or files have given an object."""
     plain = "".join(c if c.isalnum() or c in " -_.,()+" else "_" for c in text)
     return plain.strip(" .")[:LONGEST_NAME] or "scene"
+
+
+def what_replaced(argument: str) -> str:
+    """What is said of a word of the command line that earlier programs knew; "": of all others."""
+    if argument == "--touch":
+        return "--touch is no longer an option: the demo, which opens without it, can be touched."
+    path = plain(argument)
+    if path.name not in ("touch.scene.json", "touch.jsonl") or not is_bundled(path):
+        return ""
+    return (
+        f"{path.name} is no longer bundled: the demo, {TOUCH.name}, can be touched; that example "
+        "of reactions lies in the folder examples of a checkout."
+    )
 
 
 def is_bundled(path: Path) -> bool:

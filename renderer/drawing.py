@@ -31,6 +31,7 @@ class Drawing(ABC):
     backends: dict[str, str]  # what is in use: drawing, mlps, sort
     sorts: int  # of the last frame, as order_age: see FrameStats
     order_age: int
+    counts_age = 0  # frames since the one that `counts` told of last
     draws_heat: bool  # in addition to the colours, from the next frame on
     shares_pages = False  # copies of an object may draw the same pages
     weighs_pages = False  # pages may be drawn as a part of themselves
@@ -165,8 +166,10 @@ class Drawing(ABC):
         """Whatever the body does to the order, afterwards it is the one that was in use before."""
 
     @abstractmethod
-    def counts(self) -> dict[str, int]:
-        """{drawn, *CULL_REASONS} of the view drawn last: gates in their order."""
+    def counts(self, wait: bool = False) -> dict[str, int]:
+        """{drawn, *CULL_REASONS} of the view drawn last: gates in their order; once a frame.  On a
+        GPU of counts_age frames before, unless it is waited for.
+        """
 
     @property
     def hidden(self) -> int:

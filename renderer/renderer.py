@@ -94,6 +94,7 @@ class Renderer:
         self.streaming = Streaming(self.drawing)
         self.drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
+        self._stats = FrameStats()  # of the last frame
         self._views: list[View] = []  # of the last frame, in the size that is shown
         self._ways: list[FalseColors] = []  # how their colours came about
         self.taker: WindowTaker | None = None  # asked first where bytes would fill a window
@@ -178,7 +179,8 @@ class Renderer:
 
         Colours are computed for each eye, or once for the middle of the eyes where that cannot be
         told apart (settings.stereo_colors), and only when it moved.  Counts of splats in the result
-        are those of the last view.
+        are those of the last view; on a GPU they and the times are of a frame before, since nobody
+        waits for this one (FrameStats.age; `exact_stats` does).
         """
         targets = [target] if isinstance(target, moderngl.Framebuffer) else target
         if not views or (targets is not None and len(targets) != len(views)):
@@ -270,7 +272,17 @@ class Renderer:
         stats = FrameStats(self._timer.collect(), self._scene.splat_count, *told)
         stats.sorts, stats.order_age, stats.color_sets = sorts, self.drawing.order_age, color_sets
         stats.debug, stats.streaming = next((d[1] for d in self._debug), {}), self.streaming.stats
-        return stats
+        stats.age = max(self._timer.age, self.drawing.counts_age)
+        self._stats = stats
+        return self.exact_stats() if self._debug else stats  # whose legend is of this picture
+
+    def exact_stats(self) -> FrameStats:
+        """The same with the last frame's own times and counts: waits for a GPU."""
+        if self._stats.age:
+            drawn = (culled := self.drawing.counts(wait=True)).pop("drawn")
+            known = {"ms": self._timer.collect(wait=True), "drawn": drawn, "culled": culled}
+            self._stats = replace(self._stats, **known, age=0)
+        return self._stats
 
     def _settings_of_frame(self) -> RenderSettings:
         """The settings with the target in use: debug pictures hold numbers, not colours."""

@@ -122,5 +122,6 @@ class FrameStats:
     color_sets: int = 1  # 2 where each of two eyes had its own
     sorts: int = 0  # how often this frame sorted: 0 with an order kept, 1, or 1 a view
     order_age: int = 0  # frames since the order in use was made
+    age: int = 0  # frames since the one that ms, drawn and culled are of: nobody waits for a GPU
     debug: dict[str, float] = field(default_factory=dict)  # numbers of the debug picture's legend
     streaming: StreamStats | None = None  # of a scene with models in levels of detail

@@ -39,6 +39,7 @@ class FramePace:
     shown_ms: Times = field(default_factory=no_times)  # from a frame that is seen to the next
     _periods: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))  # periods, seconds
     _seen_s: float | None = None  # when the last frame was to be seen
+    _beyond_ms: float = 0.0  # of the frame under way, on a GPU that nobody waits for
     _unfair: int = 0  # frames whose times and gaps do not count
 
     @property
@@ -66,13 +67,18 @@ class FramePace:
         self.frames += 1
         _keep(self.wait_ms, wait_s * 1e3)
 
-    def drew(self, drawing_ms: float) -> None:
-        """Before the end: how long the splats of both eyes took."""
+    def drew(self, drawing_ms: float, beyond_ms: float = 0.0) -> None:
+        """Before the end: how long the splats of both eyes took; beyond_ms of it on a GPU, after
+        the time that `end` is told of.
+        """
+        self._beyond_ms = beyond_ms
         if not self._unfair:
             _keep(self.drawing_ms, drawing_ms)
 
     def end(self, own_s: float) -> None:
         """It was handed over; `own_s` is what we took for it."""
+        own_s += self._beyond_ms / 1e3
+        self._beyond_ms = 0.0
         if self._unfair:
             self._unfair -= 1
             return

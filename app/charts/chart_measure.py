@@ -151,11 +151,11 @@ class Pricing:
         """Wall ms, CPU ms of the process and stats of a whole frame."""
         start, start_cpu = time.perf_counter(), time.process_time()
         renderer.update(self._stage.scene)
-        stats = renderer.draw(views)
+        renderer.draw(views)
         if self._ctx is not None:
             self._ctx.finish()
         cpu = (time.process_time() - start_cpu) * 1e3
-        return (time.perf_counter() - start) * 1e3, cpu, stats
+        return (time.perf_counter() - start) * 1e3, cpu, renderer.exact_stats()
 
     def _compare(self, views: int, with_ssim: bool, db: list[float], alike: list[float]) -> None:
         """Adds the worse eye's PSNR, and its SSIM, of what both renderers have just drawn."""

@@ -175,7 +175,7 @@ def print_table(result: dict) -> None:
         "x sweep": result["sweep_ms"],
     }
     if touch := result.get("touch"):
-        rows |= {"touch scene": touch["frame_ms"], "its physics": touch["physics_ms"]}
+        rows |= {"in motion": touch["frame_ms"], "its physics": touch["physics_ms"]}
     last = list(rows)[-1]
     rows |= result["passes"]
     table = Table("ms", "p50", "p95", "p99")

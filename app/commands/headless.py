@@ -1,4 +1,4 @@
-"""launch.py headless: the bundled demo and touch scene, pictures and frame times, no window."""
+"""launch.py headless: the bundled demo, still and in motion: pictures, frame times, no window."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,10 +23,10 @@ TURN = 0.6  # radians between the viewpoints
 @dataclass(frozen=True)
 class Options:
     """Draw a scene at its stops and between them, and time it; without --scene the bundled demo,
-    and the touch scene while the hands of its script are at work."""
+    also while the hand of its script is at work."""
 
     scene: Path = DEMO
-    """What to draw.  Default: the bundled demo and touch scene."""
+    """What to draw.  Default: the bundled demo, still and in motion."""
     out: Path = Path("out/demo")
     """Folder for the pictures and bench.json; those of an earlier run are replaced."""
     size: Annotated[str, SIZE] = "480x320"
@@ -75,20 +75,20 @@ def run(options: Options) -> int:
 
 
 def play_touch(renderer, ctx, size: tuple[int, int], out: Path) -> dict | None:
-    """The touch scene in motion; None, and why, where its bodies cannot be made here."""
+    """The demo in motion; None, and why, where its bodies cannot be made here."""
     from shapeshift.app.commands.touch_film import film
     from shapeshift.runtime_models.model import BadFile
 
     try:
         return film(renderer, ctx, size, out / TOUCH)
     except BadFile as error:
-        say(f"The touch scene is left out: {error}")
+        say(f"The demo in motion is left out: {error}")
         return None
 
 
 def picture_words(result: dict) -> str:
     """What pictures there are, in words."""
-    touch = f", {TOUCH} the touch scene" if result.get("touch") else ""
+    touch = f", {TOUCH} the demo in motion" if result.get("touch") else ""
     return f"Pictures (sheet.png shows all{touch})"
 
 

@@ -168,13 +168,14 @@ def draw_run(steps_done, simulation, file, size: tuple[int, int], options: Optio
     """A picture of the scene as it stands every --pictures steps."""
     from dataclasses import replace
 
+    from shapeshift.app.document import Document
     from shapeshift.app.drawing import open_renderer, save_png
-    from shapeshift.scene.appearance import behind_of
     from shapeshift.scene.document.scene_file import first_view
 
-    view = first_view(file, simulation.world.drawn(), size)
+    drawn = simulation.world.drawn()
+    view = first_view(file, drawn, size)
     with open_renderer(options.context, options.drawing) as (renderer, _):
-        behind = behind_of(file.sky) or (0.0, 0.0, 0.0)
+        behind = Document(drawn, file).background
         renderer.settings = replace(renderer.settings, background=behind)
         for number in steps_done:
             if number % options.pictures == 0:

@@ -32,7 +32,7 @@ from shapeshift.app.editor.window.two_pictures import TwoPictures, splitting
 from shapeshift.app.editor.window.viewer import Viewer
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.app.errors import UsageError
-from shapeshift.app.paths import DEMO, TOUCH, config_folder, data_folder, plain
+from shapeshift.app.paths import TOUCH, config_folder, data_folder, plain
 from shapeshift.app.streaming.refine import Refiner, show_level
 from shapeshift.rasterizer.program import compiling
 from shapeshift.renderer.renderer import Renderer
@@ -58,7 +58,7 @@ def run(options: Options) -> int:
             raise UsageError(f"{name} is {value}, expected a number above 0.")
     refiner = Refiner(options)
     state = EditorState(refiner.open)
-    paths = tuple(map(plain, options.scenes)) or ((TOUCH if options.touch else DEMO),)
+    paths = tuple(map(plain, options.scenes)) or (TOUCH,)
     read = read_files(paths, refiner.open, camera_reading(options), None, options.reading())
     found = named_cameras(options.camera, options, read)
     if not found.sources and found.file is None:

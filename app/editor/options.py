@@ -1,4 +1,4 @@
-"""Options of launch.py view."""
+"""launch.py view: what may be asked, known before OpenGL is imported."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,8 +44,6 @@ class Options(DrawingOptions):
     compare: Annotated[str, Opt(metavar="SCENE")] = ""
     """Another scene (or scene@Stop, scene@0.5) to compare with: a line parts the two pictures.
     Default: none."""
-    touch: bool = False
-    """Open the bundled scene that can be touched, a table with three objects; without a scene."""
     play: bool = False
     """Let the objects of a scene file fall and be carried from the start; T switches it."""
     pictures: Path | None = None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
 from shapeshift.app.interrupts import ENDINGS, answered, leave_terminal
 from shapeshift.app.opening import DrawingOptions
-from shapeshift.app.paths import TOUCH as DEMO
+from shapeshift.app.paths import TOUCH
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Options(DrawingOptions):
     """Walk into a scene and touch it, see docs/vr.md."""
 
     scene: Annotated[Path | None, POSITIONAL] = None
-    """A scene file, a package or splats.  Default: three objects on a table."""
+    """A scene file, a package or splats.  Default: the demo."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands at the start: a stop by its name, or a number from 0 to 1.  Default:
     the first stop, and in a scene file what it says for each object."""
@@ -169,7 +169,7 @@ def check(options: Options) -> None:
     for path in (options.report, options.lines):
         if path is not None and not path.absolute().parent.is_dir():
             raise UsageError(f"there is no folder {path.parent} for {path.name}.")
-        if path is not None and path.resolve() == (options.scene or DEMO).resolve():
+        if path is not None and path.resolve() == (options.scene or TOUCH).resolve():
             raise UsageError(f"{path} is the scene; choose another file.")
 
 
@@ -195,7 +195,7 @@ def wear(options: Options) -> int:
     worn = worn_settings(options)
     how = (partial(open_session, options, worn), options.reopen, lambda: worn.now.wants_insets)
     with HeadsetLink(*how) as link:
-        document, editor = open_xr(options.scene or DEMO, options, options.x)
+        document, editor = open_xr(options.scene or TOUCH, options, options.x)
         wearing = wearing_of(options, editor)
         speak_first(ProgramSettings.read(config_folder()), editor.messages)
         pacing = Pacing(
@@ -281,7 +281,7 @@ def shelf_of(options: Options) -> "SceneShelf":
     from shapeshift.app.paths import config_folder
 
     measured = bool(options.frames or options.report or options.lines)
-    return SceneShelf(config_folder(), options, options.scene or DEMO, keeps=not measured)
+    return SceneShelf(config_folder(), options, options.scene or TOUCH, keeps=not measured)
 
 
 def open_session(options: Options, worn: "KeptSettings", instance, ctx):
@@ -347,4 +347,4 @@ def without_headset(reason: str, options: Options) -> int:
 
     say("Opening the scene in a window instead.")
     reading = {each.name: getattr(options, each.name) for each in fields(DrawingOptions)}
-    return desktop.run(desktop.Options(scenes=(options.scene or DEMO,), x=options.x, **reading))
+    return desktop.run(desktop.Options(scenes=(options.scene or TOUCH,), x=options.x, **reading))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.app.document import Document, control_of_text, file_at, pace_of
-from shapeshift.app.editor.panels.empty_panel import DEMO_LABEL, TOUCH_LABEL
+from shapeshift.app.editor.panels.empty_panel import DEMO_LABEL
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.edited_file import EditedFile, edited_from_file
 from shapeshift.app.editor.state.files.opened import Source
@@ -18,7 +18,7 @@ from shapeshift.app.editor.state.user.recent_pictures import RecentPictures
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
-from shapeshift.app.paths import DEMO, TOUCH, is_bundled
+from shapeshift.app.paths import TOUCH, is_bundled
 from shapeshift.app.scene_files import open_scene_file
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.model import BadFile
@@ -59,7 +59,7 @@ class SceneShelf:
         """What stands on each row, and the file that it opens."""
         before = self.recent.paths if self.recent is not None else ()
         rows = [(path.name or str(path), path) for path in before if not is_bundled(path)]
-        return [*rows, (said(DEMO_LABEL), DEMO), (said(TOUCH_LABEL), TOUCH)]
+        return [*rows, (said(DEMO_LABEL), TOUCH)]
 
     def open(self, path: Path) -> None:
         """Begins to read; while another scene is read nothing happens."""

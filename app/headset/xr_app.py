@@ -312,12 +312,15 @@ class XrApp:
         if through:
             self._shadows.follow(self.renderer, self.state.shown, self._seconds)
         self.state.shadows = tuple(c.name for c in self._shadows.casts) if through else ()
-        self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
+        self.stats = self.renderer.draw(views)
         looking = glass.draw(looking, self.state)
         taken_ms = (time.perf_counter() - start) * 1e3
         # Depth is no part of what the chart of shortcuts has prices for.
-        self._drawing_ms = max(taken_ms - self.stats.ms.get("depth", 0.0), 0.0)
-        self.session.pace.drew(self._drawing_ms)
+        depth_ms = self.stats.ms.get("depth", 0.0)
+        taken_ms = max(taken_ms - depth_ms, 0.0)
+        # Nobody waits for a GPU: it may take longer than it took to tell it what to draw.
+        self._drawing_ms = max(taken_ms, sum(self.stats.ms.values()) - depth_ms)
+        self.session.pace.drew(self._drawing_ms, self._drawing_ms - taken_ms)
         depths = self.eyes.depths(self.renderer, self.state.play_space.scale) if deep else None
         eyes = self.eyes
         for i, framebuffer in enumerate(eyes.framebuffers):

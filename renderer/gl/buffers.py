@@ -164,6 +164,7 @@ class Arena:
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
         self._pack = gpu.compute("pack.comp")
         self._heats: dict[int, moderngl.Buffer] = {}  # set -> heat that goes with its colours
+        self._heated: set[tuple[int, int]] = set()  # (set, object) whose rows there are not all 0
 
     @property
     def runs(self) -> list[tuple[int, int, int]]:
@@ -191,11 +192,13 @@ class Arena:
         """That of the set which decoding writes into."""
         return self.heat_of(self.set)
 
-    def clear_heat(self, i: int) -> None:
-        """Object i has none, where there is any at all."""
-        rows = self.starts[i + 1] - self.starts[i]
-        if self.set in self._heats and rows:
-            overwrite(self.heat, bytes(16 * rows), offset=16 * self.starts[i])
+    def heated(self, i: int) -> bool:
+        """Whether anything was written into the heat of object i in the set in use."""
+        return (self.set, i) in self._heated
+
+    def note_heat(self, i: int, there: bool) -> None:
+        """Object i has heat in the set in use from now on; else its rows were cleared."""
+        (self._heated.add if there else self._heated.discard)((self.set, i))
 
     def color_set(self, which: int, count: int) -> None:
         """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
@@ -206,6 +209,7 @@ class Arena:
         self.colors = self.colors[:count]
         for gone in [kept for kept in self._heats if kept >= count]:
             self._heats.pop(gone).release()
+            self._heated = {each for each in self._heated if each[0] != gone}
         while len(self.colors) < count:
             self.colors.append(self.gpu.reserve(16 * self.count, "colours of another eye"))
         self.color, self.set = self.colors[which], which
@@ -312,6 +316,7 @@ class Arena:
         start, end = self._rows(i, heat, "heats")
         if end > start:
             overwrite(self.heat, np.ascontiguousarray(heat, np.float32), offset=16 * start)
+            self.note_heat(i, True)
 
     def read_colors(self, i: int) -> tuple[np.ndarray, np.ndarray | None]:
         """(n, 3) colours of object i in the set in use, and (n, 4) heat; None: there is none."""

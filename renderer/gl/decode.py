@@ -102,8 +102,8 @@ class Decoder:
             self._colors[i].forget_after(self._arena.set, len(shade.heats))
         if heater is not None and shade.heats:
             heater.blend(self._arena, i, at_once)
-        else:
-            self._arena.clear_heat(i)
+        elif heater is not None and self._arena.heated(i):
+            heater.clear(self._arena, i)
 
     def _grade(self, i: int, grade: Appearance) -> None:
         """The appearance of colours that were just decoded."""
@@ -259,6 +259,12 @@ class Heater:
             self._add, groups_for(rows, layout.WORKGROUP),
             count=rows, start=arena.starts[i], per_weight=-(-rows // len(weights)),
         )  # fmt: skip
+        arena.note_heat(i, True)
+
+    def clear(self, arena: Arena, i: int) -> None:
+        """Object i has no heat any more: anything times 0, and nothing that was there."""
+        self.add(arena, i, np.zeros(1, np.float32))
+        arena.note_heat(i, False)
 
     def blend(self, arena: Arena, i: int, into_color: bool = False) -> None:
         """Leaves of the colours of object i, just decoded, what its heat does not take.

@@ -117,13 +117,17 @@ def overwrite(buffer: moderngl.Buffer, data: Any, offset: int = 0) -> None:
     """Other bytes from `offset` on in a buffer that a pass has read or written before.
 
     GL promises that such a pass is done before; with NVIDIA's driver 580 writes overtake compute
-    passes that still run.  So what is written as a whole gets new memory, and a part waits.
+    passes that still run.  So what is written as a whole gets new memory, and a part comes by a
+    copy on the GPU, which has its turn among the passes: nobody waits.
     """
-    if offset == 0 and memoryview(data).nbytes == buffer.size:
+    size = memoryview(data).nbytes
+    if offset == 0 and size == buffer.size:
         buffer.orphan()
-    else:
-        buffer.ctx.finish()
-    buffer.write(data, offset)
+        buffer.write(data)
+    elif size:
+        part = buffer.ctx.buffer(data)
+        buffer.ctx.copy_buffer(buffer, part, size, write_offset=offset)
+        part.release()  # its memory lasts until the copy is made
 
 
 def release_framebuffer(framebuffer: moderngl.Framebuffer) -> None:

@@ -2,7 +2,8 @@
 
 import logging
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
@@ -18,6 +19,7 @@ from shapeshift.runtime_models.stop_weights import Control, Controls, is_each
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")  # their numbers in activation.glsl
 DIRECTION = 3  # inputs
 LEAST_VECS = 16  # vec4 a layer; fewer sizes, fewer programs to compile
+FOLDS = 3  # controls a frame that colours are decoded at: two value stops and what is between
 
 
 def vecs(width: int) -> int:
@@ -125,6 +127,7 @@ class GlNetworks:
         self._heads = {name: self._prepare(name) for name in HEADS}
         self._own: dict[str, _Head] = {}  # for a control an anchor, made when there is one
         self._control: moderngl.Buffer | None = None  # Psi of these
+        self._own_x: np.ndarray | None = None  # whose
 
     def _prepare(self, name: str, own_control: bool = False) -> "_Head":
         model, gpu, mlp = self._model, self._gpu, self._model.networks[name]
@@ -145,10 +148,13 @@ class GlNetworks:
                 f"the {name} network takes {packed.rows.nbytes:,} bytes, more than a "
                 f"uniform block ({block:,}); it is read from a storage buffer, which is slower."
             )
-            weights = gpu.upload(packed.rows, f"the {name} network")
-        else:
-            weights = gpu.reserve(block)  # the whole block that the shader declares
-            weights.write(packed.rows)
+        folds = FOLDS if name == "color" and not own_control else 1
+        weights = [
+            gpu.reserve(packed.rows.nbytes if stored else block, f"the {name} network")
+            for _ in range(folds)  # the whole block that the shader declares, each time
+        ]
+        for each in weights:
+            each.write(packed.rows)
         size = max(LEAST_VECS, 1 << (packed.widest - 1).bit_length())
         program = gpu.compute(
             "decode_mlp.comp", LAYER_VECS=size, BLOCK_VECS=block // 16, STORED_WEIGHTS=int(stored),
@@ -156,12 +162,12 @@ class GlNetworks:
         )  # fmt: skip
         return _Head(name, mlp, packed, weights, stored, program)
 
-    def _heads_for(self, x: Controls) -> dict[str, "_Head"]:
-        """The networks, ready for one control or for one an anchor."""
+    def _heads_for(self, x: Controls, names: Iterable[str]) -> dict[str, "_Head"]:
+        """The networks, of which those named are ready for one control or for one an anchor."""
         if not is_each(x):
             assert not isinstance(x, np.ndarray), "one control for all"
-            for head in self._heads.values():
-                head.set_control(self._model, x)
+            for name in names:
+                self._heads[name].set_control(self._model, x)
             return self._heads
         if self._control is None:
             self._own = {name: self._prepare(name, own_control=True) for name in HEADS}
@@ -170,14 +176,16 @@ class GlNetworks:
         width = self._model.encoding.d
         for head in self._own.values():  # models share programs
             head.program["control_vecs"].value = vecs(width)
-        rows = np.zeros((len(self._model.anchors), 4 * vecs(width)), np.float32)
-        rows[:, :width] = self._model.psi(x)
-        overwrite(self._control, rows)
+        if self._own_x is None or not np.array_equal(x, self._own_x):
+            self._own_x = np.array(x)
+            rows = np.zeros((len(self._model.anchors), 4 * vecs(width)), np.float32)
+            rows[:, :width] = self._model.psi(x)
+            overwrite(self._control, rows)
         return self._own
 
     def geometry(self, arena: Arena, start: int, x: Controls) -> None:
         """Four networks at a control, or one an anchor -> rows start... of the arena."""
-        heads = self._heads_for(x)
+        heads = self._heads_for(x, PARTS)
         k, count = self._model.splats_per_anchor, len(self._model.anchors)
         at_once = arena.staged // k  # anchors
         for first in range(0, count, at_once):
@@ -188,7 +196,7 @@ class GlNetworks:
 
     def color(self, arena: Arena, start: int, x: Controls, eye: np.ndarray) -> None:
         """The colour network at x towards an eye (3,) in the object's frame -> rows start..."""
-        head = self._heads_for(x)["color"]
+        head = self._heads_for(x, ("color",))["color"]
         head.program["eye"].value = tuple(float(v) for v in eye)
         self._run(head, arena.color, 4 * start, 4, 0, len(self._model.anchors))
 
@@ -201,9 +209,9 @@ class GlNetworks:
         if self._control is not None:
             bind(control=self._control)
         if head.stored:
-            bind(weights=head.weights)
+            bind(weights=head.weights[0])
         else:
-            head.weights.bind_to_uniform_block(layout.WEIGHTS_BLOCK)
+            head.weights[0].bind_to_uniform_block(layout.WEIGHTS_BLOCK)
         lit = self._light is not None and head.name == "color"
         low, high = head.mlp.clip or (-math.inf, math.inf)
         self._gpu.run(
@@ -217,7 +225,8 @@ class GlNetworks:
 
     def release(self) -> None:
         for head in (*self._heads.values(), *self._own.values()):
-            head.weights.release()
+            for weights in head.weights:
+                weights.release()
         if self._control is not None:
             self._control.release()
         for own in (self._frames, self._light):
@@ -253,14 +262,20 @@ class _Head:
     name: str
     mlp: Mlp
     packed: PackedMlp
-    weights: moderngl.Buffer
+    weights: list[moderngl.Buffer]  # the same but for their first bias; the first is in use
     stored: bool  # weights in a storage buffer, not a uniform block
     program: moderngl.ComputeShader
-    x: Control | None = None  # control that the first bias now holds
+    folded: list[Control | None] = field(default_factory=list)  # control in the bias of each
 
     def set_control(self, model: AnchorModel, x: Control) -> None:
-        """Folds Psi(x) into the first layer's bias, where it is not there already."""
-        if x != self.x:
+        """Takes the weights whose first bias has Psi(x) in it; folded where none has it yet."""
+        self.folded = self.folded or [None] * len(self.weights)
+        if x in self.folded:
+            at = self.folded.index(x)
+        else:
+            at = len(self.weights) - 1  # used longest ago
             bias = self.packed.folded_bias(model.psi(x)[0])
-            overwrite(self.weights, bias, offset=self.packed.bias_at)
-            self.x = x
+            overwrite(self.weights[at], bias, offset=self.packed.bias_at)
+            self.folded[at] = x
+        self.weights.insert(0, self.weights.pop(at))
+        self.folded.insert(0, self.folded.pop(at))

@@ -10,6 +10,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for, overwrite
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
+from shapeshift.renderer.timing import UnderWay
 from shapeshift.scene.pose import View
 
 NO_COUNTS = np.zeros(layout.COUNTS_SIZE, np.uint32)
@@ -21,6 +22,10 @@ class Projector:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
+        self._under_way = UnderWay[tuple[moderngl.Buffer, int]]()  # counts of frames, and the view
+        self._spare: list[moderngl.Buffer] = []
+        self._counted: Arena | None = None  # whose these are
+        self._known: tuple[dict[str, int], int] = ({}, 0)
         self._variant(1, False, RenderSettings())  # a broken shader is reported at the start
 
     def _variant(
@@ -116,12 +121,41 @@ class Projector:
 
         Waits for the GPU.
         """
-        rows = np.frombuffer(arena.counts.read(), np.uint32)[i * layout.COUNTS_STRIDE :]
+        return self._read(arena, arena.counts, i)
+
+    def late_counts(self, arena: Arena, i: int = 0) -> tuple[dict[str, int], int]:
+        """The same of the newest frame that the GPU has done, and how many frames ago it was; of
+        this one, which is waited for, where none was done yet.  To be called once a frame.
+        """
+        if arena is not self._counted:
+            self._forget()
+            self._counted, self._known = arena, (self.counts(arena, i), 0)
+            return self._known
+        self._known = self._known[0], self._known[1] + 1
+        copy = None
+        if not self._under_way.full:
+            copy = self._spare.pop() if self._spare else self._gpu.reserve(arena.counts.size)
+            self._gpu.ctx.copy_buffer(copy, arena.counts, arena.counts.size)
+        self._under_way.leave(None if copy is None else (copy, i))
+        for age, (done, view) in self._under_way.done():
+            self._known = self._read(arena, done, view), age
+            self._spare.append(done)
+        return self._known
+
+    def _read(self, arena: Arena, counts: moderngl.Buffer, i: int) -> dict[str, int]:
+        rows = np.frombuffer(counts.read(), np.uint32)[i * layout.COUNTS_STRIDE :]
         culled = {name: int(rows[layout.COUNTS[name.upper()]]) for name in CULL_REASONS}
         return {"drawn": arena.count - sum(culled.values()), **culled}
 
+    def _forget(self) -> None:
+        self._spare += [copy for _, (copy, _) in self._under_way.all()]
+
     def release(self) -> None:
-        """Nothing of its own: programs belong to the Gpu."""
+        """The copies of counts; programs belong to the Gpu."""
+        self._forget()
+        while self._spare:
+            self._spare.pop().release()
+        self._counted = None
 
     def __enter__(self) -> "Projector":
         return self

@@ -57,6 +57,7 @@ class QuadsDrawing(Drawing):
         self._foveated = FoveatedSplatter(gpu)
         # Software GL pays for triangles, and drawing twice has twice as many.
         self.foveates = not is_software(gpu.ctx)
+        self.counts_age = 0
         self._depths = DepthPictures(gpu)
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._sort_policy = SortPolicy()
@@ -219,8 +220,12 @@ class QuadsDrawing(Drawing):
         mean_opacity, owner, _ = (a[:: -(-self.arena.count // SAMPLE)] for a in self.splat_points())
         return median_distance(eye_from_world @ self.arena.world_from_object, mean_opacity, owner)
 
-    def counts(self) -> dict[str, int]:
-        return self._projector.counts(self.arena, self._last)
+    def counts(self, wait: bool = False) -> dict[str, int]:
+        if wait or is_software(self._gpu.ctx):  # which has nothing under way
+            self.counts_age = 0
+            return self._projector.counts(self.arena, self._last)
+        counts, self.counts_age = self._projector.late_counts(self.arena, self._last)
+        return dict(counts)
 
     def _brightest(self) -> float:
         """The largest colour of the scene; of its models found out once."""

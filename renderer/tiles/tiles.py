@@ -216,7 +216,7 @@ class TilesDrawing(TilesArena):
             for name, value in zip(names, kept, strict=True):
                 setattr(self, name, value)
 
-    def counts(self) -> dict[str, int]:
+    def counts(self, wait: bool = False) -> dict[str, int]:
         if not self.splats:
             return dict.fromkeys(("drawn", *CULL_REASONS), 0)
         culled = self._projected[-1].culled(self.device)

@@ -1,5 +1,6 @@
 """A scene that was opened, as a library has it: what is in it, and other scenes made of it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -166,7 +167,7 @@ class OpenedScene:
         stops ("RGB..Thermal:0.5"), or StopWeights.  None: as it is.
 
         In a scene of several objects those that have no such stop stay.  Raises UsageError that
-        lists the stops, ValueError for a number outside 0..1.
+        lists the stops, or says that a number is outside 0..1.
 
             thermal = scene.at("Thermal")
             halfway = scene.at("RGB..Thermal:0.5")
@@ -175,7 +176,7 @@ class OpenedScene:
             return self
         if isinstance(x, str):
             return self._with(self._subject.placed(x, "x"))
-        control = x if isinstance(x, StopWeights) else float(x)
+        control = x if isinstance(x, StopWeights) else number_from_0_to_1(x)
         return self._with(replace(self._subject, scene=self._subject.at(control)))
 
     def with_model(self, model: Model, name: str | None = None) -> Self:
@@ -270,3 +271,14 @@ class OpenedScene:
             for each in self.objects
         )
         return self._with(replace(self._subject, scene=DrawnScene(objects)))
+
+
+def number_from_0_to_1(x: object) -> float:
+    """Raises UsageError."""
+    try:
+        number = float(x)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = math.nan
+    if not 0 <= number <= 1:
+        raise UsageError(f"x is {x!r}; a number from 0 to 1 or a stop's name is wanted.")
+    return number

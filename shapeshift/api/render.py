@@ -151,7 +151,8 @@ class Renderer:
 
     def _draw(self, scene: "OpenedScene", views: list[View]) -> None:
         self._frames.update(scene.drawn)
-        self._stats = self._frames.draw(views)
+        self._frames.draw(views)
+        self._stats = self._frames.exact_stats()  # its pixels are waited for anyway
 
     @contextmanager
     def _current(self) -> Iterator[None]:

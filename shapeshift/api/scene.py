@@ -93,7 +93,9 @@ class Scene(InspectedScene):
     ) -> list[View]:
         """Views of the scene: `orbit` (count views on a level circle about it), `front`, `auto`
         (the cameras that lie with its file), a file or folder of cameras in any known form
-        (docs/cameras.md), a CameraList, a View or several.
+        (docs/cameras.md), a CameraList, a View or several; or (4, 4) or (N, 4, 4) metres,
+        world_from_camera as transforms.json has it (OpenGL's axes: x right, y up, it looks along
+        -z), with the lens of `front`.  View.from_pinhole takes OpenCV's axes and a lens.
 
         size: width, height in pixels; None leaves them to the camera, else 640x360.  Raises
         BadFile, UsageError.
@@ -164,14 +166,11 @@ class Scene(InspectedScene):
         return show_scene(self, self.render(camera="front"), height)
 
     def _repr_html_(self) -> str | None:
-        """What a notebook displays for a scene; None, and it is text: a page cannot show it."""
-        from shapeshift.app.errors import UsageError
-        from shapeshift.runtime_models.model import BadFile
+        """What a notebook displays for a scene: a picture and a line.  None: the line alone, where
+        nothing can be drawn.  The page, which grows with the scene, is for `show`."""
+        from shapeshift.api.views import picture_and_line
 
-        try:
-            return self.show().html
-        except (BadFile, UsageError):
-            return None
+        return picture_and_line(self)
 
     def frames(
         self,

@@ -12,7 +12,7 @@ import numpy as np
 
 from shapeshift.api.arguments import DEFAULT_SIZE, Output, Size
 from shapeshift.api.opened import OpenedScene
-from shapeshift.api.picture import Picture
+from shapeshift.api.picture import Picture, encoded
 from shapeshift.api.render import Renderer, shared_renderer
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
@@ -21,12 +21,17 @@ from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.appearance import Background
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, moved
 from shapeshift.scene.cameras.framing import orbit_path
-from shapeshift.scene.pose import MOST_SIDE, View, stereo_pair
+from shapeshift.scene.pose import MOST_SIDE, Pose, View, stereo_pair
 
 SWEEP = "sweep"
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 OUTPUTS = ("picture", "depth", "normal", "coverage")
 WIDEST_EYES_M = 1.0
+RIGID = 1e-3  # most that a rotation times its transpose is off one; float32 poses are, by 1e-6
+NO_CAMERA = (
+    "a camera is 'orbit', 'front', 'auto', a file or folder of cameras, a View or several, or a "
+    "4x4 world_from_camera with OpenGL's axes."
+)
 
 
 def choose_views(scene: "OpenedScene", camera: Any, count: int, size: Size | None) -> list[View]:
@@ -46,11 +51,32 @@ def choose_views(scene: "OpenedScene", camera: Any, count: int, size: Size | Non
     if isinstance(camera, CameraList):  # of the file's world
         camera = moved(camera.views, tuple(-scene.origin))
     views = list(camera) if isinstance(camera, Iterable) else []
+    if views and not any(isinstance(view, View) for view in views):
+        return posed_views(views, subject.view(size or DEFAULT_SIZE))
     if not views or not all(isinstance(view, View) for view in views):
-        raise UsageError(
-            "a camera is 'orbit', 'front', 'auto', a file or folder of cameras, a View or several."
-        )
+        raise UsageError(NO_CAMERA)
     return [view.resized(size) if size else view for view in views]
+
+
+def posed_views(rows: list[Any], lens: View) -> list[View]:
+    """Views by (4, 4) or (N, 4, 4) world_from_camera, metres, OpenGL's axes.  Raises UsageError."""
+    try:
+        matrices = np.asarray(rows, np.float64)
+    except (TypeError, ValueError):
+        raise UsageError(NO_CAMERA) from None
+    if matrices.ndim not in (2, 3) or matrices.shape[-2:] != (4, 4):
+        raise UsageError(NO_CAMERA)
+    matrices = matrices.reshape(-1, 4, 4)
+    turns = matrices[:, :3, :3]
+    rigid = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max() <= RIGID
+    if not (rigid and np.isfinite(matrices).all() and (np.linalg.det(turns) > 0).all()
+            and (matrices[:, 3] == (0, 0, 0, 1)).all()):  # fmt: skip
+        raise UsageError(
+            "a 4x4 of camera= is no rigid pose: a rotation without scale or mirroring, a place in "
+            "metres and the last row 0 0 0 1 are wanted, world_from_camera with OpenGL's axes "
+            "(of a view matrix it is the inverse; View.from_pinhole takes OpenCV's axes)."
+        )
+    return [replace(lens, world_from_eye=Pose.from_matrix(matrix)) for matrix in matrices]
 
 
 def pixels_of(size: Any) -> Size:
@@ -132,9 +158,25 @@ def spread(x: Any, count: int) -> list[Any]:
     return np.interp(places, np.arange(len(values)), values).tolist()
 
 
-# A scene in a notebook: the page for browsers in a frame of its own.
+# A scene in a notebook: a picture and a line, or the page for browsers in a frame of its own.
 
 HEIGHTS = (100, 4000)  # pixels
+
+
+def picture_and_line(scene: OpenedScene) -> str | None:
+    """HTML of the first look at a scene and what `repr` says of it; None: it cannot be drawn."""
+    from shapeshift.rasterizer.device import NoDevice
+    from shapeshift.renderer.gl.context import NoContext
+    from shapeshift.runtime_models.model import BadFile
+
+    view = choose_views(scene, "front", 1, None)[0]
+    try:
+        picture = picture_of(scene, view, None, 0.0, "picture", None, "auto", "auto")
+    except (BadFile, UsageError, NoContext, NoDevice):
+        return None
+    png = base64.b64encode(encoded(picture, "PNG")).decode()
+    line = html.escape(repr(scene))
+    return f'<img alt="The scene" src="data:image/png;base64,{png}"><br><code>{line}</code>'
 
 
 @dataclass(frozen=True)

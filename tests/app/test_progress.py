@@ -123,7 +123,7 @@ LONG = {
     "compare": ("compare", "PACKAGE@RGB", "PACKAGE@Thermal", *SMALL),
     "stability": ("stability", "PACKAGE", "--cases", "disparity", "--out", "OUT", *SMALL),
     "export": ("export", "PACKAGE", "--out", "OUT/a.ply"),
-    "simulate": ("simulate", "assets/touch.scene.json", "--seconds", "2", "--out", "OUT"),
+    "simulate": ("simulate", "examples/touch.scene.json", "--seconds", "2", "--out", "OUT"),
     "demo": ("demo", "--size", "24x18", "--views", "4", "--test-views", "1", "--iterations", "3",
              "--processes", "1", "--out", "OUT"),
 }  # fmt: skip

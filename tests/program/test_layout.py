@@ -1,6 +1,6 @@
 """Where the overlay's parts lie: nothing covers anything else, at every size and scale."""
 
-from itertools import combinations
+from itertools import combinations, product
 
 import pytest
 
@@ -24,34 +24,28 @@ def overlap(one: tuple, other: tuple) -> bool:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("rows", [0, 1, 2])
-@pytest.mark.parametrize("legend", [False, True])
-@pytest.mark.parametrize("wanted", [None, True, False])
-@pytest.mark.parametrize("both", [False, True])
-def test_no_part_covers_another_and_none_covers_what_is_free(
-    size, scale, rows, legend, wanted, both
-):
-    rows = min(rows, 1) if size[1] / scale < 420 else rows  # as the viewer does
-    layout = lay_out(size, scale, rows, legend, wanted, both=both)
-    found = boxes(layout)
-    assert ("bar" in found) == (rows > 0)
-    for left, top, right, low in (*found.values(), layout.free):
-        assert 0 <= left < right <= size[0] + 1e-6 and 0 <= top < low <= size[1] + 1e-6
-    for (one, a), (other, b) in combinations(found.items(), 2):
-        assert not overlap(a, b), (one, other)
-    if layout.folded:  # a square in the corner takes nothing away
-        assert found.pop("panel")[2] <= (16 + FOLDED) * scale + 1e-6
-    assert not any(overlap(box, layout.free) for box in found.values())
+def test_no_part_covers_another_and_none_covers_what_is_free(size, scale):
+    for way in product([0, 1, 2], [False, True], [None, True, False], [False, True]):
+        rows, legend, wanted, both = way
+        rows = min(rows, 1) if size[1] / scale < 420 else rows  # as the viewer does
+        layout = lay_out(size, scale, rows, legend, wanted, both=both)
+        found = boxes(layout)
+        assert ("bar" in found) == (rows > 0), way
+        for left, top, right, low in (*found.values(), layout.free):
+            assert 0 <= left < right <= size[0] + 1e-6 and 0 <= top < low <= size[1] + 1e-6, way
+        for (one, a), (other, b) in combinations(found.items(), 2):
+            assert not overlap(a, b), (one, other, way)
+        if layout.folded:  # a square in the corner takes nothing away
+            assert found.pop("panel")[2] <= (16 + FOLDED) * scale + 1e-6, way
+        assert not any(overlap(box, layout.free) for box in found.values()), way
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("legend", [False, True])
-def test_most_of_a_window_is_the_scenes(size, scale, legend):
+def test_most_of_a_window_is_the_scenes():
     """A third of the width at least beside an open panel and legend, and 55 % of the height."""
-    left, top, right, low = lay_out(size, scale, 1, legend).free
-    assert right - left >= 0.49 * size[0] or size[0] / scale < 850
-    assert right - left >= 0.33 * size[0] and low - top >= 0.55 * size[1]
+    for size, scale, legend in product(SIZES, SCALES, [False, True]):
+        left, top, right, low = lay_out(size, scale, 1, legend).free
+        assert right - left >= 0.49 * size[0] or size[0] / scale < 850, (size, scale, legend)
+        assert right - left >= 0.33 * size[0] and low - top >= 0.55 * size[1], (size, scale, legend)
 
 
 @pytest.mark.parametrize("legend", [False, True])

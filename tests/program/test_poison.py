@@ -9,7 +9,7 @@ from shapeshift.renderer.settings import RenderSettings
 from tests.support.renderer.poison_judge import is_precise, judge
 from tests.support.splat_scenes import alone, front_view, random_layers
 
-SEEDS = 600
+SEEDS = 300
 MANY = 20_000
 
 

@@ -115,6 +115,8 @@ def test_the_notebook_runs_cell_by_cell(demo, tmp_path, monkeypatch):
         if last is not None:
             value = eval(compile(ast.Expression(last.value), "cell", "eval"), names)
             shown.append(value._repr_png_() if hasattr(value, "_repr_png_") else repr(value))
+            if hasattr(value, "_repr_html_"):
+                shown.append(value._repr_html_())
     pictures = [each for each in shown if isinstance(each, bytes)]
     assert len(pictures) >= 4 and all(p.startswith(b"\x89PNG") for p in pictures)
     assert any("stops RGB, Thermal, Opened" in each for each in shown if isinstance(each, str))

@@ -18,6 +18,7 @@ from shapeshift.app.commands import render as render_command
 from shapeshift.renderer.reference import reference_image
 from shapeshift.runtime_models.read_scene import read_model
 from tests.support.splat_scenes import random_layers
+from tests.support.touch_scene import TOUCH
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = (64, 48)
@@ -114,11 +115,11 @@ def test_it_opens_what_the_commands_open_and_refuses_as_they_do(demo, tmp_path):
     model = read_model(ss.DEMO)
     np.testing.assert_array_equal(demo.model.anchors, model.anchors)
     assert demo.stops == model.stops and demo.x == model.stops[0].x
-    assert [obj.name for obj in ss.load(ss.TOUCH).objects][:2] == ["background", "cube"]
+    assert [obj.name for obj in ss.load(TOUCH).objects][:2] == ["background", "cube"]
     with pytest.raises(ss.BadFile, match=r"nothing\.ply does not exist; wanted is"):
         ss.load(tmp_path / "nothing.ply")
     with pytest.raises(ss.UsageError, match="up is for one model"):
-        ss.load(ss.TOUCH, up="+Z")
+        ss.load(TOUCH, up="+Z")
     assert ss.info(ss.DEMO) == demo.info() and demo.info()["splats"] == demo.splat_count
 
 
@@ -131,7 +132,7 @@ def test_x_is_a_number_a_name_a_way_or_a_blend_and_nothing_else(demo):
         with pytest.raises(ss.UsageError, match=r"^x: .*RGB, Thermal, Opened"):
             demo.at(wrong)
     for wrong in (-0.01, 1.01, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="0 to 1"):
+        with pytest.raises(ss.UsageError, match="0 to 1"):
             demo.at(wrong)
     for edge in (0.0, 1.0):
         assert demo.at(edge).x == edge
@@ -139,7 +140,7 @@ def test_x_is_a_number_a_name_a_way_or_a_blend_and_nothing_else(demo):
 
 
 def test_objects_are_placed_hidden_and_found(demo):
-    room = ss.load(ss.TOUCH)
+    room = ss.load(TOUCH)
     moved = room.with_object("cube", position=(1, 2, 3), x="fire", visible=False)
     cube = moved.object("cube")
     assert tuple(cube.world_from_object.position) == (1, 2, 3)
@@ -156,7 +157,7 @@ def test_objects_are_placed_hidden_and_found(demo):
 
 
 def test_an_object_by_its_name_gives_scenes_in_which_it_is_elsewhere():
-    room = ss.load(ss.TOUCH)
+    room = ss.load(TOUCH)
     cube = room.objects["cube"]
     assert cube.drawn is room.object("cube") and cube.name == "cube" and "cube" in repr(cube)
     before = cube.pose.position
@@ -173,13 +174,13 @@ def test_an_object_by_its_name_gives_scenes_in_which_it_is_elsewhere():
 
 
 def test_objects_are_a_tuple_still():
-    objects = ss.load(ss.TOUCH).objects
+    objects = ss.load(TOUCH).objects
     assert isinstance(objects, tuple) and objects[0].name == "background"
     assert objects[-1] is list(objects)[-1] and objects[:2] == tuple(objects)[:2]
 
 
 def test_a_scene_without_an_object_has_neither_it_nor_its_body():
-    room = ss.load(ss.TOUCH)
+    room = ss.load(TOUCH)
     names = [obj.name for obj in room.objects]
     left = room.without("cube")
     assert [obj.name for obj in left.objects] == [name for name in names if name != "cube"]

@@ -8,6 +8,7 @@ import pytest
 import shapeshift as ss
 from shapeshift.app.command_line import parse
 from tests.support.splat_scenes import random_layers
+from tests.support.touch_scene import TOUCH
 
 SMALL = (64, 48)
 
@@ -107,11 +108,11 @@ def test_bench_and_chart_give_rows(tmp_path):
 def test_a_simulation_is_that_of_the_command(tmp_path):
     from shapeshift.app.commands import simulate as command
 
-    script = ss.TOUCH.with_name("touch.jsonl")
-    words = [str(ss.TOUCH), "--out", str(tmp_path), "--script", str(script), "--seconds", "0.7"]
+    script = TOUCH.with_name("touch.jsonl")
+    words = [str(TOUCH), "--out", str(tmp_path), "--script", str(script), "--seconds", "0.7"]
     assert command.run(parse(command.Options, words, "simulate")) == 0
     rows = [json.loads(line) for line in (tmp_path / "run.jsonl").read_text().splitlines()]
-    steps = list(ss.simulate(ss.TOUCH, script, seconds=0.7))
+    steps = list(ss.simulate(TOUCH, script, seconds=0.7))
     news = [step.row for step in steps if len(step.row) > 2]
     assert json.loads(json.dumps(news)) == rows[1:-1]
     assert steps[-1].number == len(steps) == 63 and steps[-1].seconds == pytest.approx(0.7)
@@ -123,13 +124,13 @@ def test_a_simulation_goes_on_for_a_while_after_its_script(tmp_path, monkeypatch
     monkeypatch.setattr("shapeshift.api.play.AFTER_S", 0.1)
     script = tmp_path / "script.jsonl"
     script.write_text('{"t": 0.1, "do": "hand", "position": [0, 2, 0]}')
-    assert len(list(ss.simulate(ss.TOUCH, script))) == 18  # 0.2 s at 90 Hz
-    assert len(list(ss.simulate(ss.TOUCH))) == 9
+    assert len(list(ss.simulate(TOUCH, script))) == 18  # 0.2 s at 90 Hz
+    assert len(list(ss.simulate(TOUCH))) == 9
 
 
 def test_what_falls_falls_as_newton_says():
     """From 0.5 m up, nothing below it for 0.25 s: g t^2 / 2 within a step's rounding."""
-    scene = ss.load(ss.TOUCH).with_object("cube", position=(-0.22, 0.8, 0.05))
+    scene = ss.load(TOUCH).with_object("cube", position=(-0.22, 0.8, 0.05))
     steps = list(ss.simulate(scene, seconds=0.25))
     dropped = 0.8 - steps[-1].scene.object("cube").world_from_object.position[1]
     t = steps[-1].seconds
@@ -141,9 +142,9 @@ def test_what_cannot_move_is_refused_before_the_first_step(demo):
         ss.simulate(demo)
     for wrong in (0, -1, float("nan"), 1e9):
         with pytest.raises(ss.UsageError, match="seconds is"):
-            ss.simulate(ss.TOUCH, seconds=wrong)
+            ss.simulate(TOUCH, seconds=wrong)
     with pytest.raises(ss.BadFile, match="is no file"):
-        ss.simulate(ss.TOUCH, "nothing.jsonl")
+        ss.simulate(TOUCH, "nothing.jsonl")
 
 
 # ---- training

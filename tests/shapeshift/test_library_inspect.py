@@ -2,11 +2,14 @@
 
 import json
 import math
+from datetime import datetime
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import shapeshift as ss
+from shapeshift.scene.inspection import laying
 from shapeshift.scene.inspection.marks_file import MarksFile, write_marks_file
 from tests.support.scene.warm_wall import celsius_at, wall_view, write_wall
 
@@ -69,11 +72,13 @@ def test_lengths_come_with_their_uncertainty(scene):
             scene.measure("distance", *places, camera=view)
 
 
-def test_an_inspection_is_that_of_the_command(scene, tmp_path, capsys):
+def test_an_inspection_is_that_of_the_command(scene, tmp_path, capsys, monkeypatch):
     from shapeshift.app import cli
     from shapeshift.scene.cameras.camera_list import CameraList
     from shapeshift.scene.cameras.write_cameras import write_cameras
 
+    at_noon = SimpleNamespace(now=lambda: datetime(2026, 1, 2, 12))  # of both layings
+    monkeypatch.setattr(laying, "datetime", at_noon)
     cameras, table = tmp_path / "cameras.json", tmp_path / "a.csv"
     write_cameras(CameraList((wall_view(),), ("",), "test"), cameras, "ours")
     marks = {"spot": ("mid=48,36", "0.2,0,0"), "line": "10,36,86,36"}

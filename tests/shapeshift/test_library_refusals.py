@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import shapeshift as ss
+from tests.support.touch_scene import TOUCH
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def test_what_is_no_path_is_refused(demo, call, wrong, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda demo: ss.lint(ss.TOUCH, up="+Z"), "up is for one model; in touch"),
+        (lambda demo: ss.lint(TOUCH, up="+Z"), "up is for one model; in touch"),
         (lambda demo: ss.lint(ss.DEMO, memory_gb=-1), "memory is -1, expected GB"),
         (lambda demo: ss.lod(demo, "a", leaf=63), "leaf is 63, expected 64"),
         (lambda demo: ss.lod(demo, "a", sh_degree=4), "sh_degree is 4, expected 0"),
@@ -52,7 +53,7 @@ def test_what_is_no_path_is_refused(demo, call, wrong, tmp_path, monkeypatch):
         (lambda demo: ss.fit("capture", seeds=0), "seeds is 0; it has to be"),
         (lambda demo: ss.fit("capture", tolerance_db=float("nan")), "tolerance_db is nan; it"),
         (lambda demo: ss.fit("capture", anchor=3), "did you mean"),
-        (lambda demo: ss.colliders(ss.TOUCH, "a.scene.json"), 'has "hulls" as its collider'),
+        (lambda demo: ss.colliders(TOUCH, "a.scene.json"), 'has "hulls" as its collider'),
         (lambda demo: ss.stability(demo, "a", cases=["no"]), "cases: there is no case 'no'"),
         (lambda demo: demo.thermal(out="a.jpg"), r"out is a\.jpg; a file \.png is wanted"),
         (lambda demo: demo.thermal(spott="a"), "there is no option 'spott'; there are above"),
@@ -94,6 +95,28 @@ def test_ends_of_sizes_and_other_containers_are_taken(demo):
     assert demo.render(size=(1, 1)).shape == (1, 1, 3)
     assert demo.views(size=(65536, 1))[0].size == (65536, 1)
     assert demo.render(size=np.array([32, 24])).shape == demo.render(size=[32, 24]).shape
+
+
+def test_a_camera_is_a_4x4_of_transforms_json(demo):
+    orbit = demo.views("orbit", 5)
+    poses = np.array([view.world_from_eye.matrix() for view in orbit])
+    for given, views in ((poses, orbit), (poses.tolist(), orbit), (poses[2], orbit[2:3]),
+                         (poses[2].astype(np.float32), orbit[2:3])):  # fmt: skip
+        seen = demo.views(given)
+        assert len(seen) == len(views) and seen[0].tangents == demo.views("front")[0].tangents
+        for a, b in zip(seen, views, strict=True):
+            np.testing.assert_allclose(
+                a.world_from_eye.matrix(), b.world_from_eye.matrix(), atol=1e-6
+            )
+    assert demo.views(poses[0], size=(8, 8))[0].size == (8, 8)
+    mirror, moved = np.diag([1.0, 1, -1, 1]), np.eye(4)
+    moved[3, 0] = 1
+    for wrong in (2 * np.eye(4), mirror, moved, np.full((4, 4), np.nan), np.zeros((4, 4))):
+        with pytest.raises(ss.UsageError, match="a 4x4 of camera= is no rigid pose"):
+            demo.views(wrong)
+    for wrong in (np.eye(3), np.zeros((0, 4, 4)), [orbit[0], np.eye(4)], [[1, 2], [3]]):
+        with pytest.raises(ss.UsageError, match="a camera is 'orbit'"):
+            demo.views(wrong)
 
 
 def test_a_camera_that_is_no_sequence_is_refused(demo):

@@ -47,7 +47,8 @@ pytestmark = pytest.mark.slow
 def folder(tmp_path_factory):
     """Where a person types: the folder of launch.py, as far as the tutorials look into it."""
     path = tmp_path_factory.mktemp("checkout")
-    (path / "assets").symlink_to(ROOT / "assets", target_is_directory=True)
+    for folder in ("assets", "examples"):
+        (path / folder).symlink_to(ROOT / folder, target_is_directory=True)
     (path / "out").mkdir()
     return path
 

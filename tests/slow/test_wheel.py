@@ -83,7 +83,7 @@ def test_site_packages_has_one_name_of_ours(clean):
     assert names == {"shapeshift", f"shapeshift-{number}.dist-info", "dependencies.pth"}
     files = {p.relative_to(site_of(clean) / "shapeshift") for p in site_of(clean).rglob("*.cl")}
     assert Path("rasterizer/kernels/raster_cpu.cl") in files
-    for name in ("py.typed", "__init__.pyi", "assets/workshop.shift", "assets/touch.scene.json"):
+    for name in ("py.typed", "__init__.pyi", "assets/workshop.shift", "assets/demo.scene.json"):
         assert (site_of(clean) / "shapeshift" / name).is_file(), name
 
 

@@ -30,7 +30,7 @@ def three_stop_package(path: Path, anchors: int = 60, seed: int = 0) -> Path:
 def four_stop_package(path: Path) -> Path:
     """The same with a stop Melt at 0.3, as the command `style` would have written it."""
     heat = Stop("Thermal", 0.6, "thermal")
-    stops = (Stop("RGB", 0.0), Stop("Melt", 0.3), heat, Stop("Opened", 1.0))
+    stops = (Stop("RGB", 0.0), Stop("Melt", 0.3, "style"), heat, Stop("Opened", 1.0))
     encoding = encoding_for([stop.x for stop in stops])
     path.parent.mkdir(exist_ok=True)
     write_package(replace(make_random_model(60, k=3, encoding=encoding), stops=stops), path)

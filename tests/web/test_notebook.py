@@ -1,12 +1,16 @@
 """`scene.show()`: the page in a sandboxed frame, as notebooks have it."""
 
+import base64
 import io
+import re
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import shapeshift as ss
+from shapeshift.api import views
+from shapeshift.renderer.gl.context import NoContext
 from tests.support.web.page_scenes import paced_model
 
 
@@ -19,6 +23,23 @@ def test_a_picture_stays_where_no_frame_is_shown(shown):
     picture = np.asarray(Image.open(io.BytesIO(shown.png)))
     assert picture.shape == (360, 640, 3) and picture.std() > 5
     assert shown.html.count("<iframe") == 1 and "height: 300px" in shown.html
+
+
+def test_the_last_line_of_a_cell_is_a_picture_and_a_line(monkeypatch):
+    """As large as the picture, whatever the scene; where nothing can be drawn the line alone."""
+    scene = ss.Scene.from_model(paced_model(60))
+    large = ss.Scene.from_model(paced_model(3000))
+    for shown, splats in ((s._repr_html_(), s.splat_count) for s in (scene, large)):
+        png = re.search(r'^<img alt="The scene" src="data:image/png;base64,([^"]+)">', shown)[1]
+        picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(png))))
+        assert picture.shape == (360, 640, 3) and picture.std() > 5 and len(shown) < 1_000_000
+        assert f"{splats:,} splats, stops" in shown and "<iframe" not in shown
+
+    def refuse(*_args):
+        raise NoContext("none here")
+
+    monkeypatch.setattr(views, "picture_of", refuse)
+    assert scene._repr_html_() is None
 
 
 def test_a_height_that_is_none_is_refused():

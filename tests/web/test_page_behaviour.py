@@ -15,7 +15,7 @@ from shapeshift.app.page.page_scene import PageSettings
 from tests.support.web.page_pictures import write_page
 from tests.support.web.page_scenes import paced_model, several_objects
 
-TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
+TOUCH = Path(__file__).resolve().parents[2] / "examples" / "touch.scene.json"
 X = "shapeshift.renderer.objects[0].x"
 POSE = "JSON.stringify(shapeshift.camera.pose)"
 

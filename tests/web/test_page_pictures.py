@@ -248,13 +248,13 @@ def test_nothing_grows_over_shifts_and_openings(browser, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["workshop.shift", "touch.scene.json"])
+@pytest.mark.parametrize("name", ["assets/workshop.shift", "examples/touch.scene.json"])
 def test_bundled_scenes_are_drawn_right_from_three_cameras(browser, tmp_path, name):
     from shapeshift.app.document import open_document
     from shapeshift.app.opening import ReadingOptions
     from shapeshift.scene.cameras.framing import orbit_path
 
-    document = open_document(ROOT / "assets" / name, ReadingOptions())
+    document = open_document(ROOT / name, ReadingOptions())
     centre, radius = document.bounds()
     views = [document.view(SIZE), *orbit_path(3, centre, radius, SIZE)[1:]]
     page = opened(browser, document, tmp_path)

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from shapeshift.scene.pose import Pose
 from tests.support.xr.person import CARRIES, FREE, WHOLE_LIFE, Person
@@ -12,6 +13,7 @@ INTERRUPTED = 130  # exit code
 SITS_M = 1.1  # of the eyes
 
 
+@pytest.mark.slow
 def test_who_sits_and_has_one_hand_does_all_with_it(stand, start):
     settings = stand.folder / "config" / "shapeshift" / "headset.json"
     settings.parent.mkdir(parents=True)

@@ -27,6 +27,7 @@ def picture_of(folder, line: dict, side: str) -> np.ndarray:
     return np.asarray(Image.open(folder / f"{side}-{line['frame']:05d}.png"))[..., :3].astype(int)
 
 
+@pytest.mark.slow
 def test_hands_go_behind_the_table_and_the_panel_is_a_layer(stand, start):
     pictures = stand.folder / "pictures"
     asked = ("--quality", "best", "--no-hints", "--pictures", str(pictures))
@@ -58,7 +59,7 @@ def test_hands_go_behind_the_table_and_the_panel_is_a_layer(stand, start):
     assert "Traceback" not in program.told()
 
 
-@pytest.mark.parametrize("drawing", ["tiles", "quads"])
+@pytest.mark.parametrize("drawing", ["tiles", pytest.param("quads", marks=pytest.mark.slow)])
 def test_the_runtime_has_the_depth_of_rays_through_ellipsoids(stand, drawing):
     """In metres of the room, though the world looks half as large."""
     told = stand.tell(PROGRAM, drawing)

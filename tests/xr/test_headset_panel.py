@@ -47,6 +47,7 @@ def test_the_knob_is_grabbed_and_slides_the_modality(reader):
     reader.frames(2)
     line = reader.squeeze("right")
     assert line["held"]["right"] is None, "the knob is taken, not the world"
+    assert line["layers"] == ["panel", "depth", "eyes"]
     started = len(reader.program.lines)
     along = 0.003 * direction(line)  # metres a frame
     while line["panel"]["shown"] != "fire" and line["objects"]["cube"]["x"] < 0.7:

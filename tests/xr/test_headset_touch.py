@@ -11,6 +11,7 @@ HZ = 90  # steps of the physics a second
 STEP = np.array([0.05, 0.06, 0.0])  # of a hand in a frame of 50 ms: 1.0 m/s aside, 1.2 m/s up
 
 
+@pytest.mark.slow
 def test_reach_squeeze_carry_and_let_go(person):
     before = person.take("right", "ring", RING_TOP_M)
     felt = [pulse for line in person.program.lines[-6:] for pulse in line["pulses"]]

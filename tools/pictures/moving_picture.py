@@ -1,4 +1,4 @@
-"""The moving picture in README.md: the demo's slider through its stops, then a thrown cube.
+"""The moving picture in README.md: the demo's slider through its stops, then its mug is thrown.
 
 python3 tools/pictures/moving_picture.py [docs/shapeshift.webp]
 """
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -26,9 +26,10 @@ PER_SECOND = 12
 # Stops of the demo with the frames of the way to each one and of the rest there.
 WAY = (("RGB", 0, 6), ("Thermal", 10, 8), ("Opened", 10, 10), ("RGB", 10, 4))
 SWAY_DEGREES, TURN_FRAMES = 14.0, 58  # of the camera about the scene, there and back once
-TOUCH_FROM_S, TOUCH_FRAMES = 2.5, 38  # of the script of the touch scene, in real time
-EYE, TARGET, FOV_Y = (0.03, 0.42, 0.82), (0.0, 0.1, 0.0), 0.75  # metres, radians
-THROWN, HAND = "cube", "left"  # what the script throws, and the hand that does
+TOUCH_FROM_S, TOUCH_FRAMES = 0.3, 38  # of the demo's script, in real time
+HEATS_S = (0.6, 1.2)  # of the script: the slider goes from RGB to Thermal meanwhile
+EYE, TARGET, FOV_Y = (0.03, 0.42, 0.98), (0.02, 0.08, 0.1), 0.75  # metres, radians
+HAND = "right"
 BACKGROUND = (0.075, 0.078, 0.085)  # that of the viewer
 LIGHT, DIM, ACCENT = (235, 235, 235), (150, 150, 150), (255, 178, 64)
 QUALITY = 78  # of WebP: below a megabyte
@@ -68,25 +69,26 @@ def slider_frames(renderer: ss.Renderer) -> Iterator[Image.Image]:
 
 
 def touch_frames(renderer: ss.Renderer) -> Iterator[Image.Image]:
-    """The touch scene while the script's hand carries and throws; a ring marks the hand."""
+    """The demo while its script's hand carries and throws; a ring marks the hand."""
     scene = ss.load(ss.TOUCH)
-    script, items = ss.TOUCH.with_name("touch.jsonl"), scene.subject.file.all_items
+    script, items = ss.TOUCH.with_name("demo.jsonl"), scene.subject.file.all_items
     acts = read_script(script, items)
     view = replace(
         scene.views("front", 1, SIZE)[0],
         world_from_eye=ss.look_at(np.array(EYE), np.array(TARGET)),
         tangents=ss.perspective(FOV_Y, SIZE),
     )  # fmt: skip
-    states = {state.name: state.x for item in items if item.name == THROWN for state in item.states}
+    stops = {stop.name: stop.x for stop in ss.load(ss.DEMO).stops}
     times = [TOUCH_FROM_S + i / PER_SECOND for i in range(TOUCH_FRAMES)]
     for step in ss.simulate(scene, script, seconds=times[-1] + 0.1):
         if not times or step.seconds < times[0] - 1e-9:
             continue
         times.pop(0)
-        picture = to_image(renderer.render(step.scene, view))
+        part = float(np.clip((step.seconds - HEATS_S[0]) / (HEATS_S[1] - HEATS_S[0]), 0, 1))
+        x = stops["Thermal"] * part**2 * (3 - 2 * part)
+        picture = to_image(renderer.render(step.scene.at(x), view))
         draw_hand(picture, view, acts, step.seconds)
-        (x,) = (each.x for each in step.scene.objects if each.name == THROWN)
-        draw_slider(picture, states, float(cast(Any, x)))
+        draw_slider(picture, stops, x)
         yield picture
 
 

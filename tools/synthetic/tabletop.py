@@ -1,6 +1,6 @@
 """The example of docs/scene.md: three things on a table that answer to touch, as plain splats.
 
-    python3 -m tools.synthetic.tabletop assets
+    python3 -m tools.synthetic.tabletop examples
 
 writes touch.scene.json, touch.jsonl and the folder touch/ anew, the same each time.
 """

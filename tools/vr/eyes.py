@@ -24,7 +24,7 @@ import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.document import Document
 from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.scene_shelf import open_xr
-from shapeshift.app.paths import DEMO, TOUCH
+from shapeshift.app.paths import ASSETS, DEMO
 from shapeshift.renderer.foveation import hidden_pixels
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
@@ -32,6 +32,7 @@ from shapeshift.scene.pose import HiddenMesh, Pose, View
 from tests.support.xr.masked_eyes import frame_mesh
 from tests.support.xr.remote import EYE_DEGREES, EYES_APART_M
 
+TOUCH = ASSETS.parent / "examples" / "touch.scene.json"
 TURNS = 15
 COLUMNS = "scene,eye,case,hidden,cpu_ms,depth_ms,ratio"
 NEAR = 0.3  # so near the bundled scene fills the picture

@@ -28,7 +28,7 @@ import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.document import Document
 from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.scene_shelf import open_xr
-from shapeshift.app.paths import DEMO, TOUCH
+from shapeshift.app.paths import ASSETS, DEMO
 from shapeshift.renderer.foveation import RADIUS_DEGREES, fovea_of
 from shapeshift.renderer.gl.context import open_context
 from shapeshift.renderer.renderer import Renderer
@@ -37,6 +37,7 @@ from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
 
+TOUCH = ASSETS.parent / "examples" / "touch.scene.json"
 TURNS = 11
 COLUMNS = "drawing,scene,splats,eye,case,cpu_ms,ratio,inside_db,outside_db"
 CASES = {

@@ -16,9 +16,10 @@ from typing import Any, cast
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import shapeshift  # noqa: F401  makes the folders its packages
-from shapeshift.app.headset.headset import DEMO, Options
+from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.panel_picture import PanelPicture
 from shapeshift.app.headset.scene_shelf import open_xr
+from shapeshift.app.paths import TOUCH
 from shapeshift.renderer.gl.context import open_context
 from tests.support.vr.vr_hands import a_frame, hand_at
 from tests.support.vr.vr_panel import FROM, LEFT, Wearer, a_state
@@ -32,7 +33,7 @@ def main() -> None:
     options.add_argument("--out", type=Path, required=True)
     out = options.parse_args().out
     ctx = open_context()
-    wearer = Wearer(PanelPicture(ctx), a_state(open_xr(DEMO, Options())[1]))
+    wearer = Wearer(PanelPicture(ctx), a_state(open_xr(TOUCH, Options())[1]))
     hand = hand_at(FROM, wearer.room((400.0, 600.0)))
     away = replace(hand, aim=None, grip=None, active=False)
     rows = [row(ctx, wearer, "a ray on it", hand), row(ctx, wearer, "at rest", away)]

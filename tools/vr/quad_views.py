@@ -25,7 +25,7 @@ from foveation import crowd, eyes_in
 import shapeshift  # noqa: F401  makes the folders its packages
 from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.scene_shelf import open_xr
-from shapeshift.app.paths import DEMO, TOUCH
+from shapeshift.app.paths import ASSETS, DEMO
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.resolution import bilinear
 from shapeshift.renderer.settings import RenderSettings
@@ -34,6 +34,7 @@ from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 from shapeshift.vr.openxr.view_configuration import with_insets
 
+TOUCH = ASSETS.parent / "examples" / "touch.scene.json"
 TURNS = 11
 COLUMNS = "scene,splats,eye,case,pixels,cpu_ms,ratio,inside_db,outside_db"
 Box = tuple[int, int, int, int]  # left, top, width, height, pixels

@@ -19,11 +19,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 
 import shapeshift  # noqa: F401  makes the folders its packages
-from shapeshift.app.paths import DEMO, TOUCH
+from shapeshift.app.paths import ASSETS, DEMO
 from tests.support.xr.person import Person
 from tests.support.xr.walk import walk
 from tests.support.xr.xr_stand import Program, Stand, find_runtime, start_program
 
+TOUCH = ASSETS.parent / "examples" / "touch.scene.json"
 TIMES = ("own_ms", "wait_ms", "shown_ms")
 COLUMNS = [
     "quality", "around", "depth", "eye", "seconds", "frames", "period_ms", "in_time", "dropped",

@@ -1,6 +1,6 @@
 """A page in headless Chromium on two cores: sizes, likeness, and processor time of its passes.
 
-    python3 tools/web/measure.py assets/workshop.shift assets/touch.scene.json --out FILE
+    python3 tools/web/measure.py assets/workshop.shift examples/touch.scene.json --out FILE
 
 Processor time is that of all of the browser's processes; software GL (llvmpipe) draws.  Each figure
 of a pass is the mean of RUNS after one that is not counted; `frame` is what a moving eye asks for

@@ -1,11 +1,15 @@
 """The door to OpenXR: which runtime is active, which headset it has, or one sentence why none."""
 
 import os
+import platform
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+from shapeshift.runtime_models.files.json_fields import saved_object
+from shapeshift.runtime_models.files.plain_text import LONGEST_NAME, one_line
 from shapeshift.runtime_models.program import package_words
 
 NAME = "Shapeshift"
@@ -27,9 +31,18 @@ WANTED = (
     QUAD_VIEWS,
 )  # good to have
 HOW_TO = (
-    "start SteamVR, WiVRn or Monado and make it the active OpenXR runtime, "
-    "or name its manifest in XR_RUNTIME_JSON"
+    "start SteamVR, WiVRn or Monado and make it the active OpenXR runtime, or name its manifest in "
+    "XR_RUNTIME_JSON (a Quest comes to SteamVR over Steam Link, Link, Air Link or Virtual Desktop)"
 )
+TO_RUN = {  # a word of a runtime's name or files -> what has to run before it opens
+    "monado": "start its service, `monado-service`, and leave it running",
+    "wivrn": "start its server, `wivrn-server` or its window, and connect the headset",
+    "steam": "start SteamVR and connect the headset",
+    "oculus": "start Meta's Link program, connect the headset and put it on",
+    "virtualdesktop": "connect the headset to Virtual Desktop's Streamer",
+}
+SYSTEM = "/etc"
+LARGEST_MANIFEST = 100_000  # bytes
 
 
 class NoHeadset(RuntimeError):
@@ -51,7 +64,7 @@ class Instance:
 
     def __init__(self, insets: bool = False) -> None:
         self.xr = xr = load()
-        self.runtime = "the active OpenXR runtime"
+        self.runtime, what_to_run = active_runtime()
         self.extensions = self._choose_extensions()
         newer = insets and QUAD_VIEWS not in self.extensions
         try:
@@ -61,6 +74,8 @@ class Instance:
             raise NoHeadset(
                 f"{self.runtime} refuses us ({type(error).__name__}); update it, or {HOW_TO}."
             ) from None
+        except Lost as failed:  # its library answers, what it talks to does not run
+            raise NoHeadset(f"{str(failed)[:-1]}; {what_to_run}, then start again.") from None
         try:
             self._name_runtime()
             self._find_headset()
@@ -156,6 +171,39 @@ def load():
             "installs it, and Linux needs libgl1."
         ) from missing
     return xr
+
+
+def active_runtime() -> tuple[str, str]:
+    """What the active runtime is called by its manifest, which is read where OpenXR's loader looks
+    for it, and what has to run for it.
+    """
+    for path in manifests():
+        about = saved_object(path, LARGEST_MANIFEST).get("runtime")
+        if not isinstance(about, dict):
+            continue
+        name = one_line(str(about.get("name") or ""), LONGEST_NAME)
+        said = f"{name} {about.get('library_path')} {path.name}".replace("-", "").lower()
+        what = next((what for word, what in TO_RUN.items() if word in said), HOW_TO)
+        return (f"the OpenXR runtime {name}" if name else f"the OpenXR runtime of {path}"), what
+    return "the active OpenXR runtime", HOW_TO
+
+
+def manifests() -> list[Path]:
+    """Where the active runtime's manifest may lie, the first that is there counts."""
+    if named := os.environ.get("XR_RUNTIME_JSON"):
+        return [Path(named)]
+    if sys.platform == "win32":
+        import winreg
+
+        try:
+            with winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, r"SOFTWARE\Khronos\OpenXR\1") as key:
+                return [Path(winreg.QueryValueEx(key, "ActiveRuntime")[0])]
+        except OSError:
+            return []
+    home = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
+    folders = [home, *os.environ.get("XDG_CONFIG_DIRS", "/etc/xdg").split(":"), SYSTEM]
+    names = (f"active_runtime.{platform.machine()}.json", "active_runtime.json")
+    return [Path(folder, "openxr/1", name) for folder in folders for name in names]
 
 
 def _no_runtime() -> str:

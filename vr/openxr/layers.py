@@ -40,7 +40,9 @@ class QuadPicture:
 
 
 class FrameLayers:
-    """The runtime's images of a session; `depth`: the format of the eyes' depths, "" for none."""
+    """The runtime's images of a session; `sizes` of the eyes' pictures, `depth`: the format of
+    their depths, "" for none.  Both are known after it was closed or lost, too: reports have them.
+    """
 
     def __init__(
         self,
@@ -57,18 +59,12 @@ class FrameLayers:
         self.kept_depth: list[np.ndarray] = []  # (H, W) an eye
         self.last: list[str] = []  # names of what the last frame handed over
         self._eyes = [Swapchain(instance, session, ctx, size, pixels) for size in sizes]
+        self.sizes = list(sizes)
         self._depths = self._open_depths()
+        self.depth = self._depths[0].pixels.name if self._depths else ""
         self._deep: list[Any] = []  # of the last frame
         self._panel: Swapchain | None = None
         self._panel_version: int | None = None  # that lies in it
-
-    @property
-    def sizes(self) -> list[tuple[int, int]]:
-        return [chain.size for chain in self._eyes]
-
-    @property
-    def depth(self) -> str:
-        return self._depths[0].pixels.name if self._depths else ""
 
     def _open_depths(self) -> list[DepthSwapchain]:
         """None where the runtime or the driver takes no depth: frames go without."""

@@ -14,11 +14,10 @@ WHAT = (
     "run, or a scene file."
 )
 FORMATS = ".shift  .ply  .spz  .splat  .ksplat  .sog  .glb  .scene.json"
-DEMO_LABEL, TOUCH_LABEL, OPEN = "The demo", "Things to touch", "Open\u2026"
+DEMO_LABEL, OPEN = "The demo", "Open\u2026"
 CHOICES = {
     OPEN: "Name a file or folder. Ctrl+O.",
-    DEMO_LABEL: "A workshop bench in three stops: photo, thermal, opened.",
-    TOUCH_LABEL: "A table with objects that can be grabbed and thrown.",
+    DEMO_LABEL: "A bench in photo, thermal, opened; throw its mug and its wrench.",
 }
 
 

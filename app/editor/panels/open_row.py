@@ -1,12 +1,11 @@
-"""The panel's row of files: open one, one of those opened before, or what else there is to see."""
+"""The panel's row of files: open one, or one of those opened before."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
 
-from shapeshift.app.editor.panels.empty_panel import CHOICES, OPEN
+from shapeshift.app.editor.panels.empty_panel import OPEN
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
 from shapeshift.app.editor.panels.widgets.panel_rows import item_label, tip
@@ -29,13 +28,9 @@ class OpenRow:
         self._present: dict[Path, bool] = {}
 
     def draw(
-        self, recent: RecentFiles | None, pictures: RecentPictures | None,
-        others: Mapping[str, Path], ui_scale: float,
-    ) -> tuple[str, Path | None]:  # fmt: skip
-        """Returns OPEN or NEW where that was clicked, and the file that was chosen.
-
-        `others` of CHOICES have a button each.
-        """
+        self, recent: RecentFiles | None, pictures: RecentPictures | None, ui_scale: float
+    ) -> tuple[str, Path | None]:
+        """Returns OPEN or NEW where that was clicked, and the file that was chosen."""
         listed = recent is not None and bool(recent.paths)
         gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
         count = 2 + listed
@@ -51,10 +46,6 @@ class OpenRow:
         if recent is not None and listed:
             imgui.same_line()
             chosen = self._recent(recent, pictures, ui_scale)
-        for label, path in others.items():
-            if imgui.button(item_label(label), Vec(-1, 0)):
-                chosen = path
-            tip(CHOICES[label], ui_scale)
         return clicked, chosen
 
     def _recent(

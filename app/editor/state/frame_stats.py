@@ -29,14 +29,18 @@ class Meter:
         self._frames: deque[FrameTimes] = deque()
         self.geometry_runs = self.color_runs = 0  # since the start
 
-    def note(self, now: float, ms: float, stats: FrameStats) -> None:
-        """Takes a frame in and forgets those that are too old."""
+    def note(self, now: float, ms: float, stats: FrameStats) -> float:
+        """Takes a frame in and forgets those that are too old.  Returns what it took: ms, or longer
+        on a GPU, since nobody waits for one.
+        """
+        ms = max(ms, sum(stats.ms.values()))
         frame = FrameTimes(now, ms, stats.sorts, stats.geometry_runs, stats.color_runs)
         self._frames.append(frame)
         self.geometry_runs += stats.geometry_runs
         self.color_runs += stats.color_runs
         while len(self._frames) > FEWEST and self._frames[0].when < now - SECOND:
             self._frames.popleft()
+        return ms
 
     @property
     def ms(self) -> float:

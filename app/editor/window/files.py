@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.app.camera_files import camera_reading, in_scene
 from shapeshift.app.editor.options import Options
-from shapeshift.app.editor.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
+from shapeshift.app.editor.panels.empty_panel import OPEN, draw_empty
 from shapeshift.app.editor.panels.open_row import NEW, OpenRow
 from shapeshift.app.editor.panels.widgets.boxes import PathBox
 from shapeshift.app.editor.panels.widgets.overlay_renderer import Textures
@@ -22,7 +22,7 @@ from shapeshift.app.editor.state.user.recent import RecentFiles
 from shapeshift.app.editor.state.user.recent_pictures import RecentPictures
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.window import Drop, Event, KeyDown
-from shapeshift.app.paths import DEMO, TOUCH, config_folder
+from shapeshift.app.paths import TOUCH, config_folder
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.scene import Scene
 
@@ -49,7 +49,6 @@ class Files:
         self.recent: RecentFiles | None = None  # None: nothing is kept
         self.pictures: RecentPictures | None = None  # of those
         self.picture_due: Path | None = None  # what is open, of which a picture is wanted
-        self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
         # Reads one scene, in the thread that opens; replaced where progress can be shown.
         self.read: ReadModel = lambda path, progress: state.read_model(path)
         self._row = OpenRow(textures)
@@ -70,7 +69,6 @@ class Files:
     def started(self, found: OpenedFiles) -> None:
         """The scene and cameras with which the window opens."""
         options = self._options
-        self._at_demo = not (options.scenes or options.touch)
         if options.screenshot is None:
             self.recent = RecentFiles.read(config_folder())
             self.pictures = RecentPictures(config_folder())
@@ -90,7 +88,7 @@ class Files:
     def _show_nothing(self) -> None:
         self._state.open_sources((), Scene(()))
         self._actions.upload(Scene(()))
-        self._at_demo, self.picture_due = False, None
+        self.picture_due = None
         self._state.messages.problems = []
         self._actions.opened()
         self._viewpoint.follow_cameras(None, False)
@@ -147,7 +145,6 @@ class Files:
                 state.problem = str(error)
                 return
             state.open_sources(found.sources, scene, first_look(found), edited)
-            self._at_demo = [source.path for source in found.sources] == [DEMO]
             state.messages.problems = []
             self._actions.opened()
         self.use_cameras(found, look_through=not found.sources)
@@ -167,10 +164,7 @@ class Files:
 
     def draw_row(self, ui_scale: float) -> None:
         """The buttons under the panel's title."""
-        here = self._state.edited.path
-        others = {TOUCH_LABEL: TOUCH} if self._at_demo else {DEMO_LABEL: DEMO}
-        others = others if self._at_demo or here == TOUCH else {}
-        clicked, chosen = self._row.draw(self.recent, self.pictures, others, ui_scale)
+        clicked, chosen = self._row.draw(self.recent, self.pictures, ui_scale)
         if clicked == OPEN:
             self.ask()
         elif clicked == NEW:
@@ -191,7 +185,7 @@ class Files:
         if clicked == OPEN:
             self.ask()
         elif clicked:
-            self.open_soon((TOUCH if clicked == TOUCH_LABEL else DEMO,))
+            self.open_soon((TOUCH,))
         return box
 
     def remember_all(self, found: OpenedFiles) -> None:

@@ -252,8 +252,8 @@ class Viewer:
         self.window.swap()
         now = self.readings.now = time.perf_counter()
         if fresh:
-            self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
-            self.dial.seen((now - start) * 1e3, self._moving)
+            ms = self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
+            self.dial.seen(ms, self._moving)
         self.readings.idle = not fresh
         if self.files.picture_due is not None and not fresh:
             self.files.keep_picture(self.renderer.resolved(0))

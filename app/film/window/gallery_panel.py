@@ -36,13 +36,18 @@ def draw_gallery(gallery: Gallery, styles: StyleWork, textures: Textures, ui_sca
 def _pictures(gallery: Gallery, textures: Textures, ui_scale: float) -> None:
     gap = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - gap * (COLUMNS - 1)) / COLUMNS
-    for number, stop in enumerate(gallery.stops):
-        if number % COLUMNS:
-            imgui.same_line()
-        imgui.begin_group()
-        if _picture(gallery, textures, number, width, ui_scale):
-            gallery.pick(stop.name)
-        imgui.end_group()
+    stops = gallery.stops
+    for styled in (False, True):  # styles have a row of their own below what was photographed
+        row = [n for n, stop in enumerate(stops) if (stop.kind == "style") == styled]
+        if styled and 0 < len(row) < len(stops):
+            imgui.text_disabled(said("Styles"))
+        for place, number in enumerate(row):
+            if place % COLUMNS:
+                imgui.same_line()
+            imgui.begin_group()
+            if _picture(gallery, textures, number, width, ui_scale):
+                gallery.pick(stops[number].name)
+            imgui.end_group()
 
 
 def _way(gallery: Gallery, ui_scale: float) -> None:

@@ -68,7 +68,7 @@ def written(visits, tmp_path_factory):
 
 def refused(capsys, *words) -> str:
     """The sentence with which the command refuses."""
-    assert cli.main(["change", *map(str, words), *NO_GL]) == 2
+    assert cli.main(["change", *map(str, words), "--size", "96x72", *NO_GL]) == 2
     said = capsys.readouterr().err.strip().splitlines()
     said = [line for line in said if not line.startswith("change: ")]  # progress, after a minute
     assert len(said) == 1, said

@@ -13,6 +13,7 @@ from shapeshift.app.document import Document
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.framing import default_view, frame_points, model_points
 from tests.support.models import make_random_model, random_package
+from tests.support.touch_scene import TOUCH
 
 QUICK = ["--size", "48x32", "--frames", "2", "--sweep", "2"]
 
@@ -64,13 +65,16 @@ def test_an_earlier_run_is_replaced_and_nothing_else(scene, tmp_path, capsys):
         (tmp_path / name).write_bytes(whole)
 
 
-def test_the_main_job_plays_the_touch_scene(scene, tmp_path, capsys, monkeypatch):
+def test_the_main_job_plays_a_scene_of_things(scene, tmp_path, capsys, monkeypatch):
     """Its hands carry, shoot and throw; the picture shows four moments, the table what it costs."""
     monkeypatch.setattr(headless, "DEMO", scene)
     monkeypatch.setattr(touch_film, "STEPS", 6)
+    monkeypatch.setattr(touch_film, "MOMENTS_S", (0.0, 1.6, 3.85, 6.0))
+    monkeypatch.setattr(touch_film, "SCENE", TOUCH)
+    monkeypatch.setattr(touch_film, "SCRIPT", TOUCH.with_name("touch.jsonl"))
     assert run("--scene", scene, "--out", tmp_path, *QUICK) == 0
     told = capsys.readouterr()
-    assert "touch scene" in told.err and "its physics" in told.err and "touch.png" in told.err
+    assert "in motion" in told.err and "its physics" in told.err and "touch.png" in told.err
     touch = json.loads(told.out)["touch"]
     assert touch == json.loads((tmp_path / "bench.json").read_text())["touch"]
     assert (touch["objects"], touch["splats"], touch["reactions"]) == (5, 32_000, 6)
@@ -92,7 +96,7 @@ def test_without_bodies_the_rest_of_the_job_goes_on(scene, tmp_path, capsys, mon
     monkeypatch.setattr(touch_film, "film", refuse)
     assert run("--scene", scene, "--out", tmp_path, *QUICK) == 0
     told = capsys.readouterr()
-    assert "The touch scene is left out: object 'ring'" in told.err
+    assert "The demo in motion is left out: object 'ring'" in told.err
     assert json.loads(told.out)["touch"] is None and not (tmp_path / "touch.png").exists()
 
 

@@ -27,7 +27,7 @@ from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import first_view, read_models, scene_of
 from tests.support.splats.gltf_files import plain_splats
 
-SCENE = Path(__file__).resolve().parents[3] / "assets" / "touch.scene.json"
+SCENE = Path(__file__).resolve().parents[3] / "examples" / "touch.scene.json"
 SIZE = (96, 54)
 ROWS = [BudgetRow("exact", RenderSettings(), 2.0, 200.0)]
 

@@ -24,7 +24,7 @@ absent = [name for name in ("rapier3d", "coacd") if find_spec(name) is None]
 pytestmark = pytest.mark.skipif(bool(absent), reason=f"not installed: {', '.join(absent)}")
 
 ROOT = Path(__file__).resolve().parents[3]
-SCENE, SCRIPT = ROOT / "assets" / "touch.scene.json", ROOT / "assets" / "touch.jsonl"
+SCENE, SCRIPT = ROOT / "examples" / "touch.scene.json", ROOT / "examples" / "touch.jsonl"
 
 
 def rows_of(folder: Path) -> list[dict]:

@@ -7,11 +7,12 @@ import pytest
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.app.errors import UsageError
-from shapeshift.app.paths import DEMO, TOUCH
+from shapeshift.app.paths import DEMO
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.document.edits import MOST_SECTIONS
 from shapeshift.scene.sections.section_texts import read_section
+from tests.support.touch_scene import TOUCH
 
 
 def opened(path):

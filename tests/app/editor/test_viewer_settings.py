@@ -11,7 +11,7 @@ from shapeshift.app.editor.state.user.settings import (
     default_text_size,
     other_text_size,
 )
-from shapeshift.app.paths import ASSETS, DEMO, WorkFolders, is_bundled
+from shapeshift.app.paths import ASSETS, DEMO, TOUCH, WorkFolders, is_bundled
 
 
 def test_settings_come_back(tmp_path):
@@ -135,8 +135,8 @@ def test_work_goes_to_the_documents_and_is_told_absolutely(tmp_path, monkeypatch
 def test_what_came_with_the_program_is_known_through_links(tmp_path):
     link = tmp_path / "link"
     link.symlink_to(ASSETS)
-    for path in (DEMO, ASSETS, ASSETS / "new.scene.json", link / "touch.scene.json"):
+    for path in (DEMO, ASSETS, ASSETS / "new.scene.json", link / TOUCH.name):
         assert is_bundled(path)
-    assert not is_bundled(tmp_path / "touch.scene.json")
+    assert not is_bundled(tmp_path / TOUCH.name)
     assert not is_bundled(ASSETS.parent / "mine.scene.json")
     assert not is_bundled(ASSETS / ".." / "mine.scene.json")

@@ -11,9 +11,11 @@ import pytest
 from shapeshift.app.cli import main
 from shapeshift.app.document import DARK
 from shapeshift.app.headset import headset
-from shapeshift.app.headset.headset import DEMO, NO_HEADSET, Options, interrupting
+from shapeshift.app.headset.headset import NO_HEADSET, Options, interrupting
 from shapeshift.app.headset.scene_shelf import open_xr
+from shapeshift.app.paths import TOUCH as DEMO_SCENE
 from shapeshift.vr.openxr.instance import Lost, NoHeadset
+from tests.support.touch_scene import TOUCH
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -42,7 +44,7 @@ def test_without_a_headset_the_viewer_opens_the_same_scene(monkeypatch, viewer, 
     scene = ROOT / "assets" / "workshop.shift"
     assert main(["vr", str(scene), "--max-splats", "500"]) == 0
     assert main(["vr"]) == 0
-    assert [each.scenes for each in viewer] == [(scene,), (DEMO,)]
+    assert [each.scenes for each in viewer] == [(scene,), (DEMO_SCENE,)]
     assert [each.max_splats for each in viewer] == [500, 0]
     said = capsys.readouterr()
     assert said.out == "" and said.err.splitlines()[:1] == [f"shapeshift vr: {reason}"]
@@ -79,7 +81,7 @@ def test_without_a_display_nothing_is_opened(monkeypatch, viewer, capsys):
         (["--vignette", "1.01"], "--vignette is 1.01, expected 0 to 1."),
         (["nothing.ply"], "there is no nothing.ply."),
         (["--report", "no/where/r.json"], "there is no folder"),
-        (["--lines", str(DEMO)], "touch.scene.json is the scene; choose another file."),
+        (["--lines", str(DEMO_SCENE)], "demo.scene.json is the scene; choose another file."),
     ],
 )
 def test_wrong_options_are_one_sentence(capsys, wrong, sentence):
@@ -108,7 +110,7 @@ def test_a_second_ctrl_c_ends_at_once_and_none_changes_nothing():
 
 
 def test_a_scene_file_is_a_world_with_a_floor():
-    document, editor = open_xr(DEMO, Options())
+    document, editor = open_xr(TOUCH, Options())
     world = editor.world
     assert document.floor_y == -0.7 and document.background_or(DARK) == DARK
     named = {obj.name for obj in document.scene.objects}

@@ -14,7 +14,7 @@ from shapeshift.app.headset.save_start import save_start
 from shapeshift.app.headset.scene_shelf import PICTURE_AFTER, SceneShelf, open_xr
 from shapeshift.app.headset.session.recorder import Shutter
 from shapeshift.app.opening import ReadingOptions
-from shapeshift.app.paths import DEMO, TOUCH
+from shapeshift.app.paths import TOUCH
 from shapeshift.scene.pose import look_at
 from tests.support.three_stops import three_stop_package
 from tests.support.vr.vr_panel import an_editor, item
@@ -44,7 +44,7 @@ def polled(shelf: SceneShelf, fail) -> object:
 def test_a_scene_is_read_in_a_thread_and_comes_first_in_the_list(tmp_path, package):
     said: list[str] = []
     shelf = SceneShelf(tmp_path / "config", keeps=True)
-    assert shelf.rows == [("The demo", DEMO), ("Things to touch", TOUCH)]
+    assert shelf.rows == [("The demo", TOUCH)]
     shelf.open(tmp_path / "gone.shift")
     shelf.open(package)  # not while another one is read
     assert polled(shelf, said.append) is None
@@ -60,7 +60,7 @@ def test_a_scene_is_read_in_a_thread_and_comes_first_in_the_list(tmp_path, packa
     quiet = SceneShelf(tmp_path / "config", shown=package)
     assert quiet.rows[0] == ("three.shift", package)
     again = SceneShelf(tmp_path / "other", shown=package)
-    assert again.rows == [("The demo", DEMO), ("Things to touch", TOUCH)]
+    assert again.rows == [("The demo", TOUCH)]
     assert RecentFiles.read(tmp_path / "other").paths == (), "it keeps nothing unasked"
 
 
@@ -132,11 +132,11 @@ def test_work_is_not_lost_by_one_press(ctx):
     wearer.unfold("Scenes")
     wearer.scroll_to("The demo")
     wearer.press("The demo")
-    assert opened == [DEMO]
+    assert opened == [TOUCH]
     objects = ObjectEdits(wearer.editor, None, lambda: None)
     objects.change(wearer.editor.edited.file.items[0], "mass", mass_kg=2.0)
     wearer.press("The demo")
-    assert opened == [DEMO] and "lose" in wearer.editor.messages.note
+    assert opened == [TOUCH] and "lose" in wearer.editor.messages.note
     wearer.press("The demo")
-    assert opened == [DEMO, DEMO]
+    assert opened == [TOUCH, TOUCH]
     picture.release()

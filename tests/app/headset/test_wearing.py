@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.document import DARK
-from shapeshift.app.headset.headset import DEMO, Options
+from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.headset_report import Report
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.scene_shelf import open_xr
@@ -20,6 +20,7 @@ from shapeshift.vr.floor import REST
 from shapeshift.vr.frame import LOST, SIDES, Frame
 from shapeshift.vr.openxr.events import Life
 from shapeshift.vr.pace import FramePace
+from tests.support.touch_scene import TOUCH
 
 PERIOD = 1 / 90
 HEAD = Pose(np.array([0.3, 1.6, -0.2]), np.array([np.cos(0.4), 0.0, np.sin(0.4), 0.0]))
@@ -114,7 +115,7 @@ class Played:
 
 @pytest.fixture(scope="module")
 def scene():
-    return open_xr(DEMO, Options())
+    return open_xr(TOUCH, Options())
 
 
 @pytest.fixture

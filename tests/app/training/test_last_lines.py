@@ -23,7 +23,7 @@ WRITERS = [
     (("export", "random.shift", "--out", "b.shift"), "{}/b.shift: "),
     (("compare", "random.shift@0", "random.shift@1", "--out", "out", *SMALL), "sheets in {}/out\n"),
     (
-        ("simulate", str(ROOT / "assets/touch.scene.json"), "--seconds", "0.02", "--out", "run"),
+        ("simulate", str(ROOT / "examples/touch.scene.json"), "--seconds", "0.02", "--out", "run"),
         "run.jsonl in {}/run\n",
     ),
     (("cameras", "view.json", "--out", "views.json"), "1 camera in {}/views.json\n"),

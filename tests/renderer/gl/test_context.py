@@ -9,6 +9,7 @@ import moderngl
 import numpy as np
 import pytest
 
+from shapeshift.renderer.gl import context
 from shapeshift.renderer.gl.context import (
     KINDS,
     VERSIONS,
@@ -18,7 +19,8 @@ from shapeshift.renderer.gl.context import (
     is_software,
     open_context,
 )
-from shapeshift.renderer.timing import PassTimer
+from shapeshift.renderer.gl.layered import GlFunctions
+from shapeshift.renderer.timing import MOST_UNDER_WAY, PassTimer
 
 ROOT = Path(__file__).resolve().parents[3]
 TRIPLE = """#version 430
@@ -141,17 +143,52 @@ def test_a_failing_pass_does_not_break_the_timer():
     assert timer.collect() == {}
 
 
-def test_the_drivers_timer_counts_what_the_driver_does(ctx):
+@pytest.fixture
+def queries(monkeypatch) -> list[moderngl.Query]:
+    """All that are made from now on, by timers that take this machine's GL for a GPU's."""
+    made, query = [], moderngl.Context.query
+
+    def noted(*arguments, **kinds):
+        made.append(query(*arguments, **kinds))
+        return made[-1]
+
+    monkeypatch.setattr(moderngl.Context, "query", noted)
+    monkeypatch.setattr(context, "SOFTWARE", ("none such",))
+    return made
+
+
+def test_the_drivers_timer_counts_what_the_driver_does(ctx, queries):
     timer = PassTimer(ctx)
-    timer._gpu, timer._software = ctx, None  # as on a GPU, which no machine of tests has
     target = ctx.framebuffer([ctx.texture((512, 512), 4, dtype="f4")])
     for _ in range(2):  # queries are used again
         for name, on_gpu in (("decode", False), ("splat", True), ("splat", True)):
             with timer.time(name, on_gpu):
                 target.clear(0.5, 0.5, 0.5, 1.0)
-        took = timer.collect()
+        took = timer.collect(wait=True)
         assert list(took) == ["decode", "splat"] and all(ms >= 0 for ms in took.values())
-    assert len(timer._unused) == 2  # queries that wait to be used again: GL counts none
+        assert timer.age == 0
+    assert len(queries) == 2
+
+
+def test_times_of_a_gpu_that_is_behind_are_of_a_frame_before(ctx, queries, monkeypatch):
+    """Ten frames of which none gets done: nobody waits, and no more is asked for than may be under
+    way; then all are done, and the newest is told with its age."""
+    behind, call = [True], GlFunctions.call
+
+    def slow(self, name, *arguments):
+        return 0x911B if behind and "Wait" in name else call(self, name, *arguments)
+
+    monkeypatch.setattr(GlFunctions, "call", slow)  # GL_TIMEOUT_EXPIRED
+    timer = PassTimer(ctx)
+    target, frames = ctx.framebuffer([ctx.texture((8, 8), 4)]), 10
+    for number in range(frames):
+        with timer.time(f"pass {number}"):
+            target.clear()
+        assert (timer.collect(), timer.age) == ({}, number + 1)
+    behind.clear()
+    ctx.finish()
+    assert list(timer.collect()) == [f"pass {MOST_UNDER_WAY - 1}"]
+    assert timer.age == frames + 1 - MOST_UNDER_WAY and len(queries) == MOST_UNDER_WAY
 
 
 @pytest.mark.parametrize("newest", VERSIONS)

@@ -1,11 +1,11 @@
 """Whole frames decoded by our kernel against onnxruntime's, and what runs where is said."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from shapeshift.app.paths import DEMO
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models import session
@@ -19,7 +19,6 @@ from tests.support.renderer.selected_scenes import VIEW, selected_scene
 from tests.support.splat_scenes import alone, front_view, psnr_db, random_model, stereo_views
 
 LEAST_DB = 100  # of a frame by one decoder against the other's: 1e-5 of full scale
-BUNDLED = sorted((Path(__file__).resolve().parents[3] / "assets").glob("*.shift"))
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +39,9 @@ def assert_alike(both, scene: Scene, views: list[View]) -> None:
         assert psnr_db(both[0].image(i), wanted) >= LEAST_DB
 
 
-@pytest.mark.parametrize("path", BUNDLED, ids=lambda path: path.stem)
 @pytest.mark.parametrize("x", [0.0, 0.3, 0.5, 0.75, 1.0])
-def test_bundled_scenes_at_stops_and_between_them(both, path, x):
-    model = read_model(path)
+def test_the_bundled_scene_at_stops_and_between_them(both, x):
+    model = read_model(DEMO)
     centre = model.anchors.mean(axis=0)
     pose = look_at(centre + np.array([0.6, 0.5, 1.6]), centre)
     view = View(pose, (-0.5, 0.5, -0.3, 0.3), 0.05, 50, (256, 144))

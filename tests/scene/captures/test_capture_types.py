@@ -33,17 +33,20 @@ def told(folder) -> str:
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_every_value_of_every_type_in_every_place(tmp_path):
+    """Of the numbers of a list, which are read alike, each has a quarter of them in its turn."""
     (first, frame, last), more = whole(tmp_path)
     count = len(list(places_of({"frame": frame} | more)))
-    refused = 0
+    refused = tried = 0
     for place in range(count):
-        for value in SPECIAL_VALUES:
+        for turn, value in enumerate(SPECIAL_VALUES, place):
             tree = json.loads(json.dumps({"frame": frame} | more))
             holder, key = list(places_of(tree))[place]
+            if isinstance(holder, list) and turn % 4:
+                continue
             holder[key] = value
             write_transforms(tmp_path, [first, tree.pop("frame", value), last], **tree)
-            refused += bool(told(tmp_path))
-    assert count > 60 and refused > 0.7 * count * len(SPECIAL_VALUES)
+            tried, refused = tried + 1, refused + bool(told(tmp_path))
+    assert count > 60 and refused > 0.7 * tried
 
 
 OF_FRAMES = {

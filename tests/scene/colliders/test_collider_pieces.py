@@ -22,7 +22,7 @@ from shapeshift.scene.document.read_scene_file import read_scene_file
 from tests.support.scene.collider_shapes import shapes, solid
 
 ROOT = Path(__file__).resolve().parents[3]
-ASSETS = ROOT / "assets"
+EXAMPLES = ROOT / "examples"
 
 
 def box(x: float, size=(0.1, 0.1, 0.1)) -> trimesh.Trimesh:
@@ -182,7 +182,7 @@ def test_the_touch_scene_needs_no_collider_to_be_made(monkeypatch):
 
     monkeypatch.setattr("shapeshift.scene.colliders.convex_parts.run_coacd", None)
     monkeypatch.setattr("shapeshift.scene.colliders.collider.wrap", None)
-    file = read_scene_file(ASSETS / "touch.scene.json")
+    file = read_scene_file(EXAMPLES / "touch.scene.json")
     file, models = read_models(file)
     made = {i.name: one_collider(file, i, models[i.name], Making(kept=False))
             for i in file.all_items}  # fmt: skip
@@ -197,7 +197,7 @@ def test_the_shipped_colliders_are_what_the_program_makes(tmp_path):
     write_example(tmp_path)
     write_colliders(tmp_path)
     for name in ("ball", "ring"):
-        made, kept = (collider_of_mesh(f / f"touch/{name}.glb") for f in (tmp_path, ASSETS))
+        made, kept = (collider_of_mesh(f / f"touch/{name}.glb") for f in (tmp_path, EXAMPLES))
         assert parts_volume(made) == pytest.approx(parts_volume(kept), rel=0.05)
         one, two = (solid(c) for c in (made, kept))
         assert one.volume == pytest.approx(two.volume, rel=0.01)

@@ -21,7 +21,7 @@ TURN = round(math.sqrt(0.5), 9)
 
 @pytest.fixture
 def file() -> SceneFile:
-    return read_scene_file(ROOT / "assets" / "touch.scene.json")
+    return read_scene_file(ROOT / "examples" / "touch.scene.json")
 
 
 def names(file: SceneFile) -> list[str]:
@@ -139,7 +139,7 @@ def test_on_another_drive_paths_become_whole(file, tmp_path, monkeypatch):
     monkeypatch.undo()
     again = read_scene_file(tmp_path / "a.scene.json")
     assert [Path(item.model).is_absolute() for item in again.items] == [True] * 4
-    assert Path(again.items[0].model) == ROOT / "assets" / "touch" / "cube"
+    assert Path(again.items[0].model) == ROOT / "examples" / "touch" / "cube"
 
 
 def test_the_scene_s_own_edits(file):

@@ -12,8 +12,8 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles
 from tests.support.desktop.desktop_stand import PlainRenderer, ball, run_frames
+from tests.support.touch_scene import TOUCH as TOUCH
 
-TOUCH = Path(__file__).resolve().parents[3] / "assets" / "touch.scene.json"
 NAMES = ["background", "cube", "ball", "ring", "plate"]
 
 

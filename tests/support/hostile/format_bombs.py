@@ -9,7 +9,15 @@ from pathlib import Path
 import numpy as np
 
 import tests.support.splats.torch_files as torch_files
-from tests.support.hostile.bombs import bomb, deflated, npz_of_zeros, package, put, spz_zeros
+from tests.support.hostile.bombs import (
+    bomb,
+    deflated,
+    gzip_of_zeros,
+    npz_of_zeros,
+    package,
+    put,
+    spz_zeros,
+)
 from tests.support.splats.lcc_files import write_lcc, write_lcc2
 
 NAMES = ("x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2",
@@ -24,15 +32,15 @@ def package_of_150_bytes_for_each_of_its_own(folder: Path) -> Path:
     return package(folder, anchors_npz=npz, notes_bin=noise)
 
 
-def ply_of_zeros(count: int) -> bytes:
+def gzip_of_a_ply(count: int = 4_000_000) -> bytes:
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {count}"]
     lines += [f"property float {name}" for name in NAMES]
-    return "\n".join([*lines, "end_header", ""]).encode() + bytes(4 * len(NAMES) * count)
+    return gzip_of_zeros(4 * len(NAMES) * count, "\n".join([*lines, "end_header", ""]).encode())
 
 
 @bomb()
 def ply_of_zeros_in_gzip(folder: Path) -> Path:
-    return put(folder / "a.ply.gz", gzip.compress(ply_of_zeros(4_000_000), 9))
+    return put(folder / "a.ply.gz", gzip_of_a_ply())
 
 
 @bomb()
@@ -43,10 +51,7 @@ def spz_of_zeros_in_a_zip(folder: Path) -> Path:
 
 @bomb()
 def gzip_in_gzip_in_gzip(folder: Path) -> Path:
-    data = ply_of_zeros(4_000_000)
-    for _ in range(3):
-        data = gzip.compress(data, 9)
-    return put(folder / "a.gz", data)
+    return put(folder / "a.gz", gzip.compress(gzip.compress(gzip_of_a_ply(), 9), 9))
 
 
 @bomb()

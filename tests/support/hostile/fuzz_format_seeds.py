@@ -13,6 +13,7 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from tests.support.hostile.fuzz_run import Seed
 from tests.support.splats.ply_files import names_of, random_rows, write_rows
+from tests.support.touch_scene import TOUCH
 
 Made = Callable[[int, int], PlainSplats]  # of a count and a number of coefficients
 
@@ -55,13 +56,12 @@ def act_seeds() -> list[Seed]:
     """A scene file with all that it may say, and a script."""
     from shapeshift.scene.document.read_scene_file import read_scene_file
 
-    assets = Path(__file__).resolve().parents[3] / "assets"
-    items = read_scene_file(assets / "touch.scene.json").all_items
-    script = {"a.jsonl": (assets / "touch.jsonl").read_bytes()}
+    items = read_scene_file(TOUCH).all_items
+    script = {"a.jsonl": TOUCH.with_name("touch.jsonl").read_bytes()}
     return [
         Seed(
             "scene file",
-            {"a.scene.json": (assets / "touch.scene.json").read_bytes()},
+            {"a.scene.json": TOUCH.read_bytes()},
             read_scene_file,
         ),
         Seed("script", script, partial(named_script, items=items)),

@@ -1,7 +1,6 @@
 """What an eye of `launch.py vr` should see: the float64 reference at what a line says."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -12,9 +11,9 @@ from shapeshift.scene.document.scene_file import read_models, scene_of
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 from shapeshift.vr.play_space import PlaySpace
+from tests.support.touch_scene import TOUCH as SCENE
 from tests.support.xr.person import SIZE, pose_of
 
-SCENE = Path(__file__).resolve().parents[3] / "assets" / "touch.scene.json"
 ROUNDING = 1 / 255  # of eight bits, and of six decimals in the lines
 BEHIND = (0.0, 1.4, 1.5)  # where hands are not seen
 

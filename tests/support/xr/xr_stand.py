@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.support.touch_scene import TOUCH
 from tests.support.xr.remote import Remote
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -211,6 +212,8 @@ def start_program(
     **environment: str,
 ) -> Program:  # fmt: skip
     """`launch.py vr`, or a program like it; its lines, output and report in the stand's folder."""
+    if not any(Path(word).exists() for word in arguments):
+        arguments = (str(TOUCH), *arguments)
     out = ["--lines", stand.folder / "lines.jsonl"]
     out += ["--report", stand.folder / "report.json"] if reports else []
     command = [sys.executable, program, "vr", *arguments, *out]

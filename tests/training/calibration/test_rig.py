@@ -251,7 +251,7 @@ def test_both_modalities_are_read_with_pixels_of_one_angle(balls):
 @pytest.mark.parametrize("kind", ["turntable", "cut_out"])
 def test_what_stands_still_behind_a_calibrated_camera_is_said(tmp_path, kind):
     """Not where masks leave it out, nor where nothing does."""
-    make_stranger(tmp_path, kind, 1, (80, 60), 24)
+    make_stranger(tmp_path, kind, 1, (80, 60), 12)
     said = still_warning(read_capture(tmp_path), TrainSettings(), "RGB")
     assert bool(said) == (kind == "turntable")
     if said:

@@ -164,7 +164,8 @@ def test_no_point_is_left_of_none_and_all_of_those_that_nobody_sees():
     assert len(initial.one_a_cell(points, np.full(5, 1e-30))) == 1
 
 
-def test_without_points_depth_comes_before_the_hull(balls, photos, coarse):
+def test_without_points_depth_comes_before_the_hull(balls, photos, monkeypatch):
+    monkeypatch.setattr(initial, "visual_hulls", lambda *_: ([np.ones((9, 3))], ()))
     bare = replace(balls, points=None)
     assert initial_points(bare, photos, RNG(0))[1] == "depth photos"
     flat = [replace(p, depth=None) for p in photos]

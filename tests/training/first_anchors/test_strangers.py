@@ -63,7 +63,7 @@ def test_a_phones_photos_read_straight_are_what_the_tracer_sees_without_a_lens(p
     seen = radiance(KINDS["phone"], place, paint(np.random.default_rng(0), 8))
     found = []
     photos = open_photos(capture, 1, "object", None)
-    for photo in [*photos.train, *photos.test]:
+    for photo in [*photos.train, *photos.test][::3]:
         pose = photo.view.world_from_eye.matrix()
         pose[:3, 3] += capture.origin
         straight, _ = photograph(replace(photo.view, world_from_eye=Pose.from_matrix(pose)), seen)
@@ -71,7 +71,7 @@ def test_a_phones_photos_read_straight_are_what_the_tracer_sees_without_a_lens(p
     # A JPEG resampled once, full of edges: 31.1 to 35.1 dB.
     assert min(found) > 30
     bent = []
-    for name in sorted(path.name for path in (folder / "images").iterdir()):
+    for name in sorted(path.name for path in (folder / "images").iterdir())[::3]:
         straight, _ = photograph(views[int(name[6:11])], seen)
         with Image.open(folder / "images" / name) as picture:
             bent.append(likeness(np.asarray(picture, np.float32) / 255, straight, None))

@@ -118,13 +118,20 @@ def carried(photos: list[LoadedPhoto], where: np.ndarray) -> list[LoadedPhoto]:
 
 
 @pytest.fixture(scope="module")
-def photos_of(tmp_path_factory) -> Callable[[str], list[LoadedPhoto]]:
-    """Of a kind 28 photos, traced once."""
+def turntable(tmp_path_factory) -> tuple:
+    folder = tmp_path_factory.mktemp("turntable")
+    return folder, *make_stranger(folder, "turntable", 1, (80, 60), 32)
+
+
+@pytest.fixture(scope="module")
+def photos_of(turntable, tmp_path_factory) -> Callable[[str], list[LoadedPhoto]]:
+    """Of a kind 28 photos or more, traced once."""
 
     @cache
     def photos(kind: str) -> list[LoadedPhoto]:
-        folder = tmp_path_factory.mktemp(kind)
-        make_stranger(folder, kind, 1, (80, 60), 28)
+        folder = turntable[0]
+        if kind != "turntable":
+            make_stranger(folder := tmp_path_factory.mktemp(kind), kind, 1, (80, 60), 28)
         return load_photos(read_capture(folder), "train", 1, "ignore")
 
     return photos
@@ -187,12 +194,6 @@ def test_outlines_must_belong_to_one_object(photos_of):
     rng = RNG(0)
     shapes = [(p.view, np.hypot(x - rng.integers(80), y - rng.integers(60)) < 12) for p in apart]
     assert not still.fit_together(shapes)
-
-
-@pytest.fixture(scope="module")
-def turntable(tmp_path_factory) -> tuple:
-    folder = tmp_path_factory.mktemp("turntable")
-    return folder, *make_stranger(folder, "turntable", 1, (80, 60), 32)
 
 
 def true_masks(turntable: tuple) -> dict[str, np.ndarray]:

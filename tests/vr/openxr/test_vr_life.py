@@ -1,5 +1,6 @@
 """What of a session needs no runtime: its life, its pace, what it makes of what it is told."""
 
+import json
 import math
 import sys
 from dataclasses import dataclass
@@ -11,8 +12,9 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import IDENTITY
+from shapeshift.vr.openxr import instance as instance_module
 from shapeshift.vr.openxr.events import BEGIN, END, Life
-from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset, load
+from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset, load, manifests
 from shapeshift.vr.openxr.room import KINDS, choose_kind, moved_by
 from shapeshift.vr.openxr.session import choose_blend, eye_size, known_part, tangents_of
 from shapeshift.vr.pace import RECOVER, SETTLED, FramePace
@@ -270,6 +272,42 @@ def test_a_manifest_that_leads_nowhere_is_named(fake, monkeypatch):
     fake(fails=("enumerate_instance_extension_properties", "RuntimeUnavailableError"))
     with pytest.raises(NoHeadset, match=r"that XR_RUNTIME_JSON names, /nowhere\.json, cannot be"):
         Instance()
+
+
+ANY = "start SteamVR, WiVRn or Monado"
+NOT_RUN = {  # a manifest's runtime: its name, its library -> how it is called, what is to be run
+    ("Monado", "../lib/libopenxr_monado.so"): ("runtime Monado", "`monado-service`"),
+    ("", "libopenxr_wivrn.so"): (r"runtime of .*active_runtime\.json", "`wivrn-server`"),
+    ("Oculus", "x.dll"): ("runtime Oculus", "Meta's Link program"),
+    ("VD", "virtualdesktop-openxr.dll"): ("runtime VD", "Virtual Desktop's Streamer"),
+    ("Another\n" + 300 * "x", ""): ("runtime Another.*x", ANY),
+    "no object": ("the active OpenXR runtime", ANY),
+    None: ("the active OpenXR runtime", ANY),
+}
+
+
+@pytest.mark.parametrize(("about", "told_of"), NOT_RUN.items(), ids=lambda v: str(v)[:9])
+def test_a_runtime_whose_service_does_not_run_is_named(fake, monkeypatch, tmp_path, about, told_of):
+    """Its library answers and its service does not, as Monado's: found where the loader looks."""
+    monkeypatch.delenv("XR_RUNTIME_JSON", raising=False)
+    for name in ("XDG_CONFIG_HOME", "XDG_CONFIG_DIRS"):
+        monkeypatch.setenv(name, str(tmp_path / name))
+    monkeypatch.setattr(instance_module, "SYSTEM", str(tmp_path / "etc"))
+    monkeypatch.setattr("sys.platform", "linux")
+    manifest = tmp_path / "XDG_CONFIG_DIRS" / "openxr" / "1" / "active_runtime.json"
+    manifest.parent.mkdir(parents=True)
+    if about is not None:
+        named = (
+            dict(zip(("name", "library_path"), about, strict=True)) if len(about) == 2 else about
+        )
+        manifest.write_text(json.dumps({"file_format_version": "1.0.0", "runtime": named}))
+    said, to_do = told_of
+    fake(fails=("create_instance", "RuntimeFailureError"))
+    with pytest.raises(NoHeadset, match=f"{said}.* failed to open .*; .*{to_do}.*, then") as told:
+        Instance()
+    assert "\n" not in str(told.value) and len(str(told.value)) < 450
+    monkeypatch.setenv("XR_RUNTIME_JSON", str(manifest))  # alone counts
+    assert manifests() == [manifest]
 
 
 @pytest.mark.parametrize("error", ["InstanceLostError", "SessionLostError", "RuntimeFailureError"])

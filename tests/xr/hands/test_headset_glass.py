@@ -39,6 +39,7 @@ def distances(line: dict, eye: int) -> np.ndarray:
     return np.where(metres > 0, np.linalg.norm(meets, axis=2), np.inf)
 
 
+@pytest.mark.slow
 def test_each_eye_sees_the_stop_through_it_as_the_reference_draws_it(stand, start):
     pictures = stand.folder / "pictures"
     asked = ("--quality", "best", "--no-floor", "--no-hints", "--glass", "ICE")

@@ -38,6 +38,7 @@ def squeezed(person: Person, pictures: Path) -> list[int]:
     return [lit(pictures, line, eye) - lit(pictures, rest, eye) for eye in range(2)]
 
 
+@pytest.mark.slow
 def test_while_buttons_are_named_a_hand_is_the_controller_that_it_holds(stand, start):
     pictures = stand.folder / "pictures"
     program = start(stand, "--quality", "best", "--no-depth", "--pictures", str(pictures))

@@ -28,7 +28,7 @@ NAMES = ["background", "cube", "ball", "ring", "plate"]
 @pytest.fixture(scope="module")
 def touch() -> OpenedFiles:
     return read_files(
-        [ROOT / "assets" / "touch.scene.json"], None, CameraReading(), lambda *_: None
+        [ROOT / "examples" / "touch.scene.json"], None, CameraReading(), lambda *_: None
     )
 
 

@@ -55,8 +55,9 @@ def touch_viewer(window, touch_found, tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def playing_viewer(window, touch_found, tmp_path):
-    """The touch scene as the program opens it."""
+def playing_viewer(window, touch_found, tmp_path, monkeypatch):
+    """The touch scene as the program opens what it has brought along."""
+    monkeypatch.setattr("shapeshift.app.paths.ASSETS", TOUCH.parent)
     viewer = viewer_of(window, touch_found, tmp_path)
     yield viewer
     release(viewer)

@@ -9,6 +9,7 @@ import pytest
 from shapeshift.app.editor.panels import panel
 from shapeshift.app.editor.window.window import Drop
 from shapeshift.app.film.window.timeline import CAMERA, STOP
+from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.film.film_path import read_film_file
 from tests.support.desktop.desktop_stand import run_frames
@@ -187,3 +188,18 @@ def test_two_stops_are_picked_by_clicks_and_slid_between(viewer, hands, only, mo
     assert viewer.state.scene.objects[0].x != x
     hands.click(*widgets.middle("Stop"))
     assert not viewer.films.gallery.sliding
+
+
+def test_styles_have_a_row_of_their_own(viewer, only, monkeypatch):
+    """A style between two photographed stops parts neither of them in the gallery."""
+    only("Gallery")
+    named = {"RGB": "rgb", "Melt": "style", "Thermal": "thermal", "Opened": "layer"}
+    stops = tuple(Stop(name, x / 3, kind) for x, (name, kind) in enumerate(named.items()))
+    monkeypatch.setattr(type(viewer.films.gallery), "stops", stops)
+    widgets = Widgets(monkeypatch)
+    run_frames(viewer, 3)
+    photographed = [widgets.boxes[name] for name in ("RGB", "Thermal", "Opened")]
+    lefts = [left for left, *_ in photographed]
+    assert len({top for _, top, _, _ in photographed}) == 1 and lefts == sorted(lefts)
+    left, top, _, _ = widgets.boxes["Melt"]
+    assert top > photographed[0][3] and left == lefts[0]

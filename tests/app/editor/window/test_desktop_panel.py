@@ -153,7 +153,7 @@ def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
     assert (left + right) / 2 == pytest.approx((free[0] + free[2]) / 2, abs=1)
     assert (top + low) / 2 == pytest.approx((free[1] + free[3]) / 2, abs=1)
     with RealHands(viewer, display) as hands:
-        hands.click(*widgets.middle("Things to touch"))
+        hands.click(*widgets.middle("The demo"))
     assert viewer.files.busy or viewer.objects.saving.asking
     until_opened(viewer)
     viewer.objects.saving.answer("Do not save")

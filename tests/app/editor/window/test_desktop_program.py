@@ -174,7 +174,7 @@ def test_no_context_is_the_error_of_the_window(monkeypatch):
 
 def test_a_scene_file_opens_with_one_object_more(display, scene_file, tmp_path):
     out = tmp_path / "window.png"
-    touch = ROOT / "assets" / "touch.scene.json"
+    touch = ROOT / "examples" / "touch.scene.json"
     done = start(display, "view", touch, scene_file, "--screenshot", out, "--frames", 2)
     assert done.returncode == 0 and done.stdout == "", done.stderr
     assert np.asarray(Image.open(out)).std() > 10

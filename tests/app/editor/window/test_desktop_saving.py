@@ -32,7 +32,9 @@ from tests.support.desktop.widgets import Widgets
 
 
 @pytest.fixture
-def viewer(touch_viewer):
+def viewer(touch_viewer, monkeypatch):
+    """On a scene as if the program had brought it along."""
+    monkeypatch.setattr("shapeshift.app.paths.ASSETS", TOUCH.parent)
     return touch_viewer
 
 

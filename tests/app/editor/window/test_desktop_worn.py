@@ -9,11 +9,12 @@ from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.panels.slider import draw_slider
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.touch_state import TouchState
-from shapeshift.app.headset.headset import DEMO, Options
+from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.panel_picture import UI_SCALE, PanelPicture
 from shapeshift.app.headset.scene_shelf import open_xr
 from shapeshift.vr.panel import NOBODY
 from tests.support.desktop.widgets import Widgets
+from tests.support.touch_scene import TOUCH
 
 
 def recorded(monkeypatch, draw) -> list[str]:
@@ -26,7 +27,7 @@ def recorded(monkeypatch, draw) -> list[str]:
 
 def test_a_section_has_the_desktops_widgets(window, monkeypatch):
     """Each exists once: drawn in the window and in the texture it asks for the very same items."""
-    _, editor = open_xr(DEMO, Options())
+    _, editor = open_xr(TOUCH, Options())
     touch = TouchState(editor, True)
     objects = ObjectEdits(editor, None, lambda: None)
     sections = {

@@ -98,8 +98,13 @@ FORMULAS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("factor, least", [(1, 16), (2, 16), (2, 1), (3, 16), (3, 1), (7, 16)])
-@pytest.mark.parametrize("formula, keys, numbers, more", FORMULAS)
+SIZES = [(1, 16), (2, 16), (2, 1), (3, 16), (3, 1), (7, 16)]  # factor, least
+
+
+@pytest.mark.parametrize(
+    "formula, keys, numbers, more, factor, least",
+    [(*f, *size) for i, f in enumerate(FORMULAS) for size in SIZES[i % 2 :: 2]],  # each with half
+)
 def test_points_in_the_world_fall_where_the_view_says(
     tmp_path, monkeypatch, formula, keys, numbers, more, factor, least
 ):
