@@ -25,7 +25,7 @@ from shapeshift.app.editor.window.overlay.triangles import read_lists
 from shapeshift.app.editor.window.shown import FrameRequest
 from shapeshift.app.editor.window.window import CLICK_PIXELS, MOVING, KeyDown, Window
 
-FRAMES = 2  # after a press: in the first it acts, in the second what follows from that is drawn
+FRAMES = 3  # after a press: it acts, what follows from that is drawn, what flashed is gone
 NEAR = 1e-6  # of a number: nearer is the same place
 QUIET = {  # held while others are pressed, or the desktop's
     glfw.KEY_UNKNOWN, glfw.KEY_CAPS_LOCK, glfw.KEY_NUM_LOCK, glfw.KEY_SCROLL_LOCK, glfw.KEY_F11,
@@ -119,7 +119,10 @@ class Answers:
             return ()
         beside = request.beside and (request.beside.scene.objects, request.beside.cut)
         picture = (request.scene.objects, request.view, request.settings, beside)
-        return read_lists(data, ()), picture
+        lists = sorted(
+            read_lists(data, ()), key=lambda each: each.vertices
+        )  # a click reorders them
+        return tuple(lists), picture
 
     @property
     def _moves(self) -> bool:
@@ -175,10 +178,11 @@ class Answers:
         self._left -= 1
         x, y = self._window.cursor
         away = abs(x - self._place[0]) + abs(y - self._place[1]) > CLICK_PIXELS
-        if self._left or self._before is None or (self._key is None and away):
+        if self._left >= FRAMES - 1 or self._before is None or (self._key is None and away):
             return
         if not same(self._before, self._look(data)):
             return
+        self._left = 0
         messages = self._state.messages
         spoke = self._spoke if self._key else messages.count != self._said
         if spoke and messages.note:  # the same once more
